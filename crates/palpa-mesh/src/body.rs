@@ -1,0 +1,79 @@
+//! The layered body: a surface triangulation times levels.
+
+use crate::{Surface, Vec3};
+
+/// A body of triangular prisms: every vertex of a skin surface carries a *column* of `n_levels` nodes, from the skin
+/// (level 0) down to the rigid base (the last level). Between two neighbouring levels, over every triangle, stands a
+/// prism; it belongs to the layer of its interval.
+///
+/// ```text
+///        v2                 node (v, l) has the index v * n_levels + l
+///       /|\                 level 0   skin
+///      / | \                level 1   ┐ interval 0, layer interval_layer[0]
+///    v0--+--v1   level l    level 2   ┐ interval 1
+///     |  v2' |              ...
+///     | / \  |
+///    v0'---v1'   level l+1
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayeredBody {
+    /// The skin at rest, oriented outward; its points are the nodes of level 0.
+    pub skin: Surface,
+    /// Nodes at rest, node-major by column, in metres. `[n_vertices × n_levels]`
+    pub positions: Vec<Vec3>,
+    /// Nodes per column, at least 2.
+    pub n_levels: usize,
+    /// The layer of each interval between levels, from the skin down, ascending. `[n_levels − 1]`
+    pub interval_layer: Vec<usize>,
+    /// Names of the layers, from the skin down.
+    pub layer_names: Vec<String>,
+    /// For each skin vertex, the cut face (the end of a limb, the edge of a cut-out) that it lies on. `[n_vertices]`
+    pub cut_face: Vec<Option<u32>>,
+    /// The cut faces, in the order of the ids in `cut_face`.
+    pub cut_faces: Vec<CutFace>,
+}
+
+/// One face at which the body was cut from the rest: the end of a limb or the rim of a cut-out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutFace {
+    /// Unit normal pointing out of the body (mean, where the face is not flat).
+    pub normal: Vec3,
+    /// A point on the face.
+    pub point: Vec3,
+    /// Whether the loop of the skin lies in one plane.
+    pub is_flat: bool,
+}
+
+impl LayeredBody {
+    /// Number of columns, which is the number of skin vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.skin.points.len()
+    }
+
+    /// Number of nodes, `n_vertices × n_levels`.
+    pub fn n_nodes(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Number of prisms, `n_triangles × (n_levels − 1)`.
+    pub fn n_prisms(&self) -> usize {
+        self.skin.triangles.len() * (self.n_levels - 1)
+    }
+
+    /// The index of the node of vertex `v` at level `l`.
+    pub fn node(&self, v: usize, l: usize) -> usize {
+        debug_assert!(l < self.n_levels);
+        v * self.n_levels + l
+    }
+
+    /// The six nodes of the prism under triangle `t` in interval `i`: the upper triangle, then the lower.
+    pub fn prism(&self, t: usize, i: usize) -> [usize; 6] {
+        let [a, b, c] = self.skin.triangles[t].map(|v| self.node(v as usize, i));
+        [a, b, c, a + 1, b + 1, c + 1]
+    }
+
+    /// Whether a node belongs to the rigid base (the deepest level).
+    pub fn is_base(&self, node: usize) -> bool {
+        node % self.n_levels == self.n_levels - 1
+    }
+}

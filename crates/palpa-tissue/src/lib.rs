@@ -1,0 +1,1 @@
+//! Scene file, units and the tissue catalogue.
