@@ -39,7 +39,9 @@ impl Surface {
             }
         }
         for n in &mut normals {
-            *n = n.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vec3::zeros);
+            *n = n
+                .try_normalize(f64::MIN_POSITIVE)
+                .unwrap_or_else(Vec3::zeros);
         }
         normals
     }
@@ -62,8 +64,11 @@ impl Surface {
     /// Loops run as their triangles do. Edges that do not close (at non-manifold vertices) are left out.
     pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
         let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut directed: Vec<[u32; 2]> =
-            self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        let mut directed: Vec<[u32; 2]> = self
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+            .collect();
         directed.sort_unstable();
         for &[a, b] in &directed {
             if directed.binary_search(&[b, a]).is_err() {
@@ -75,7 +80,9 @@ impl Surface {
             let mut chain = vec![start];
             let mut at = start;
             let is_closed = loop {
-                let Some(ends) = next.get_mut(&at) else { break false };
+                let Some(ends) = next.get_mut(&at) else {
+                    break false;
+                };
                 let Some(to) = ends.pop() else { break false };
                 if ends.is_empty() {
                     next.remove(&at);
@@ -96,7 +103,11 @@ impl Surface {
     /// Smallest and largest coordinates, or `None` without points.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.points.first()?;
-        Some(self.points.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))))
+        Some(
+            self.points
+                .iter()
+                .fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))),
+        )
     }
 
     /// Mean edge length, in metres; 0 without edges.
@@ -105,8 +116,10 @@ impl Surface {
         if edges.is_empty() {
             return 0.0;
         }
-        let sum: f64 =
-            edges.iter().map(|&[a, b]| (self.points[a as usize] - self.points[b as usize]).norm()).sum();
+        let sum: f64 = edges
+            .iter()
+            .map(|&[a, b]| (self.points[a as usize] - self.points[b as usize]).norm())
+            .sum();
         sum / edges.len() as f64
     }
 }
