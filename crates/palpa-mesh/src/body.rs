@@ -27,20 +27,21 @@ pub struct LayeredBody {
     pub interval_layer: Vec<usize>,
     /// Names of the layers, from the skin down.
     pub layer_names: Vec<String>,
-    /// For each skin vertex, the cut face (the end of a limb, the edge of a cut-out) that it lies on. `[n_vertices]`
-    pub cut_face: Vec<Option<u32>>,
-    /// The cut faces, in the order of the ids in `cut_face`.
+    /// The faces at which the body was cut from the rest: ends of a limb, sides of a block, the rim of a cut-out.
     pub cut_faces: Vec<CutFace>,
 }
 
-/// One face at which the body was cut from the rest: the end of a limb or the rim of a cut-out.
+/// One face at which the body was cut from the rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutFace {
+    /// The skin vertices whose columns lie in the face, along the rim. A corner may belong to two faces.
+    pub vertices: Vec<u32>,
     /// Unit normal pointing out of the body (mean, where the face is not flat).
     pub normal: Vec3,
     /// A point on the face.
     pub point: Vec3,
-    /// Whether the loop of the skin lies in one plane.
+    /// Whether the face is a plane, in which the columns stay exactly. If not, it can be free or fixed, but it is no
+    /// plane of symmetry.
     pub is_flat: bool,
 }
 

@@ -4,10 +4,28 @@
 //! inward into a [`LayeredBody`].
 
 pub mod body;
+pub mod check;
+pub mod generate;
+pub mod distance;
+pub mod growth;
+pub mod quality;
+pub mod orient;
+pub mod read;
+pub mod repair;
 pub mod surface;
+mod topology;
+pub mod weld;
+pub mod write;
 
-pub use body::LayeredBody;
+pub use body::{CutFace, LayeredBody};
+pub use check::{SurfaceReport, Verdict, check_surface, examine};
+pub use distance::SurfaceIndex;
+pub use growth::{Growth, GrowthError, GrowthParams, LayerSpec, grow};
+pub use read::{Format, ReadError, SurfaceFile, read_surface, read_surface_bytes};
+pub use repair::{RepairOptions, RepairReport, repair};
 pub use surface::Surface;
+pub use weld::{weld_exact, weld_within};
+pub use write::{WriteError, write_surface};
 
 /// A point or vector in space, in metres unless a name says otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -100,6 +100,14 @@ impl Surface {
         loops
     }
 
+    /// A copy with every coordinate times `factor`, as from millimetres to metres by 0.001.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            points: self.points.iter().map(|p| p * factor).collect(),
+            triangles: self.triangles.clone(),
+        }
+    }
+
     /// Smallest and largest coordinates, or `None` without points.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.points.first()?;

@@ -1,1 +1,20 @@
-//! The command and facade.
+//! Feel what lies beneath the skin: the `palpa` command, and the facade that library users depend on.
+//!
+//! A skin surface is grown inward into layers of triangular prisms, pressed with a tool, and pushes back in newtons.
+//! The parts are crates of their own, re-exported here; this crate adds the command and what it writes.
+
+// `println!` panics when the reader has gone, as in `palpa check … | head`: print through `cli::Context`.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod cli;
+pub mod commands;
+
+pub mod output;
+pub mod plot;
+pub mod section;
+pub mod table;
+pub mod vtu;
+
+pub use palpa_mesh as mesh;
+pub use palpa_springs as springs;
+pub use palpa_tissue as tissue;

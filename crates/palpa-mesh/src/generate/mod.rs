@@ -1,0 +1,3 @@
+//! Bodies made by formula.
+
+pub mod patch;

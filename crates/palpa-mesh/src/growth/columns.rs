@@ -1,0 +1,215 @@
+//! The lines along which columns grow inward from the skin.
+
+use super::core::RigidCore;
+use crate::{CutFace, Surface, SurfaceIndex, Vec3};
+
+/// Where a column has turned fully from the skin's normal to the core's field, as a share of its room.
+const TURN_SHARE: f64 = 0.4;
+/// Longest step along a column, as a share of its room.
+const STEP_SHARE: f64 = 1.0 / 16.0;
+/// A column ends when it is this close to the core, as a share of its room.
+const END_SHARE: f64 = 2e-3;
+/// A column that has gone this many times its room without meeting the core ends there.
+const MAX_DETOUR: f64 = 3.0;
+const MAX_STEPS: usize = 200;
+
+/// A line inward from a skin vertex, as points at growing arc length.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    points: Vec<Vec3>,
+    arc: Vec<f64>,
+}
+
+impl Column {
+    fn starting_at(p: Vec3) -> Self {
+        Self { points: vec![p], arc: vec![0.0] }
+    }
+
+    fn push(&mut self, p: Vec3) {
+        let last = self.points[self.points.len() - 1];
+        let s = self.length() + (p - last).norm();
+        self.points.push(p);
+        self.arc.push(s);
+    }
+
+    /// Length of the whole line. m
+    pub(super) fn length(&self) -> f64 {
+        self.arc[self.arc.len() - 1]
+    }
+
+    /// The point at arc length `s`; beyond the end, straight on.
+    pub(super) fn at(&self, s: f64) -> Vec3 {
+        let n = self.arc.len();
+        if n == 1 {
+            return self.points[0];
+        }
+        let above = self.arc.partition_point(|&a| a < s).clamp(1, n - 1);
+        let (s0, s1) = (self.arc[above - 1], self.arc[above]);
+        if s1 <= s0 {
+            return self.points[above];
+        }
+        self.points[above - 1].lerp(&self.points[above], (s - s0) / (s1 - s0))
+    }
+}
+
+/// What keeps columns of a flat cut face in it: for each vertex the normals that its column must not follow.
+#[derive(Debug)]
+pub(super) struct Confinement {
+    normals: Vec<Vec<Vec3>>,
+}
+
+impl Confinement {
+    pub(super) fn new(n_vertices: usize, cuts: &[CutFace]) -> Self {
+        let mut normals = vec![Vec::new(); n_vertices];
+        for cut in cuts.iter().filter(|c| c.is_flat) {
+            for &v in &cut.vertices {
+                normals[v as usize].push(cut.normal);
+            }
+        }
+        Self { normals }
+    }
+
+    /// `direction` without its part across the cut faces of vertex `v`.
+    pub(super) fn project(&self, v: usize, direction: Vec3) -> Vec3 {
+        match self.normals[v][..] {
+            [] => direction,
+            [a, b] if a.cross(&b).norm() > 1e-6 => {
+                let common = a.cross(&b).normalize();
+                common * common.dot(&direction)
+            }
+            [a, ..] => direction - a * a.dot(&direction),
+        }
+    }
+
+    /// The same, as a unit vector where anything is left.
+    pub(super) fn confine(&self, v: usize, direction: Vec3) -> Vec3 {
+        if self.normals[v].is_empty() {
+            return direction;
+        }
+        self.project(v, direction).try_normalize(1e-9).unwrap_or(direction)
+    }
+}
+
+/// Vertices around each vertex.
+pub(super) fn one_rings(skin: &Surface) -> Vec<Vec<u32>> {
+    let mut rings = vec![Vec::new(); skin.points.len()];
+    for [a, b] in skin.edges() {
+        rings[a as usize].push(b);
+        rings[b as usize].push(a);
+    }
+    rings
+}
+
+/// Unit directions inward: the normals of the skin, smoothed over a length comparable with the depth, and turned back
+/// where smoothing would leave a triangle of the vertex behind.
+pub(super) fn inward_directions(
+    skin: &Surface,
+    rings: &[Vec<u32>],
+    confinement: &Confinement,
+    smoothing_length: f64,
+) -> Vec<Vec3> {
+    let normals = skin.vertex_normals();
+    let edge = skin.mean_edge_length().max(f64::MIN_POSITIVE);
+    let n_sweeps = ((smoothing_length / edge).powi(2).round() as usize).clamp(2, 40);
+    let mut directions: Vec<Vec3> = normals.iter().enumerate().map(|(v, n)| confinement.confine(v, -n)).collect();
+    for _ in 0..n_sweeps {
+        directions = (0..directions.len())
+            .map(|v| {
+                let ring = &rings[v];
+                let sum: Vec3 = ring.iter().map(|&u| directions[u as usize]).sum();
+                let mean = directions[v] + sum / ring.len().max(1) as f64;
+                confinement.confine(v, mean.try_normalize(0.0).unwrap_or(directions[v]))
+            })
+            .collect();
+    }
+    keep_in_sight(skin, &mut directions, confinement);
+    directions
+}
+
+/// Turns directions that leave a triangle of their vertex behind (or nearly) towards the inside of that triangle.
+fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinement) {
+    const MIN_COS: f64 = 0.3;
+    let mut faces: Vec<Vec<Vec3>> = vec![Vec::new(); directions.len()];
+    for (t, triangle) in skin.triangles.iter().enumerate() {
+        if let Some(n) = skin.area_vector(t).try_normalize(0.0) {
+            triangle.iter().for_each(|&v| faces[v as usize].push(-n));
+        }
+    }
+    for (v, direction) in directions.iter_mut().enumerate() {
+        // Perceptron steps: each adds a little of the face that is least in sight. It ends when all are, or gives up
+        // (a spike has no such direction; then the prisms are invalid and the growth says where).
+        for _ in 0..100 {
+            let Some(worst) = faces[v].iter().min_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction))) else {
+                break;
+            };
+            if worst.dot(direction) >= MIN_COS {
+                break;
+            }
+            let turned = (*direction + worst * 0.15).normalize();
+            *direction = confinement.confine(v, turned);
+        }
+    }
+}
+
+/// Straight columns along `directions`, as long as half of what lies between the skin and its far side, at most `depth`.
+pub(super) fn straight_columns(
+    skin: &Surface,
+    index: &SurfaceIndex,
+    directions: &[Vec3],
+    depth: impl Fn(usize) -> f64,
+) -> Vec<Column> {
+    const SHARE_OF_THICKNESS: f64 = 0.45;
+    skin.points
+        .iter()
+        .enumerate()
+        .map(|(v, &p)| {
+            let d = directions[v];
+            let s_min = 1e-6 * depth(v);
+            // A hit on the back of the surface is its far side; one on its front is a fold of skin seen from outside.
+            let across = index.ray(p, d, s_min).map_or(f64::INFINITY, |(s, _)| s);
+            let mut column = Column::starting_at(p);
+            column.push(p + d * depth(v).min(SHARE_OF_THICKNESS * across));
+            column
+        })
+        .collect()
+}
+
+/// A column from the vertex `v` of the skin down to the core: it leaves along `direction` and turns into the core's field.
+pub(super) fn column_to_core(
+    v: usize,
+    start: Vec3,
+    direction: Vec3,
+    core: &RigidCore,
+    confinement: &Confinement,
+) -> Column {
+    let mut column = Column::starting_at(start);
+    let room = core.distance(start);
+    if room <= 0.0 {
+        return column;
+    }
+    let heading = |x: Vec3, s: f64| {
+        let t = (s / (TURN_SHARE * room)).clamp(0.0, 1.0);
+        let turn = t * t * (3.0 - 2.0 * t);
+        let mixed = direction * (1.0 - turn) + core.direction(x) * turn;
+        confinement.confine(v, mixed.try_normalize(1e-9).unwrap_or(direction))
+    };
+    let (mut x, mut last) = (start, direction);
+    for _ in 0..MAX_STEPS {
+        let s = column.length();
+        let gap = core.distance(x);
+        if gap <= END_SHARE * room || s > MAX_DETOUR * room {
+            break;
+        }
+        let step = (0.9 * gap).min(STEP_SHARE * room);
+        let midpoint = x + heading(x, s) * (0.5 * step);
+        let next = heading(midpoint, s + 0.5 * step);
+        // Past a minimum of the field (beside a bone that ends just before a cut face) the line would swing to and fro.
+        if s > 0.5 * room && next.dot(&last) < 0.0 {
+            break;
+        }
+        last = next;
+        x += next * step;
+        column.push(x);
+    }
+    column
+}

@@ -1,0 +1,231 @@
+//! Faces at which a body part was cut from the rest: flat caps of a closed mesh, rims of an open one, cut-outs.
+
+use std::collections::BTreeMap;
+
+use crate::{CutFace, Surface, Vec3};
+
+/// Neighbouring triangles belong to one flat region while their normals differ less than this (0.5°).
+const FLAT_COS: f64 = 0.999_962;
+/// A cap meets the skin at a crease sharper than this, on average (30°).
+const CREASE_COS: f64 = 0.866;
+/// A flat region smaller than this share of the whole area is not a cap.
+const MIN_CAP_SHARE: f64 = 0.01;
+/// If flat regions make up more than this share, the body is a box, not a limb with cut ends.
+const MAX_CAPS_SHARE: f64 = 0.6;
+/// A rim is flat if it stays within this share of its extent from its plane.
+const FLAT_TOLERANCE: f64 = 5e-3;
+/// A rim is split into several cut faces at turns sharper than this (40°).
+const CORNER_COS: f64 = 0.766;
+/// More faces than this in one rim is a ragged edge, not a polygon.
+const MAX_SIDES: usize = 8;
+
+/// The triangles that form flat caps, one list per cap.
+pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
+    let n = surface.triangles.len();
+    let areas: Vec<Vec3> = (0..n).map(|t| surface.area_vector(t)).collect();
+    let normal = |t: usize| areas[t].try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    let pairs = triangle_pairs(surface);
+    let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); n];
+    for &(a, b) in &pairs {
+        if normal(a).dot(&normal(b)) > FLAT_COS {
+            neighbours[a].push(b);
+            neighbours[b].push(a);
+        }
+    }
+    let total: f64 = areas.iter().map(|a| a.norm()).sum();
+    let mut region = vec![usize::MAX; n];
+    let mut caps = Vec::new();
+    for seed in 0..n {
+        if region[seed] != usize::MAX {
+            continue;
+        }
+        let members = flood(seed, &neighbours, &mut region);
+        let area: f64 = members.iter().map(|&t| areas[t].norm()).sum();
+        // Flat as a whole, too: a smooth round surface also bends little from triangle to triangle.
+        let is_flat = members.iter().all(|&t| normal(t).dot(&normal(seed)) > FLAT_COS);
+        if area < MIN_CAP_SHARE * total || !is_flat || members.len() < 3 {
+            continue;
+        }
+        let mut crease = (0.0, 0);
+        for &(a, b) in &pairs {
+            if (region[a] == seed) != (region[b] == seed) {
+                crease = (crease.0 + normal(a).dot(&normal(b)), crease.1 + 1);
+            }
+        }
+        if crease.1 > 0 && crease.0 / f64::from(crease.1) < CREASE_COS {
+            caps.push(members);
+        }
+    }
+    let caps_area: f64 = caps.iter().flatten().map(|&t| areas[t].norm()).sum();
+    if caps_area > MAX_CAPS_SHARE * total { Vec::new() } else { caps }
+}
+
+/// Pairs of triangles that share an edge which no third triangle uses.
+fn triangle_pairs(surface: &Surface) -> Vec<(usize, usize)> {
+    let mut by_edge: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+    for (t, &[a, b, c]) in surface.triangles.iter().enumerate() {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            by_edge.entry([p.min(q), p.max(q)]).or_default().push(t);
+        }
+    }
+    by_edge.into_values().filter_map(|t| if let [a, b] = t[..] { Some((a, b)) } else { None }).collect()
+}
+
+fn flood(seed: usize, neighbours: &[Vec<usize>], mark: &mut [usize]) -> Vec<usize> {
+    let mut members = vec![seed];
+    mark[seed] = seed;
+    let mut next = 0;
+    while next < members.len() {
+        for &other in &neighbours[members[next]] {
+            if mark[other] == usize::MAX {
+                mark[other] = seed;
+                members.push(other);
+            }
+        }
+        next += 1;
+    }
+    members
+}
+
+/// The surface without the triangles for which `is_dropped`, and without the vertices that only those used.
+pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) -> bool) -> Surface {
+    let mut index = vec![u32::MAX; surface.points.len()];
+    let mut kept = Surface::default();
+    for (t, triangle) in surface.triangles.iter().enumerate() {
+        if is_dropped(t) {
+            continue;
+        }
+        kept.triangles.push(triangle.map(|v| {
+            let new = &mut index[v as usize];
+            if *new == u32::MAX {
+                *new = kept.points.len() as u32;
+                kept.points.push(surface.points[v as usize]);
+            }
+            *new
+        }));
+    }
+    kept
+}
+
+/// The part of a surface within `radius` of `centre`, connected with the vertex nearest to it; ragged teeth and
+/// vertices at which only corners meet are trimmed.
+pub(super) fn cut_out(surface: &Surface, centre: Vec3, radius: f64) -> Surface {
+    let is_near: Vec<bool> = surface.points.iter().map(|p| (p - centre).norm() <= radius).collect();
+    let mut part = without_triangles(surface, |t| !surface.triangles[t].iter().all(|&v| is_near[v as usize]));
+    loop {
+        let before = part.triangles.len();
+        part = trim_teeth(&part);
+        part = connected_with(&part, centre);
+        if part.triangles.len() == before {
+            return part;
+        }
+    }
+}
+
+/// Drops triangles that hang on one edge only, and the smaller fans at vertices shared by separate fans.
+fn trim_teeth(surface: &Surface) -> Surface {
+    let pairs = triangle_pairs(surface);
+    let mut n_neighbours = vec![0; surface.triangles.len()];
+    for &(a, b) in &pairs {
+        n_neighbours[a] += 1;
+        n_neighbours[b] += 1;
+    }
+    let mut loops_at = vec![0; surface.points.len()];
+    for v in surface.boundary_loops().into_iter().flatten() {
+        loops_at[v as usize] += 1;
+    }
+    without_triangles(surface, |t| {
+        n_neighbours[t] < 2 || surface.triangles[t].iter().any(|&v| loops_at[v as usize] > 1)
+    })
+}
+
+fn connected_with(surface: &Surface, centre: Vec3) -> Surface {
+    let mut neighbours = vec![Vec::new(); surface.triangles.len()];
+    for (a, b) in triangle_pairs(surface) {
+        neighbours[a].push(b);
+        neighbours[b].push(a);
+    }
+    let distance = |t: usize| surface.corners(t).iter().map(|p| (p - centre).norm()).fold(f64::INFINITY, f64::min);
+    let Some(seed) = (0..surface.triangles.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))) else {
+        return surface.clone();
+    };
+    let mut mark = vec![usize::MAX; surface.triangles.len()];
+    flood(seed, &neighbours, &mut mark);
+    without_triangles(surface, |t| mark[t] != seed)
+}
+
+/// The cut faces along the rims of an open surface.
+pub(super) fn find_cut_faces(skin: &Surface) -> Vec<CutFace> {
+    let normals = skin.vertex_normals();
+    let mut faces = Vec::new();
+    for rim in skin.boundary_loops() {
+        if let Some(end) = limb_end(skin, &normals, &rim) {
+            faces.push(end);
+            continue;
+        }
+        let sides = split_at_corners(skin, &rim);
+        let planes: Vec<CutFace> = sides.iter().map(|side| side_face(skin, &normals, side)).collect();
+        if sides.len() > 1 && sides.len() <= MAX_SIDES && planes.iter().all(|f| f.is_flat) {
+            faces.extend(planes);
+        } else {
+            let mut closed = rim.clone();
+            closed.extend(rim.first());
+            let mut face = side_face(skin, &normals, &closed);
+            face.vertices = rim;
+            face.is_flat = false;
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+/// The rim as the flat end of a limb: its own plane cuts the skin at a steep angle.
+fn limb_end(skin: &Surface, normals: &[Vec3], rim: &[u32]) -> Option<CutFace> {
+    let points: Vec<Vec3> = rim.iter().map(|&v| skin.points[v as usize]).collect();
+    let centre = points.iter().sum::<Vec3>() / points.len() as f64;
+    // Rims run as their triangles do, that is clockwise as seen from beyond the cut.
+    let mut area = Vec3::zeros();
+    for i in 0..points.len() {
+        area -= (points[i] - centre).cross(&(points[(i + 1) % points.len()] - centre));
+    }
+    let normal = area.try_normalize(0.0)?;
+    let extent = points.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+    let is_flat = points.iter().all(|p| (p - centre).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
+    let steepness = rim.iter().map(|&v| normals[v as usize].dot(&normal).abs()).sum::<f64>() / rim.len() as f64;
+    (is_flat && steepness < 0.6).then(|| CutFace { vertices: rim.to_vec(), normal, point: centre, is_flat: true })
+}
+
+/// A closed rim as runs of vertices between sharp turns; each run ends where the next begins.
+fn split_at_corners(skin: &Surface, rim: &[u32]) -> Vec<Vec<u32>> {
+    let n = rim.len();
+    let p = |i: usize| skin.points[rim[i % n] as usize];
+    let is_corner = |i: usize| {
+        let (before, after) = (p(i) - p(i + n - 1), p(i + 1) - p(i));
+        before.dot(&after) < CORNER_COS * before.norm() * after.norm()
+    };
+    let Some(first) = (0..n).find(|&i| is_corner(i)) else {
+        return Vec::new();
+    };
+    let mut sides = Vec::new();
+    let mut side = vec![rim[first]];
+    for i in first + 1..=first + n {
+        side.push(rim[i % n]);
+        if is_corner(i % n) {
+            sides.push(std::mem::replace(&mut side, vec![rim[i % n]]));
+        }
+    }
+    sides
+}
+
+/// A run of rim vertices as a face whose normal points out of the skin, along it.
+fn side_face(skin: &Surface, normals: &[Vec3], side: &[u32]) -> CutFace {
+    let p = |v: u32| skin.points[v as usize];
+    let outward: Vec3 =
+        side.windows(2).map(|e| (p(e[1]) - p(e[0])).cross(&(normals[e[0] as usize] + normals[e[1] as usize]))).sum();
+    let normal = outward.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    let point = side.iter().map(|&v| p(v)).sum::<Vec3>() / side.len() as f64;
+    let extent = side.iter().map(|&v| (p(v) - point).norm()).fold(0.0, f64::max);
+    let is_flat = normal != Vec3::zeros()
+        && side.iter().all(|&v| (p(v) - point).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
+    CutFace { vertices: side.to_vec(), normal, point, is_flat }
+}

@@ -1,0 +1,321 @@
+//! Growth of a skin surface inward into a layered body (method, eq. 3.1, on real shapes).
+//!
+//! 1. Flat caps of a closed limb are found and taken off; the rims become cut faces.
+//! 2. Every skin vertex gets a *column*: a line inward that leaves along the smoothed normal and turns into the field of
+//!    the rigid [`core`] (bones), or runs straight where there is no bone.
+//! 3. Levels are put on the columns by the thickness of the layers; where there is no room, all layers thin in proportion.
+//! 4. Every prism is measured. Where one is turned over or flat, the columns around it are evened out and, if that is not
+//!    enough, shortened; the core then stands off the bone there. If nothing helps, growth is refused, saying where.
+//!
+//! What was thinned, shortened and how far the core stands off the bones is in the [`GrowthReport`].
+
+mod columns;
+mod core;
+mod cut;
+mod report;
+mod thickness;
+mod untangle;
+
+use thiserror::Error;
+
+pub use report::{GrowthReport, LayerReport, Spread, Worst};
+pub use thickness::{ScatteredThickness, Thickness};
+
+use crate::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use columns::{Column, Confinement};
+use core::RigidCore;
+
+/// A layer down to the bone asks for at least this share of the thickness above it; where less is left, all layers thin
+/// in proportion. Without it the last layer would be squeezed to nothing before the others give way.
+const LEAST_FILL_SHARE: f64 = 0.2;
+
+/// What one layer asks for.
+#[derive(Debug, Clone)]
+pub struct LayerSpec {
+    /// Name, for messages and reports.
+    pub name: String,
+    /// Thickness below the skin, or `None` for a layer that reaches down to the bones (only the last one can).
+    pub thickness: Option<Thickness>,
+    /// Prisms through the layer's thickness, at least 1.
+    pub n_levels: usize,
+    /// Thickness that the layer keeps where there is no room, in metres; positive.
+    pub min_thickness: f64,
+}
+
+/// How a surface is to be grown.
+#[derive(Debug, Clone)]
+pub struct GrowthParams {
+    /// Layers from the skin down, at least one.
+    pub layers: Vec<LayerSpec>,
+    /// Keep only the part within this distance of a point: `(centre, radius)`, in metres.
+    pub cut_out: Option<(Vec3, f64)>,
+}
+
+/// A grown body with what a user should know about it.
+#[derive(Debug, Clone)]
+pub struct Growth {
+    /// The layered body.
+    pub body: LayeredBody,
+    /// Figures for people and machines.
+    pub report: GrowthReport,
+    /// By which factor the layers of each column were thinned (1: not at all). `[n_vertices]`
+    pub thinning: Vec<f64>,
+    /// How far the end of each column stands off the nearest bone, in metres, negative inside it; empty without
+    /// bones. `[n_vertices]`
+    pub stand_off: Vec<f64>,
+    /// Shape of each prism, triangle by triangle, intervals inside. `[n_prisms]`
+    pub scaled_jacobian: Vec<f64>,
+}
+
+/// Why a body could not be grown.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum GrowthError {
+    /// The surface has no triangles, or none is left after cutting.
+    #[error("{what} has no triangles; give a skin surface with faces")]
+    Empty {
+        /// Which surface.
+        what: String,
+    },
+    /// The surface is not fit to be grown.
+    #[error("the skin cannot be grown: {reason}; run `palpa check` on it and repair it first")]
+    BadSurface {
+        /// What is wrong and where.
+        reason: String,
+    },
+    /// A layer specification that makes no sense.
+    #[error("layer \"{name}\": {reason}")]
+    BadLayer {
+        /// The layer.
+        name: String,
+        /// What is wrong with it, and what to do.
+        reason: String,
+    },
+    /// A bone comes through the skin.
+    #[error(
+        "bone {bone} comes {:.1} mm out of the skin at ({:.1}, {:.1}, {:.1}) mm; check that skin and bones use the \
+         same frame and unit, or move the bone inside",
+        depth * 1e3, at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+    )]
+    BoneOutside {
+        /// Index of the bone in the list given.
+        bone: usize,
+        /// How far outside. m
+        depth: f64,
+        /// Where. m
+        at: [f64; 3],
+    },
+    /// The layers ask for more than the body has, everywhere.
+    #[error(
+        "the layers are thicker than the body: they ask for {:.2} mm, and the most room below any skin point is \
+         {:.2} mm; make the layers thinner, or check the unit of the surface",
+        asked * 1e3, room * 1e3
+    )]
+    NoRoom {
+        /// Sum of the layers' thickness where there is most room. m
+        asked: f64,
+        /// The most room there is. m
+        room: f64,
+    },
+    /// Prisms stayed turned over whatever was tried.
+    #[error(
+        "{n_bad} of {n_prisms} prisms cannot be given a positive volume; the worst is in layer \"{layer}\" under \
+         skin vertex {vertex} at ({:.1}, {:.1}, {:.1}) mm; smooth or remesh the skin there, or use thinner layers",
+        at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+    )]
+    Tangled {
+        /// Prisms that are not valid.
+        n_bad: usize,
+        /// All prisms.
+        n_prisms: usize,
+        /// The layer of the worst.
+        layer: String,
+        /// A skin vertex of the worst.
+        vertex: u32,
+        /// Its position. m
+        at: [f64; 3],
+    },
+}
+
+/// Grows `surface` inward, down to `bones` where a layer asks for it.
+///
+/// `surface` must be oriented outward and edge-manifold. Cost: about `n_vertices × (steps of a column ≈ 30) ×
+/// (sources of the core's field ≈ 1000)`, a second for 10,000 vertices.
+///
+/// # Errors
+/// [`GrowthError`], with the place.
+pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Result<Growth, GrowthError> {
+    check_layers(&params.layers, bones)?;
+    check_surface(surface, "the skin")?;
+    for (i, bone) in bones.iter().enumerate() {
+        check_points(bone, &format!("bone {i}"))?;
+    }
+
+    let caps = cut::find_caps(surface);
+    let mut is_cap = vec![false; surface.triangles.len()];
+    caps.iter().flatten().for_each(|&t| is_cap[t] = true);
+    let mut skin = cut::without_triangles(surface, |t| is_cap[t]);
+    if let Some((centre, radius)) = params.cut_out {
+        skin = cut::cut_out(&skin, centre, radius);
+        if skin.triangles.is_empty() {
+            return Err(GrowthError::Empty { what: format!("the skin within {:.1} mm of the cut-out's centre", radius * 1e3) });
+        }
+    }
+    let cuts = cut::find_cut_faces(&skin);
+    let (lo, hi) = skin.bounds().unwrap_or_default();
+    let size = (hi - lo).max();
+
+    let rings = columns::one_rings(&skin);
+    let confinement = Confinement::new(skin.points.len(), &cuts);
+    let skin_index = SurfaceIndex::build(&skin);
+    let fixed_depth = |v: usize| -> f64 {
+        params.layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin.points[v])).sum()
+    };
+    check_thickness(&skin, &params.layers)?;
+    let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
+    let mean_depth = (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
+    let smoothing = if reaches_bone { 2.0 * mean_depth.max(0.02 * size) } else { mean_depth };
+    let directions = columns::inward_directions(&skin, &rings, &confinement, smoothing);
+
+    let (lines, core): (Vec<Column>, Option<RigidCore>) = if reaches_bone {
+        let core = RigidCore::build(bones, &cuts, size);
+        core.check_inside(bones, &skin_index, &cuts, size)?;
+        let lines = (0..skin.points.len())
+            .map(|v| columns::column_to_core(v, skin.points[v], directions[v], &core, &confinement))
+            .collect();
+        (lines, Some(core))
+    } else {
+        (columns::straight_columns(&skin, &skin_index, &directions, fixed_depth), None)
+    };
+    check_room(&skin, &params.layers, &lines)?;
+
+    let n_levels = 1 + params.layers.iter().map(|l| l.n_levels).sum::<usize>();
+    let mut body = LayeredBody {
+        positions: vec![Vec3::zeros(); skin.points.len() * n_levels],
+        skin,
+        n_levels,
+        interval_layer: params.layers.iter().enumerate().flat_map(|(i, l)| vec![i; l.n_levels]).collect(),
+        layer_names: params.layers.iter().map(|l| l.name.clone()).collect(),
+        cut_faces: cuts,
+    };
+    let outcome = untangle::place_levels(&mut body, &lines, &params.layers, &rings, &confinement, core.as_ref())?;
+    Ok(report::finish(body, &params.layers, outcome, core.as_ref(), caps.len()))
+}
+
+/// What a layer that reaches down to the bone asks for at least, given the thickness of the layers above it. m
+fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
+    layer.min_thickness.max(LEAST_FILL_SHARE * fixed)
+}
+
+/// Where the levels of one column lie: arc lengths of its nodes, and the factor by which its layers were thinned.
+fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<f64>) -> f64 {
+    let fixed: f64 = layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin_point)).sum();
+    let nominal = |l: &LayerSpec| match &l.thickness {
+        Some(t) => t.at(skin_point),
+        None => least_fill(l, fixed).max(room - fixed),
+    };
+    let asked: f64 = layers.iter().map(nominal).sum();
+    let factor = if asked > room { room / asked } else { 1.0 };
+    arcs.clear();
+    arcs.push(0.0);
+    let mut s = 0.0;
+    for layer in layers {
+        let thickness = (nominal(layer) * factor).max(layer.min_thickness.min(nominal(layer)));
+        for i in 1..=layer.n_levels {
+            arcs.push(s + thickness * i as f64 / layer.n_levels as f64);
+        }
+        s += thickness;
+    }
+    factor
+}
+
+fn check_layers(layers: &[LayerSpec], bones: &[Surface]) -> Result<(), GrowthError> {
+    let bad = |name: &str, reason: &str| {
+        Err(GrowthError::BadLayer { name: name.to_owned(), reason: reason.to_owned() })
+    };
+    let Some((last, above)) = layers.split_last() else {
+        return bad("", "a body needs at least one layer");
+    };
+    for layer in layers {
+        if layer.n_levels == 0 {
+            return bad(&layer.name, "has 0 levels; give it at least 1");
+        }
+        if !(layer.min_thickness > 0.0 && layer.min_thickness.is_finite()) {
+            return bad(&layer.name, "its smallest thickness must be positive");
+        }
+    }
+    if let Some(layer) = above.iter().find(|l| l.thickness.is_none()) {
+        return bad(&layer.name, "only the deepest layer can reach down to the bone; give this one a thickness");
+    }
+    if last.thickness.is_none() && bones.iter().all(|b| b.triangles.is_empty()) {
+        return bad(&last.name, "has no thickness and there is no bone to reach down to; give it a thickness or add bones");
+    }
+    Ok(())
+}
+
+fn check_thickness(skin: &Surface, layers: &[LayerSpec]) -> Result<(), GrowthError> {
+    for layer in layers {
+        let Some(thickness) = &layer.thickness else { continue };
+        for (v, &p) in skin.points.iter().enumerate() {
+            let d = thickness.at(p);
+            if !(d > 0.0 && d.is_finite()) {
+                return Err(GrowthError::BadLayer {
+                    name: layer.name.clone(),
+                    reason: format!(
+                        "{:.3} mm thick at skin vertex {v} ({:.1}, {:.1}, {:.1}) mm; a thickness must be positive everywhere",
+                        d * 1e3, p.x * 1e3, p.y * 1e3, p.z * 1e3
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_points(surface: &Surface, what: &str) -> Result<(), GrowthError> {
+    if surface.triangles.is_empty() {
+        return Err(GrowthError::Empty { what: what.to_owned() });
+    }
+    if let Some(v) = surface.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(GrowthError::BadSurface { reason: format!("vertex {v} of {what} is not finite") });
+    }
+    Ok(())
+}
+
+fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
+    check_points(surface, what)?;
+    let mut directed: Vec<[u32; 2]> =
+        surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    directed.sort_unstable();
+    if let Some(pair) = directed.windows(2).find(|w| w[0] == w[1]) {
+        let [a, b] = pair[0];
+        let p = surface.points[a as usize];
+        return Err(GrowthError::BadSurface {
+            reason: format!(
+                "the edge from vertex {a} to {b} at ({:.1}, {:.1}, {:.1}) mm belongs to several triangles of the same \
+                 direction (mixed winding or more than two faces on an edge)",
+                p.x * 1e3, p.y * 1e3, p.z * 1e3
+            ),
+        });
+    }
+    if let Some(t) = (0..surface.triangles.len()).find(|&t| surface.area_vector(t).norm() == 0.0) {
+        return Err(GrowthError::BadSurface { reason: format!("triangle {t} of {what} has no area") });
+    }
+    Ok(())
+}
+
+/// Refuses when the layers of given thickness find room nowhere.
+fn check_room(skin: &Surface, layers: &[LayerSpec], lines: &[Column]) -> Result<(), GrowthError> {
+    let asked = |v: usize| -> f64 {
+        let fixed: f64 = layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin.points[v])).sum();
+        fixed + layers.iter().filter(|l| l.thickness.is_none()).map(|l| least_fill(l, fixed)).sum::<f64>()
+    };
+    let best = (0..lines.len())
+        .max_by(|&a, &b| (lines[a].length() / asked(a)).total_cmp(&(lines[b].length() / asked(b))));
+    match best {
+        Some(v) if lines[v].length() < 0.999 * asked(v) => {
+            Err(GrowthError::NoRoom { asked: asked(v), room: lines[v].length() })
+        }
+        _ => Ok(()),
+    }
+}

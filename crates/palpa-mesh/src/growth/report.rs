@@ -1,0 +1,178 @@
+//! What a user should know about a grown body.
+
+use serde::Serialize;
+
+use super::core::RigidCore;
+use super::untangle::Placement;
+use super::{Growth, LayerSpec};
+use crate::{LayeredBody, Vec3};
+
+/// A place at which a figure is worst.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worst {
+    /// The figure there.
+    pub value: f64,
+    /// Skin vertex above it.
+    pub vertex: u32,
+    /// Position of that vertex. m
+    pub at: [f64; 3],
+}
+
+/// Minimum, some quantiles and maximum of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub min: f64,
+    /// 5 % lie below.
+    pub p05: f64,
+    /// Half lie below.
+    pub median: f64,
+    /// 95 % lie below.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// The spread of `values`, or `None` of none.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        let at = |q: f64| sorted[(q * last as f64).round() as usize];
+        Some(Self { min: at(0.0), p05: at(0.05), median: at(0.5), p95: at(0.95), max: at(1.0) })
+    }
+}
+
+/// Thickness that a layer got.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LayerReport {
+    /// Name of the layer.
+    pub name: String,
+    /// Prisms through its thickness.
+    pub n_levels: usize,
+    /// Thickness over the skin vertices, along the columns. m
+    pub thickness: Spread,
+}
+
+/// Figures of a grown body.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GrowthReport {
+    /// Skin vertices, which is the number of columns.
+    pub n_vertices: usize,
+    /// Nodes per column.
+    pub n_levels: usize,
+    /// Nodes.
+    pub n_nodes: usize,
+    /// Prisms; all are valid.
+    pub n_prisms: usize,
+    /// Flat caps that were found on a closed limb and not grown from.
+    pub n_caps: usize,
+    /// Cut faces (ends, sides, rims).
+    pub n_cut_faces: usize,
+    /// Scaled Jacobian of the prisms; 1 is best, above 0 is valid.
+    pub scaled_jacobian: Spread,
+    /// The worst prism.
+    pub worst_prism: Worst,
+    /// Thickness of each layer.
+    pub layers: Vec<LayerReport>,
+    /// Share of the skin's area below which the layers had to be thinned.
+    pub thinned_share: f64,
+    /// The strongest thinning (factor of the thickness), if any.
+    pub worst_thinning: Option<Worst>,
+    /// Share of the skin's area below which columns were shortened to keep prisms valid.
+    pub shortened_share: f64,
+    /// How far the ends of the columns stand off the nearest bone, negative inside it; absent without bones. m
+    pub stand_off: Option<Spread>,
+    /// The largest stand-off, absent without bones.
+    pub worst_stand_off: Option<Worst>,
+}
+
+pub(super) fn finish(
+    body: LayeredBody,
+    layers: &[LayerSpec],
+    placement: Placement,
+    core: Option<&RigidCore>,
+    n_caps: usize,
+) -> Growth {
+    let Placement { thinning, used_share, shapes } = placement;
+    let n_intervals = body.n_levels - 1;
+    let scaled_jacobian: Vec<f64> = shapes.iter().map(|s| s.scaled_jacobian).collect();
+    let worst_at = |vertex: usize, value: f64| Worst {
+        value,
+        vertex: vertex as u32,
+        at: body.skin.points[vertex].into(),
+    };
+    let worst_prism = (0..shapes.len())
+        .min_by(|&a, &b| scaled_jacobian[a].total_cmp(&scaled_jacobian[b]))
+        .map_or(0, |p| p);
+    let worst_prism =
+        worst_at(body.skin.triangles[worst_prism / n_intervals][0] as usize, scaled_jacobian[worst_prism]);
+
+    let bases = (0..body.n_vertices()).map(|v| body.positions[body.node(v, body.n_levels - 1)]);
+    let stand_off: Vec<f64> = core.map_or_else(Vec::new, |core| bases.map(|p| core.bone_distance(p)).collect());
+    let extreme = |values: &[f64], sign: f64| {
+        (0..values.len())
+            .max_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b])))
+            .map(|v| worst_at(v, values[v]))
+    };
+    let vertex_areas = vertex_areas(&body);
+    let total: f64 = vertex_areas.iter().sum();
+    let share = |is_in: &dyn Fn(usize) -> bool| {
+        (0..body.n_vertices()).filter(|&v| is_in(v)).map(|v| vertex_areas[v]).sum::<f64>() / total
+    };
+    let report = GrowthReport {
+        n_vertices: body.n_vertices(),
+        n_levels: body.n_levels,
+        n_nodes: body.n_nodes(),
+        n_prisms: body.n_prisms(),
+        n_caps,
+        n_cut_faces: body.cut_faces.len(),
+        scaled_jacobian: Spread::of(&scaled_jacobian).unwrap_or(Spread {
+            min: 0.0,
+            p05: 0.0,
+            median: 0.0,
+            p95: 0.0,
+            max: 0.0,
+        }),
+        worst_prism,
+        layers: layer_reports(&body, layers),
+        thinned_share: share(&|v| thinning[v] < 1.0 - 1e-9),
+        worst_thinning: extreme(&thinning, -1.0).filter(|w| w.value < 1.0 - 1e-9),
+        shortened_share: share(&|v| used_share[v] < 1.0 - 1e-9),
+        stand_off: Spread::of(&stand_off),
+        worst_stand_off: extreme(&stand_off, 1.0),
+    };
+    Growth { body, report, thinning, stand_off, scaled_jacobian }
+}
+
+/// A third of the area of the triangles around each vertex. m²
+fn vertex_areas(body: &LayeredBody) -> Vec<f64> {
+    let mut areas = vec![0.0; body.n_vertices()];
+    for (t, triangle) in body.skin.triangles.iter().enumerate() {
+        let third = body.skin.area_vector(t).norm() / 3.0;
+        triangle.iter().for_each(|&v| areas[v as usize] += third);
+    }
+    areas
+}
+
+fn layer_reports(body: &LayeredBody, layers: &[LayerSpec]) -> Vec<LayerReport> {
+    layers
+        .iter()
+        .enumerate()
+        .filter_map(|(id, layer)| {
+            let intervals: Vec<usize> = (0..body.n_levels - 1).filter(|&i| body.interval_layer[i] == id).collect();
+            let segment = |v: usize, i: usize| -> Vec3 {
+                body.positions[body.node(v, i + 1)] - body.positions[body.node(v, i)]
+            };
+            let thickness: Vec<f64> = (0..body.n_vertices())
+                .map(|v| intervals.iter().map(|&i| segment(v, i).norm()).sum())
+                .collect();
+            Some(LayerReport {
+                name: layer.name.clone(),
+                n_levels: layer.n_levels,
+                thickness: Spread::of(&thickness)?,
+            })
+        })
+        .collect()
+}

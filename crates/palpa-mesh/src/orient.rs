@@ -1,0 +1,232 @@
+//! Which way triangles face: one winding over each part, and outward.
+
+use serde::Serialize;
+
+use crate::topology::{Side, UnionFind, all_sides, by_edge, has_repeated_vertex, sides};
+use crate::{Surface, Vec3};
+
+/// The least share of the volume of a ball of the same area below which the side on which an open sheet bulges is
+/// not taken to mean anything. A cap of 10° opening is at 0.03; noise on a flat sheet is far below.
+const LEAST_BULGE: f64 = 1e-3;
+
+/// What turning triangles has come to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct OrientReport {
+    /// Triangles that were turned to agree with their neighbours or to face outward.
+    pub n_flipped: usize,
+    /// Closed parts that were inside out as a whole.
+    pub n_inverted_closed: usize,
+    /// Open parts that faced the hollow side as a whole.
+    pub n_inverted_open: usize,
+    /// Open parts too flat to tell which side is out; they were made consistent only.
+    pub n_undecided: usize,
+    /// Parts that have but one side, as a Möbius strip has, and so no winding.
+    pub n_one_sided: usize,
+}
+
+/// A part whose triangles meet pairwise over edges, and how each would have to be turned.
+#[derive(Debug)]
+pub(crate) struct Patch {
+    /// Triangles, ascending.
+    pub(crate) triangles: Vec<u32>,
+    /// Whether each triangle is wound against the majority of its patch.
+    pub(crate) is_odd: Vec<bool>,
+    /// Whether no consistent winding exists.
+    pub(crate) is_one_sided: bool,
+}
+
+/// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more meet, which
+/// two belong together is not known, and no winding is carried across.
+pub(crate) fn patches(surface: &Surface) -> Vec<Patch> {
+    let n = surface.triangles.len();
+    let all = all_sides(surface);
+    let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); n];
+    let mut sets = UnionFind::new(n);
+    for on_edge in by_edge(&all) {
+        if let &[a, b] = on_edge {
+            let agrees = a.is_forward != b.is_forward;
+            neighbours[a.triangle as usize].push((b.triangle, agrees));
+            neighbours[b.triangle as usize].push((a.triangle, agrees));
+            sets.join(a.triangle, b.triangle);
+        }
+    }
+    let mut is_odd: Vec<Option<bool>> = vec![None; n];
+    sets.groups()
+        .into_iter()
+        .filter(|group| !has_repeated_vertex(surface.triangles[group[0] as usize]))
+        .map(|triangles| {
+            let mut is_one_sided = false;
+            let mut open = vec![triangles[0]];
+            is_odd[triangles[0] as usize] = Some(false);
+            while let Some(t) = open.pop() {
+                let here = is_odd[t as usize] == Some(true);
+                for &(other, agrees) in &neighbours[t as usize] {
+                    let there = here == agrees;
+                    match is_odd[other as usize] {
+                        None => {
+                            is_odd[other as usize] = Some(there);
+                            open.push(other);
+                        }
+                        Some(known) => is_one_sided |= known != there,
+                    }
+                }
+            }
+            let mut is_odd: Vec<bool> = triangles
+                .iter()
+                .map(|&t| is_odd[t as usize] == Some(true))
+                .collect();
+            // The majority is taken to be right, so that the fewest triangles turn.
+            if 2 * is_odd.iter().filter(|&&odd| odd).count() > is_odd.len() {
+                is_odd.iter_mut().for_each(|odd| *odd = !*odd);
+            }
+            Patch {
+                triangles,
+                is_odd,
+                is_one_sided,
+            }
+        })
+        .collect()
+}
+
+/// Winds every part consistently and outward.
+///
+/// A closed part is outward when its volume is positive. An open part is closed in thought by a fan over each of its
+/// boundary loops, from the centre of the loop: a limb cut at both ends becomes a limb with caps, and a sheet faces the side
+/// on which it bulges. For a sheet cut from a hollow (an armpit) that is the wrong side, and for a flat one there is no
+/// telling; the report counts both.
+pub fn orient(surface: &mut Surface) -> OrientReport {
+    let mut report = OrientReport::default();
+    for patch in patches(surface) {
+        if patch.is_one_sided {
+            report.n_one_sided += 1;
+            continue;
+        }
+        for (&t, _) in patch
+            .triangles
+            .iter()
+            .zip(&patch.is_odd)
+            .filter(|(_, odd)| **odd)
+        {
+            flip(surface, t);
+        }
+        let shape = Enclosed::of(surface, &patch.triangles);
+        let is_inverted = match (shape.is_closed, shape.facing()) {
+            (_, None) => {
+                report.n_undecided += 1;
+                false
+            }
+            (_, Some(is_outward)) => !is_outward,
+        };
+        if is_inverted {
+            if shape.is_closed {
+                report.n_inverted_closed += 1;
+            } else {
+                report.n_inverted_open += 1;
+            }
+            for &t in &patch.triangles {
+                flip(surface, t);
+            }
+        }
+        let turned = patch
+            .is_odd
+            .iter()
+            .filter(|&&odd| odd != is_inverted)
+            .count();
+        report.n_flipped += turned;
+    }
+    report
+}
+
+fn flip(surface: &mut Surface, t: u32) {
+    surface.triangles[t as usize].swap(1, 2);
+}
+
+/// What some triangles enclose, once their boundary loops are capped. Triangles that are not finite count as absent.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Enclosed {
+    /// Signed volume, positive when the triangles face outward. m³
+    pub(crate) volume: f64,
+    /// Area of the triangles, without caps. m²
+    pub(crate) area: f64,
+    /// Whether there was nothing to cap.
+    pub(crate) is_closed: bool,
+}
+
+impl Enclosed {
+    pub(crate) fn of(surface: &Surface, triangles: &[u32]) -> Self {
+        let is_finite = |corners: &[Vec3; 3]| corners.iter().flatten().all(|x| x.is_finite());
+        let finite: Vec<[Vec3; 3]> = triangles
+            .iter()
+            .map(|&t| surface.corners(t as usize))
+            .filter(is_finite)
+            .collect();
+        // Volumes are taken about a point of the part: about a far origin they would be differences of huge numbers.
+        let origin = finite
+            .first()
+            .map_or_else(Vec3::zeros, |corners| corners[0]);
+        let cross = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a));
+        let sixfold = |corners: [Vec3; 3]| {
+            let [a, b, c] = corners.map(|p| p - origin);
+            a.cross(&b).dot(&c)
+        };
+        let mut volume: f64 = finite.iter().map(|&t| sixfold(t)).sum();
+        let area = finite.iter().map(|&t| cross(t).norm() / 2.0).sum();
+        let boundary = boundary_sides(&sides(surface, triangles.iter().copied()));
+        for chain in chains(&boundary) {
+            let ends = |side: &Side| side.directed().map(|v| surface.points[v as usize]);
+            let centre = chain.iter().map(|side| ends(side)[0]).sum::<Vec3>() / chain.len() as f64;
+            let caps = chain
+                .iter()
+                .map(|side| [ends(side)[1], ends(side)[0], centre]);
+            volume += caps.filter(is_finite).map(sixfold).sum::<f64>();
+        }
+        Self {
+            volume: volume / 6.0,
+            area,
+            is_closed: boundary.is_empty(),
+        }
+    }
+
+    /// Whether the triangles face outward, or `None` where an open part is too flat to say.
+    pub(crate) fn facing(&self) -> Option<bool> {
+        let ball = self.area.powf(1.5) / (6.0 * std::f64::consts::PI.sqrt());
+        let is_clear = self.is_closed || self.volume.abs() > LEAST_BULGE * ball;
+        is_clear.then_some(self.volume >= 0.0)
+    }
+}
+
+/// The sides without a partner in the other direction.
+pub(crate) fn boundary_sides(sides: &[Side]) -> Vec<Side> {
+    by_edge(sides)
+        .flat_map(|on_edge| {
+            let n_forward = on_edge.iter().filter(|s| s.is_forward).count();
+            let n_paired = n_forward.min(on_edge.len() - n_forward);
+            let unpaired = |is_forward: bool| {
+                on_edge
+                    .iter()
+                    .filter(move |s| s.is_forward == is_forward)
+                    .skip(n_paired)
+            };
+            unpaired(true).chain(unpaired(false)).copied()
+        })
+        .collect()
+}
+
+/// Boundary sides sorted into those that hang together by their vertices. At the rim of a fin, which ends at an edge of three
+/// triangles, a chain need not close.
+pub(crate) fn chains(boundary: &[Side]) -> Vec<Vec<Side>> {
+    let mut at_vertex: Vec<(u32, u32)> = boundary
+        .iter()
+        .enumerate()
+        .flat_map(|(i, side)| side.edge.map(|v| (v, i as u32)))
+        .collect();
+    at_vertex.sort_unstable();
+    let mut sets = UnionFind::new(boundary.len());
+    for pair in at_vertex.windows(2).filter(|p| p[0].0 == p[1].0) {
+        sets.join(pair[0].1, pair[1].1);
+    }
+    sets.groups()
+        .into_iter()
+        .map(|group| group.into_iter().map(|i| boundary[i as usize]).collect())
+        .collect()
+}

@@ -1,0 +1,84 @@
+//! Shape of prisms: Jacobian determinants at corners and quadrature points, and the scaled Jacobian.
+//!
+//! ```text
+//! upper triangle v0 v1 v2 (ζ = 0, towards the skin), lower v3 v4 v5 (ζ = 1)
+//! x(ξ, η, ζ) = Σ N_a(ξ, η, ζ) x_a,  N_a = λ_i (1 − ζ) or λ_i ζ,  λ = (1 − ξ − η, ξ, η)
+//! ```
+//! Seen from outside the skin, v0 v1 v2 run counter-clockwise and ζ points inward, so `det ∂x/∂(ξ, η, ζ)` of a good
+//! prism is *negative*; everything here returns the orientation-corrected, positive value for a good prism.
+
+use crate::{LayeredBody, Vec3};
+
+/// Points inside the triangle and in depth at which elements are integrated: 3 × 2.
+const TRIANGLE_POINTS: [[f64; 2]; 3] = [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
+const DEPTH_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// What the checks say of one prism.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PrismShape {
+    /// Smallest Jacobian determinant at the six corners and six quadrature points. m³
+    pub min_jacobian: f64,
+    /// Smallest scaled Jacobian of the six corners: the determinant divided by the lengths of the three edges that
+    /// meet there, times 2/√3, so that a right prism over an equilateral triangle has 1. Below 0: inverted.
+    pub scaled_jacobian: f64,
+}
+
+impl PrismShape {
+    /// Measures the prism with corners `x`: upper triangle, then lower.
+    pub fn of(x: &[Vec3; 6]) -> Self {
+        let mut min_jacobian = f64::INFINITY;
+        let mut scaled = f64::INFINITY;
+        for corner in 0..6 {
+            let (i, base) = (corner % 3, corner - corner % 3);
+            let e1 = x[base + (i + 1) % 3] - x[corner];
+            let e2 = x[base + (i + 2) % 3] - x[corner];
+            let e3 = x[i + 3] - x[i];
+            let det = -e1.cross(&e2).dot(&e3);
+            let lengths = e1.norm() * e2.norm() * e3.norm();
+            min_jacobian = min_jacobian.min(det);
+            scaled = scaled.min(if lengths > 0.0 { det / lengths * 2.0 / 3.0_f64.sqrt() } else { 0.0 });
+        }
+        for [xi, eta] in TRIANGLE_POINTS {
+            for zeta in DEPTH_POINTS {
+                min_jacobian = min_jacobian.min(jacobian(x, xi, eta, zeta));
+            }
+        }
+        // A right prism over a flat triangle can exceed 1 by rounding or by an obtuse corner elsewhere.
+        Self { min_jacobian, scaled_jacobian: scaled.clamp(-1.0, 1.0) }
+    }
+
+    /// Whether every determinant is positive.
+    pub fn is_valid(&self) -> bool {
+        self.min_jacobian > 0.0
+    }
+}
+
+/// Orientation-corrected determinant of the prism's map at a point.
+fn jacobian(x: &[Vec3; 6], xi: f64, eta: f64, zeta: f64) -> f64 {
+    let lambda = [1.0 - xi - eta, xi, eta];
+    let d_xi = (x[1] - x[0]) * (1.0 - zeta) + (x[4] - x[3]) * zeta;
+    let d_eta = (x[2] - x[0]) * (1.0 - zeta) + (x[5] - x[3]) * zeta;
+    let d_zeta: Vec3 = (0..3).map(|i| (x[i + 3] - x[i]) * lambda[i]).sum();
+    -d_xi.cross(&d_eta).dot(&d_zeta)
+}
+
+/// The shapes of all prisms at the given node positions, triangle by triangle, intervals inside. `[n_prisms]`
+///
+/// # Panics
+/// If `positions` does not hold one point per node.
+pub fn prism_shapes(body: &LayeredBody, positions: &[Vec3]) -> Vec<PrismShape> {
+    assert_eq!(positions.len(), body.n_nodes(), "one position per node");
+    (0..body.skin.triangles.len())
+        .flat_map(|t| (0..body.n_levels - 1).map(move |i| (t, i)))
+        .map(|(t, i)| PrismShape::of(&body.prism(t, i).map(|n| positions[n])))
+        .collect()
+}
+
+/// Volume of the prism with corners `x` (exact for the trilinear map: 3 × 2 points). m³
+pub fn prism_volume(x: &[Vec3; 6]) -> f64 {
+    let sum: f64 = TRIANGLE_POINTS
+        .iter()
+        .flat_map(|&[xi, eta]| DEPTH_POINTS.iter().map(move |&zeta| jacobian(x, xi, eta, zeta)))
+        .sum();
+    sum / 12.0
+}

@@ -1,0 +1,118 @@
+//! What the readers fill: points and triangles, with polygons cut on the way in.
+
+use super::polygon::triangulate;
+use super::{Fault, FileCounts, Parsed, Place, ReadNote};
+use crate::{Surface, Vec3};
+
+/// The most corners that a face may have. Cutting a polygon takes up to the square of its corners; real faces have a few,
+/// the caps of a cylinder some hundred.
+const MAX_CORNERS: usize = 4096;
+
+/// A surface in the making.
+#[derive(Debug, Default)]
+pub(super) struct Builder {
+    pub(super) points: Vec<Vec3>,
+    pub(super) n_objects: usize,
+    triangles: Vec<[u32; 3]>,
+    n_faces: usize,
+    n_polygons: usize,
+    n_short_faces: usize,
+    first_short_face: Option<Place>,
+    n_folded: usize,
+    first_folded: Option<Place>,
+    notes: Vec<ReadNote>,
+}
+
+impl Builder {
+    pub(super) fn note(&mut self, note: ReadNote) {
+        self.notes.push(note);
+    }
+
+    pub(super) fn reserve_faces(&mut self, n: usize) {
+        self.triangles.reserve(n);
+    }
+
+    /// Adds a face of vertices that are all there. One with fewer than three corners is left out and counted.
+    pub(super) fn face(&mut self, corners: &[u32], place: Place) -> Parsed<()> {
+        self.n_faces += 1;
+        match corners {
+            [] | [_] | [_, _] => {
+                self.n_short_faces += 1;
+                self.first_short_face.get_or_insert(place);
+            }
+            &[a, b, c] => self.triangles.push([a, b, c]),
+            _ if corners.len() > MAX_CORNERS => {
+                let problem = format!(
+                    "a face with {} corners, more than the {MAX_CORNERS} that are read; \
+                     cut it into triangles in a mesh program",
+                    corners.len()
+                );
+                return Err(Fault::new(place, problem));
+            }
+            _ => {
+                self.n_polygons += 1;
+                if !triangulate(&self.points, corners, &mut self.triangles) {
+                    self.n_folded += 1;
+                    self.first_folded.get_or_insert(place);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The index of a vertex that a file names by number, once it is known to be there.
+    pub(super) fn vertex(&self, index: i64, place: Place) -> Parsed<u32> {
+        match usize::try_from(index) {
+            Ok(i) if i < self.points.len() => Ok(i as u32),
+            _ => {
+                let n = self.points.len();
+                let problem = match n {
+                    0 => format!("a face uses vertex {index}, but there are no vertices"),
+                    _ => format!(
+                        "a face uses vertex {index}, but the vertices are 0 to {}",
+                        n - 1
+                    ),
+                };
+                Err(Fault::new(place, problem))
+            }
+        }
+    }
+
+    /// Refuses a surface without faces, which is a cloud of points or not a surface at all.
+    pub(super) fn check_faces(&self) -> Parsed<()> {
+        if !self.triangles.is_empty() {
+            return Ok(());
+        }
+        let problem = match (self.points.len(), self.n_short_faces) {
+            (0, _) => "no vertices and no faces; export the mesh itself".to_owned(),
+            (_, 0) => format!(
+                "{} vertices but no faces; reconstruct a surface from the points first",
+                self.points.len()
+            ),
+            (_, n) => format!("no faces but {n} with fewer than three corners"),
+        };
+        Err(Fault::new(Place::File, problem))
+    }
+
+    pub(super) fn finish(mut self) -> (Surface, FileCounts, Vec<ReadNote>) {
+        if let Some(first) = self.first_short_face {
+            let count = self.n_short_faces;
+            self.notes.push(ReadNote::ShortFaces { count, first });
+        }
+        if let Some(first) = self.first_folded {
+            let count = self.n_folded;
+            self.notes.push(ReadNote::FoldedPolygons { count, first });
+        }
+        let counts = FileCounts {
+            n_points: self.points.len(),
+            n_faces: self.n_faces,
+            n_polygons: self.n_polygons,
+            n_objects: self.n_objects.max(1),
+        };
+        let surface = Surface {
+            points: self.points,
+            triangles: self.triangles,
+        };
+        (surface, counts, self.notes)
+    }
+}

@@ -1,0 +1,134 @@
+//! Welding: vertices at one place become one vertex.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use crate::{Surface, Vec3};
+
+/// A welded surface, and how it came from the one before.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Welded {
+    /// The surface with one vertex per place; triangles keep their order and may have become degenerate.
+    pub surface: Surface,
+    /// The new index of each old vertex. `[n_vertices before]`
+    pub new_index: Vec<u32>,
+}
+
+/// Makes one vertex of those with exactly the same coordinates. The first of them gives its place in the order.
+///
+/// Vertices that are not finite stay apart: nothing is known about where they are.
+pub fn weld_exact(surface: &Surface) -> Welded {
+    let mut seen: HashMap<[u64; 3], u32> = HashMap::with_capacity(surface.points.len());
+    weld(surface, |p, candidate, _| match seen.entry(exact_key(p)) {
+        Entry::Occupied(entry) => Some(*entry.get()),
+        Entry::Vacant(entry) => {
+            entry.insert(candidate);
+            None
+        }
+    })
+}
+
+/// Makes one vertex of those within `tolerance` (in the unit of the points) of each other, the first of which stays where it
+/// is; so no vertex moves by more than the tolerance, whatever chains there are.
+pub fn weld_within(surface: &Surface, tolerance: f64) -> Welded {
+    if tolerance.is_nan() || tolerance <= 0.0 {
+        return weld_exact(surface);
+    }
+    // Cells as wide as the tolerance: whatever is near lies in this cell or one of its 26 neighbours. A float-to-integer
+    // cast saturates, so points beyond the grid share its last cell and are still compared by distance.
+    let cell_of = |p: &Vec3| p.map(|x| (x / tolerance).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(surface.points.len());
+    weld(surface, |p, candidate, kept| {
+        let cell = cell_of(p);
+        let is_near = |&v: &u32| (kept[v as usize] - p).norm() <= tolerance;
+        let near = (0..27)
+            .filter_map(|i| {
+                let offset = [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1];
+                let key = std::array::from_fn(|k| cell[k].saturating_add(offset[k]));
+                cells.get(&key)?.iter().copied().find(is_near)
+            })
+            .min();
+        if near.is_none() {
+            cells.entry(cell.into()).or_default().push(candidate);
+        }
+        near
+    })
+}
+
+/// Walks the points in order and keeps each for which `find(point, its index if kept, points kept so far)` knows none.
+fn weld(surface: &Surface, mut find: impl FnMut(&Vec3, u32, &[Vec3]) -> Option<u32>) -> Welded {
+    let mut points: Vec<Vec3> = Vec::new();
+    let new_index: Vec<u32> = surface
+        .points
+        .iter()
+        .map(|p| {
+            let candidate = points.len() as u32;
+            let is_finite = p.iter().all(|x| x.is_finite());
+            let known = is_finite.then(|| find(p, candidate, &points)).flatten();
+            known.unwrap_or_else(|| {
+                points.push(*p);
+                candidate
+            })
+        })
+        .collect();
+    let triangles = surface
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| new_index[v as usize]))
+        .collect();
+    Welded {
+        surface: Surface { points, triangles },
+        new_index,
+    }
+}
+
+/// The bits of the coordinates, with −0 as 0.
+fn exact_key(p: &Vec3) -> [u64; 3] {
+    [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_triangles(gap: f64) -> Surface {
+        let at = |x: f64, y: f64| Vec3::new(x, y, 0.0);
+        Surface {
+            points: vec![
+                at(0.0, 0.0),
+                at(1.0, 0.0),
+                at(0.0, 1.0),
+                at(1.0, gap),
+                at(1.0, 1.0),
+                at(gap, 1.0),
+            ],
+            triangles: vec![[0, 1, 2], [3, 4, 5]],
+        }
+    }
+
+    #[test]
+    fn the_first_vertex_stays() {
+        let welded = weld_exact(&two_triangles(-0.0));
+        assert_eq!(welded.new_index, [0, 1, 2, 1, 3, 2]);
+        assert_eq!(welded.surface.triangles, [[0, 1, 2], [1, 3, 2]]);
+    }
+
+    #[test]
+    fn tolerance_reaches_across_cells_and_no_further() {
+        let apart = two_triangles(1e-6);
+        assert_eq!(weld_exact(&apart).surface.points.len(), 6);
+        assert_eq!(weld_within(&apart, 0.9e-6).surface.points.len(), 6);
+        assert_eq!(weld_within(&apart, 1.1e-6).surface.points.len(), 4);
+    }
+
+    #[test]
+    fn what_is_not_finite_stays_apart() {
+        let nan = Vec3::new(f64::NAN, 0.0, 0.0);
+        let surface = Surface {
+            points: vec![nan, nan, nan],
+            triangles: vec![[0, 1, 2]],
+        };
+        assert_eq!(weld_exact(&surface).new_index, [0, 1, 2]);
+        assert_eq!(weld_within(&surface, 1.0).new_index, [0, 1, 2]);
+    }
+}

@@ -1,0 +1,128 @@
+//! Explicit Euler alone: the method that the thesis compares itself with.
+//!
+//! Every step moves each free node by (3.21), its sign so that it restores,
+//! ```text
+//!     U_a = ½ h Σ_i k_i (l_i − L_i) (P_i − P_a)
+//! ```
+//! with one step size `h` for all nodes. To the letter the vector `P_i − P_a` is not of unit length, so the pull grows with
+//! the square of the stretch and its tangent is up to `k (2l − L)`: whatever `h` is stable at rest, a large enough
+//! stretch is beyond it, and the nodes fly apart. A node only feels its neighbours, so a force crosses one level a step.
+
+use palpa_mesh::Vec3;
+
+use crate::constraints::Role;
+use crate::model::SpringModel;
+use crate::network::direction;
+use crate::state::{Mode, SpringState, Workspace};
+use crate::step::{Method, Outcome, StepParams, bar_force, move_operated, step};
+
+/// The step size of explicit Euler.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EulerParams {
+    /// Step size relative to `1 / max_a Σ_i k_i L_i`: at rest stable below 2.
+    pub gain: f64,
+}
+
+impl Default for EulerParams {
+    /// Half of what is stable at rest.
+    fn default() -> Self {
+        Self { gain: 1.0 }
+    }
+}
+
+/// One step of explicit Euler: the operated nodes move, then every free node once, all from the same positions.
+pub(crate) fn euler_step(
+    model: &SpringModel,
+    state: &mut SpringState,
+    ws: &mut Workspace,
+    displacement: Vec3,
+    params: &EulerParams,
+) {
+    for &node in &model.operated {
+        state.positions[node] += displacement;
+    }
+    move_operated(model, ws, Vec3::zeros());
+    for bar in &model.bars {
+        let (a, b) = (bar.a as usize, bar.b as usize);
+        let d = state.positions[b] - state.positions[a];
+        let pull = d * (bar.stiffness * (d.norm() - bar.length));
+        ws.increments[a] += pull;
+        ws.increments[b] -= pull;
+    }
+    let h = 0.5 * params.gain / model.largest_pull;
+    for (node, freedom) in model.freedoms.iter().enumerate() {
+        if freedom.role == Role::Free {
+            state.positions[node] += freedom.project(&ws.increments[node]) * h;
+        }
+    }
+    update_forces(model, state);
+    state.mode = Mode::Euler;
+}
+
+/// Sets the forces of the state to those of the bars as they are stretched now: Euler keeps no path.
+fn update_forces(model: &SpringModel, state: &mut SpringState) {
+    state.node_forces.fill(Vec3::zeros());
+    for bar in &model.bars {
+        let (a, b) = (bar.a as usize, bar.b as usize);
+        let d = state.positions[b] - state.positions[a];
+        let pull = direction(d) * (bar.stiffness * (d.norm() - bar.length));
+        state.node_forces[a] -= pull;
+        state.node_forces[b] += pull;
+    }
+    state.force = bar_force(model, &state.positions);
+}
+
+/// How many steps it takes until the reaction at the fixed nodes comes to a fraction of what it settles at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Steps until the fixed nodes feel anything at all.
+    pub first_steps: usize,
+    /// Steps until their reaction has come to the fraction asked for, for good.
+    pub settled_steps: usize,
+    /// The reaction that it settles at. N
+    pub reaction: f64,
+}
+
+/// Applies `displacement` in the first step and waits: when does the base feel it?
+///
+/// `None` if the method diverges, or the reaction still changes by more than a thousandth between half of `max_steps`
+/// and all of them.
+pub fn steps_to_cross(
+    model: &SpringModel,
+    displacement: Vec3,
+    params: &StepParams,
+    fraction: f64,
+    max_steps: usize,
+) -> Option<Crossing> {
+    let (mut state, mut ws) = (SpringState::new(model), Workspace::new(model));
+    let mut trace = Vec::with_capacity(max_steps);
+    for i in 0..max_steps.max(1) {
+        let moved = if i == 0 { displacement } else { Vec3::zeros() };
+        let report = step(model, &mut state, &mut ws, moved, params);
+        if matches!(report.outcome, Outcome::Diverged { .. } | Outcome::NotFinite) {
+            return None;
+        }
+        trace.push(state.fixed_reaction(model).norm());
+    }
+    let reaction = trace[trace.len() - 1];
+    let has_settled = (trace[trace.len() / 2] - reaction).abs() <= 1e-3 * reaction;
+    if reaction <= 0.0 || !has_settled {
+        return None;
+    }
+    let within = |r: &f64| (r - reaction).abs() <= (1.0 - fraction) * reaction;
+    Some(Crossing {
+        first_steps: 1 + trace.iter().position(|r| *r > 1e-12 * reaction)?,
+        settled_steps: 1 + trace.iter().rposition(|r| !within(r)).map_or(0, |i| i + 1),
+        reaction,
+    })
+}
+
+impl StepParams {
+    /// Explicit Euler alone, with its default step size.
+    pub fn euler() -> Self {
+        Self {
+            method: Method::Euler(EulerParams::default()),
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! One step of the method: the displacement of the tool in, the force that it feels out.
+//!
+//! The displacement is split into `n` parts. In each, with the bars in their current directions,
+//! ```text
+//!     U'_f = −K_ff⁻¹ K_fc u_c            the free nodes follow, into equilibrium     (3.19, 3.20)
+//!     ΔF   =  K_cc u_c + K_cf U'_f       the force of the increment                  (3.17, after the nodes moved)
+//! ```
+//! and the force that is felt is the sum of the increments along the path. Where `K_ff` is singular the part is done by
+//! explicit Euler (`relax`); every part tries the finite elements first, so that they take over again by themselves.
+
+use palpa_mesh::Vec3;
+
+use crate::constraints::Role;
+use crate::euler::{EulerParams, euler_step};
+use crate::model::SpringModel;
+use crate::network::Bar;
+use crate::relax::relax;
+use crate::state::{Mode, SpringState, Workspace};
+use crate::system::Singular;
+
+/// A free node that moves further than this many times the way of the tool in one part is on a mechanism, though
+/// rounding (or its bars being very nearly in a plane) let the matrix pass as regular.
+const MECHANISM_TRAVEL: f64 = 1e3;
+
+/// A node further than this from where it was, in sizes of the body, has run away.
+const RUNAWAY: f64 = 1e2;
+
+/// How a step is done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepParams {
+    /// Number of parts that the displacement is split into; 0 counts as 1.
+    pub substeps: usize,
+    /// Finite elements, or explicit Euler alone.
+    pub method: Method,
+    /// The explicit Euler corrections that end a step.
+    pub corrections: Corrections,
+    /// The step's duration in **milliseconds** for the literal force of (3.18), or `None` for leaving it out.
+    pub literal_duration_ms: Option<f64>,
+}
+
+impl Default for StepParams {
+    fn default() -> Self {
+        Self {
+            substeps: 1,
+            method: Method::FiniteElements,
+            corrections: Corrections::default(),
+            literal_duration_ms: None,
+        }
+    }
+}
+
+/// How nodes are moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// The combined method: finite elements, and Euler where these are singular.
+    FiniteElements,
+    /// Explicit Euler alone, which the thesis compares itself with.
+    Euler(EulerParams),
+}
+
+/// Gains of the corrections (3.21) and (3.22), each from 0 (off) to 1; beyond that they are held to 1.
+///
+/// Both are scaled by the stiffness at the node, so that no gain in this range is unstable (`relax.rs` has the proof).
+/// The pull of springs towards their lengths mends the drift of the incremental method and leaves an equilibrium in
+/// place. The pull towards the initial shape does not: it makes a held body creep back under the tool, by an amount that
+/// depends on the number of steps. So it is off unless asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corrections {
+    /// Gain of the springs' pull towards their natural lengths (3.21).
+    pub spring_gain: f64,
+    /// Gain of the pull towards the initial shape (3.22).
+    pub shape_gain: f64,
+}
+
+impl Corrections {
+    /// No correction.
+    pub const OFF: Self = Self {
+        spring_gain: 0.0,
+        shape_gain: 0.0,
+    };
+}
+
+impl Default for Corrections {
+    fn default() -> Self {
+        Self {
+            spring_gain: 1.0,
+            shape_gain: 0.0,
+        }
+    }
+}
+
+/// How a step ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// As the method was asked for.
+    Converged,
+    /// The system was singular in this many parts; they were done by explicit Euler.
+    EulerFallback {
+        /// Parts done by explicit Euler.
+        n_substeps: usize,
+    },
+    /// A node ran away or its position is no number. The state is the one before the step.
+    Diverged {
+        /// The first such node.
+        node: usize,
+    },
+    /// The displacement is not finite. The state is the one before the step.
+    NotFinite,
+}
+
+/// What a step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepReport {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Force on the tool by the body, the sum along the path since rest. N
+    pub force: Vec3,
+    /// What this step added to it. N
+    pub force_increment: Vec3,
+    /// Force on the tool by the bars as they are stretched now, in their present directions. It equals `force` for small
+    /// displacements; the difference is what the linear increments leave out. N
+    pub bar_force: Vec3,
+    /// Largest force left on a free node by the last part that finite elements did, over the largest nodal force in it.
+    pub free_residual: f64,
+    /// The force as (3.17), (3.18) give it to the letter: the reaction of this step's displacement *before* the free
+    /// nodes moved, over the duration in ms. For comparison; never send it to a device. N/ms
+    pub literal_force: Option<Vec3>,
+}
+
+/// Moves the operated nodes by `displacement` (m) and lets the body follow.
+///
+/// Whatever happens, the state stays finite: a step that diverges leaves it as it was, and says so in the report.
+///
+/// # Panics
+/// If `state` or `ws` belong to another model.
+pub fn step(
+    model: &SpringModel,
+    state: &mut SpringState,
+    ws: &mut Workspace,
+    displacement: Vec3,
+    params: &StepParams,
+) -> StepReport {
+    assert_eq!(state.positions.len(), model.n_nodes(), "a state of another model");
+    assert_eq!(ws.increments.len(), model.n_nodes(), "a workspace of another model");
+    ws.saved.copy_from(state);
+    let mut free_residual = 0.0;
+    let mut literal = Vec3::zeros();
+    let outcome = if displacement.iter().all(|x| x.is_finite()) {
+        let (residual, f1) = (&mut free_residual, &mut literal);
+        advance(model, state, ws, displacement, params, residual, f1)
+    } else {
+        Outcome::NotFinite
+    };
+    if matches!(outcome, Outcome::Diverged { .. } | Outcome::NotFinite) {
+        state.copy_from(&ws.saved);
+    } else {
+        state.displacement += displacement;
+    }
+    StepReport {
+        outcome,
+        force: state.force,
+        force_increment: state.force - ws.saved.force,
+        bar_force: bar_force(model, &state.positions),
+        free_residual,
+        literal_force: params.literal_duration_ms.map(|dt| -literal / dt),
+    }
+}
+
+fn advance(
+    model: &SpringModel,
+    state: &mut SpringState,
+    ws: &mut Workspace,
+    displacement: Vec3,
+    params: &StepParams,
+    free_residual: &mut f64,
+    literal: &mut Vec3,
+) -> Outcome {
+    let n = params.substeps.max(1);
+    let part = displacement / n as f64;
+    let mut n_fallbacks = 0;
+    for _ in 0..n {
+        match params.method {
+            Method::Euler(euler) => {
+                euler_step(model, state, ws, part, &euler);
+            }
+            Method::FiniteElements => {
+                if finite_elements(model, state, ws, part, literal).is_ok() {
+                    *free_residual = residual_of_free_nodes(model, &ws.forces);
+                    commit(model, state, ws);
+                    state.mode = Mode::FiniteElements;
+                } else {
+                    n_fallbacks += 1;
+                    push_through(model, state, ws, part);
+                    commit(model, state, ws);
+                    let springs = Corrections {
+                        spring_gain: 1.0,
+                        ..params.corrections
+                    };
+                    relax(model, state, ws, &springs);
+                    commit(model, state, ws);
+                    state.mode = Mode::Euler;
+                }
+            }
+        }
+        if let Some(node) = runaway(model, &state.positions, &ws.saved.positions) {
+            return Outcome::Diverged { node };
+        }
+    }
+    let is_corrected = params.corrections != Corrections::OFF;
+    if params.method == Method::FiniteElements && is_corrected {
+        relax(model, state, ws, &params.corrections);
+        commit(model, state, ws);
+    }
+    if n_fallbacks > 0 {
+        Outcome::EulerFallback {
+            n_substeps: n_fallbacks,
+        }
+    } else {
+        Outcome::Converged
+    }
+}
+
+/// Solves one part into `ws.increments` and `ws.forces`, and adds its literal force (3.17).
+fn finite_elements(
+    model: &SpringModel,
+    state: &SpringState,
+    ws: &mut Workspace,
+    part: Vec3,
+    literal: &mut Vec3,
+) -> Result<(), Singular> {
+    ws.system.update_directions(&model.bars, &state.positions);
+    ws.system
+        .refactor(&model.structure, &model.bars, &model.freedoms)?;
+    move_operated(model, ws, part);
+    // M1 u_c: as all operated nodes move alike, only bars with one operated end are stretched.
+    ws.forces.fill(Vec3::zeros());
+    let mut f1 = Vec3::zeros();
+    for &(i, a_is_operated) in &model.operated_bars {
+        let (bar, c) = (&model.bars[i], &ws.system.directions[i]);
+        let pull = c * (bar.stiffness * c.dot(&part));
+        let other = if a_is_operated { bar.b } else { bar.a };
+        ws.forces[other as usize] -= pull;
+        f1 += pull;
+    }
+    ws.system
+        .solve(&model.structure, &model.freedoms, &ws.forces, &mut ws.increments);
+
+    let limit = MECHANISM_TRAVEL * part.norm();
+    // Written so that NaN counts as too far.
+    let stays = |u: &Vec3| u.norm() <= limit;
+    if !ws.increments.iter().all(stays) {
+        return Err(Singular);
+    }
+    *literal += f1;
+    nodal_forces(&model.bars, &ws.system.directions, &ws.increments, &mut ws.forces);
+    Ok(())
+}
+
+/// Moves the operated nodes only; their bars are stretched and nothing follows yet.
+fn push_through(model: &SpringModel, state: &SpringState, ws: &mut Workspace, part: Vec3) {
+    ws.system.update_directions(&model.bars, &state.positions);
+    move_operated(model, ws, part);
+    nodal_forces(&model.bars, &ws.system.directions, &ws.increments, &mut ws.forces);
+}
+
+pub(crate) fn move_operated(model: &SpringModel, ws: &mut Workspace, part: Vec3) {
+    ws.increments.fill(Vec3::zeros());
+    for &node in &model.operated {
+        ws.increments[node] = part;
+    }
+}
+
+/// `M1 U`, the nodal forces that belong to the increments.
+pub(crate) fn nodal_forces(
+    bars: &[Bar],
+    directions: &[Vec3],
+    increments: &[Vec3],
+    forces: &mut [Vec3],
+) {
+    forces.fill(Vec3::zeros());
+    for (bar, c) in bars.iter().zip(directions) {
+        let (a, b) = (bar.a as usize, bar.b as usize);
+        let tension = bar.stiffness * c.dot(&(increments[b] - increments[a]));
+        let pull = c * tension;
+        forces[a] -= pull;
+        forces[b] += pull;
+    }
+}
+
+/// Adds the increments to the state, and their forces to the sums along the path.
+pub(crate) fn commit(model: &SpringModel, state: &mut SpringState, ws: &Workspace) {
+    for (p, u) in state.positions.iter_mut().zip(&ws.increments) {
+        *p += u;
+    }
+    for (sum, f) in state.node_forces.iter_mut().zip(&ws.forces) {
+        *sum += f;
+    }
+    for &node in &model.operated {
+        state.force -= ws.forces[node];
+    }
+}
+
+/// Force on the tool by the bars at their lengths and directions now.
+pub(crate) fn bar_force(model: &SpringModel, positions: &[Vec3]) -> Vec3 {
+    let mut force = Vec3::zeros();
+    for &(i, a_is_operated) in &model.operated_bars {
+        let bar = &model.bars[i];
+        let d = positions[bar.b as usize] - positions[bar.a as usize];
+        let length = d.norm();
+        if length > 0.0 {
+            let pull = d * (bar.stiffness * (length - bar.length) / length);
+            force += if a_is_operated { pull } else { -pull };
+        }
+    }
+    force
+}
+
+fn residual_of_free_nodes(model: &SpringModel, forces: &[Vec3]) -> f64 {
+    let (mut left, mut largest) = (0.0_f64, 0.0_f64);
+    for (freedom, force) in model.freedoms.iter().zip(forces) {
+        largest = largest.max(force.norm());
+        if freedom.role == Role::Free {
+            left = left.max(freedom.project(force).norm());
+        }
+    }
+    if largest > 0.0 { left / largest } else { 0.0 }
+}
+
+fn runaway(model: &SpringModel, now: &[Vec3], before: &[Vec3]) -> Option<usize> {
+    let limit = RUNAWAY * model.size;
+    let stays = |(p, q): (&Vec3, &Vec3)| (p - q).norm() <= limit;
+    now.iter().zip(before).position(|pair| !stays(pair))
+}

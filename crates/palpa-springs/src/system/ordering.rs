@@ -1,0 +1,90 @@
+//! The order of elimination: columns of the body by approximate minimum degree, the nodes of a column together.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
+
+use crate::constraints::Freedom;
+use crate::error::SpringError;
+use crate::network::Network;
+
+/// For each node that has unknowns, in the order of elimination: the node, and its neighbours later in that order.
+pub(crate) type NodePattern = Vec<(usize, Vec<usize>)>;
+
+/// Nodes with unknowns in the order of elimination. The graph that is ordered has the columns that hold such nodes
+/// for vertices, as all the structure of a layered body is in its skin.
+pub(crate) fn column_order(
+    network: &Network,
+    freedoms: &[Freedom],
+) -> Result<Vec<usize>, SpringError> {
+    let n_columns = network.column.iter().max().map_or(0, |c| *c as usize + 1);
+    let mut members = vec![Vec::new(); n_columns];
+    for (node, freedom) in freedoms.iter().enumerate() {
+        if freedom.n_free > 0 {
+            members[network.column[node] as usize].push(node);
+        }
+    }
+    // Number the columns that take part.
+    let mut rank = vec![usize::MAX; n_columns];
+    let taking_part: Vec<usize> = (0..n_columns).filter(|&c| !members[c].is_empty()).collect();
+    for (r, &c) in taking_part.iter().enumerate() {
+        rank[c] = r;
+    }
+    let mut pairs: Vec<(usize, usize)> = network
+        .bars
+        .iter()
+        .filter(|bar| [bar.a, bar.b].iter().all(|n| freedoms[*n as usize].n_free > 0))
+        .map(|bar| {
+            let [a, b] = [bar.a, bar.b].map(|n| rank[network.column[n as usize] as usize]);
+            (a.max(b), a.min(b))
+        })
+        .filter(|(column, row)| column != row)
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+
+    let n = taking_part.len();
+    let mut col_ptr = vec![0; n + 1];
+    for &(column, _) in &pairs {
+        col_ptr[column + 1] += 1;
+    }
+    for c in 0..n {
+        col_ptr[c + 1] += col_ptr[c];
+    }
+    let row_idx: Vec<usize> = pairs.iter().map(|&(_, row)| row).collect();
+    let graph = SymbolicSparseColMatRef::new_checked(n, n, &col_ptr, None, &row_idx);
+    let (mut forward, mut inverse) = (vec![0; n], vec![0; n]);
+    let mut memory = MemBuffer::new(amd::order_scratch::<usize>(n, row_idx.len()));
+    amd::order(
+        &mut forward,
+        &mut inverse,
+        graph,
+        amd::Control::default(),
+        MemStack::new(&mut memory),
+    )
+    .map_err(|_| SpringError::TooLarge { n_dofs: n })?;
+    Ok(forward
+        .into_iter()
+        .flat_map(|r| members[taking_part[r]].iter().copied())
+        .collect())
+}
+
+/// Which free nodes share a bar.
+pub(crate) fn node_pattern(network: &Network, order: &[usize]) -> NodePattern {
+    let mut place = vec![usize::MAX; network.n_nodes()];
+    for (p, &node) in order.iter().enumerate() {
+        place[node] = p;
+    }
+    let mut pattern: NodePattern = order.iter().map(|&node| (node, Vec::new())).collect();
+    for bar in &network.bars {
+        let [p, q] = [bar.a, bar.b].map(|n| place[n as usize]);
+        if p.max(q) != usize::MAX {
+            pattern[p.min(q)].1.push(order[p.max(q)]);
+        }
+    }
+    for (_, later) in &mut pattern {
+        later.sort_unstable_by_key(|&node| place[node]);
+        later.dedup();
+    }
+    pattern
+}

@@ -1,0 +1,246 @@
+//! From the scene as written to the scene: ranges, combinations, defaults, the catalogue.
+
+mod body;
+mod layers;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Document, Site};
+use crate::file::{PressTable, ReferenceTable, SceneFile, ToolShape, ToolTable};
+use crate::limits::{self, Limits};
+use crate::scene::{Generator, Press, Reference, Scene, Skin, Target, Tool};
+use crate::units::{Kind, Length, Quantity};
+use crate::{SceneError, Thickness};
+
+/// Results on the way down, unless the scene says otherwise.
+const DEFAULT_STEPS: f64 = 32.0;
+
+pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells a file that is too large from one that just fits.
+    File::open(path)
+        .and_then(|file| file.take(limits::MAX_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|source| SceneError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+    let base_dir = path.parent().unwrap_or(Path::new(""));
+    match String::from_utf8(bytes) {
+        Ok(text) => parse(&text, base_dir, Some(path)),
+        Err(error) => {
+            let valid = error.utf8_error().valid_up_to();
+            let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
+            let document = Document {
+                text: &text,
+                file: Some(path),
+            };
+            Err(document.not_text(valid))
+        }
+    }
+}
+
+pub(crate) fn parse(text: &str, base_dir: &Path, file: Option<&Path>) -> Result<Scene, SceneError> {
+    let document = Document { text, file };
+    if text.len() as u64 > limits::MAX_FILE {
+        return Err(SceneError::TooLarge {
+            place: document.whole(String::new()).into(),
+            limit: limits::MAX_FILE,
+        });
+    }
+    let written = toml::Deserializer::parse(text).map_err(|e| document.toml_error(&e, true))?;
+    let written: SceneFile =
+        serde::Deserialize::deserialize(written).map_err(|e| document.toml_error(&e, false))?;
+    let reader = Reader { document, base_dir };
+    let press = reader.press(&written.press)?;
+    let layers = reader.layers(written.layer)?;
+    let scene = Scene {
+        base_dir: base_dir.to_owned(),
+        body: reader.body(written.body, press.target)?,
+        layers,
+        tool: reader.tool(&written.tool)?,
+        press,
+        reference: reader.reference(&written.reference)?,
+    };
+    reader.depths(&scene)?;
+    Ok(scene)
+}
+
+struct Reader<'a> {
+    document: Document<'a>,
+    base_dir: &'a Path,
+}
+
+impl<'a> Reader<'a> {
+    fn site(&self, key: &'static str) -> Site<'a> {
+        self.document.site(key)
+    }
+
+    fn path(&self, site: &Site<'_>, path: &Path) -> Result<PathBuf, SceneError> {
+        if path.as_os_str().is_empty() {
+            return Err(site.invalid("the path is empty; name a file, relative to this scene"));
+        }
+        Ok(self.base_dir.join(path))
+    }
+
+    fn tool(&self, tool: &ToolTable) -> Result<Tool, SceneError> {
+        let at = self.site("tool").key("radius");
+        match (tool.shape, tool.radius) {
+            (ToolShape::Disc, radius) => {
+                let radius = radius.unwrap_or(Length::from_si(8e-3));
+                let radius = at.within(radius, &limits::TOOL_RADIUS)?.si();
+                Ok(Tool::Disc { radius })
+            }
+            (ToolShape::Node, None) => Ok(Tool::Node),
+            (ToolShape::Node, Some(_)) => {
+                Err(at.invalid("a node has no radius; remove it, or use shape = \"disc\""))
+            }
+        }
+    }
+
+    fn press(&self, press: &PressTable) -> Result<Press, SceneError> {
+        let at = self.site("press");
+        let target = match (press.at, press.vertex) {
+            (None, None) => Target::Middle,
+            (Some(point), None) => Target::Point(coordinates(&at.key("at"), point)?),
+            (None, Some(vertex)) => Target::Vertex(vertex),
+            (Some(_), Some(_)) => {
+                return Err(at
+                    .key("vertex")
+                    .invalid("the place is given twice; remove `at` or `vertex`"));
+            }
+        };
+        let direction = match press.direction {
+            None => None,
+            Some(vector) => Some(unit_vector(&at.key("direction"), vector)?),
+        };
+        let depth = at.key("depth").within(press.depth, &limits::DEPTH)?;
+        let step = match press.step {
+            None => depth.si() / DEFAULT_STEPS,
+            Some(step) => {
+                let at = at.key("step");
+                let step = at.within(step, &limits::STEP)?;
+                let (n, most) = (depth.si() / step.si(), limits::MAX_STEPS);
+                // A step that divides the depth evenly may miss the bound by rounding.
+                if step > depth || n > most * (1.0 + 1e-9) {
+                    return Err(at.invalid(format!(
+                        "a step of {step} does not fit a depth of {depth}; take a step between {} and the depth",
+                        Length::from_si(depth.si() / most)
+                    )));
+                }
+                step.si()
+            }
+        };
+        Ok(Press {
+            target,
+            direction,
+            depth: depth.si(),
+            speed: at.key("speed").within(press.speed, &limits::SPEED)?.si(),
+            hold: at.key("hold").within(press.hold, &limits::HOLD)?.si(),
+            retract: press.retract,
+            step,
+        })
+    }
+
+    fn reference(&self, reference: &ReferenceTable) -> Result<Reference, SceneError> {
+        let at = self.site("reference");
+        let gain = |key, gain| at.key(key).within(gain, &limits::GAIN);
+        Ok(Reference {
+            substeps: at
+                .key("substeps")
+                .within(reference.substeps, &limits::SUBSTEPS)?,
+            solver: reference.solver,
+            in_plane: reference.in_plane,
+            spring_gain: gain("spring_gain", reference.spring_gain)?,
+            shape_gain: gain("shape_gain", reference.shape_gain)?,
+        })
+    }
+
+    /// What concerns body, layers and press together: the layers reach a base, and the press ends above it.
+    fn depths(&self, scene: &Scene) -> Result<(), SceneError> {
+        let at = self.site("layer");
+        let last = scene.layers.len() - 1;
+        let reaches_down = scene.layers[last].thickness.is_none();
+        if reaches_down && matches!(scene.body.skin, Skin::File(_)) && scene.body.bones.is_empty() {
+            return Err(at.index(last).invalid(
+                "the layer has no thickness and the body no bone to reach down to; give `thickness`, \
+                 or `bones` in [body]",
+            ));
+        }
+        let block_depth = match scene.body.skin {
+            Skin::Generated(Generator::Block { size, .. }) => Some(size[2]),
+            _ => None,
+        };
+        let layers: Option<f64> = scene
+            .layers
+            .iter()
+            .filter_map(|layer| layer.thickness.as_ref())
+            .map(Thickness::largest)
+            .sum();
+        // A file's thickness is not known here; then growth and press see to it.
+        let Some(layers) = layers else { return Ok(()) };
+        if let Some(depth) = block_depth {
+            let too_thick = if reaches_down {
+                layers >= depth
+            } else {
+                layers > depth * (1.0 + 1e-9)
+            };
+            if too_thick {
+                return Err(at.index(last).invalid(format!(
+                    "the layers are {} thick together, the block is {} deep; make the layers thinner or \
+                     the block deeper",
+                    Length::from_si(layers),
+                    Length::from_si(depth)
+                )));
+            }
+        }
+        let room = if reaches_down {
+            block_depth
+        } else {
+            Some(layers)
+        };
+        if let Some(room) = room.filter(|&room| scene.press.depth >= room) {
+            return Err(self.site("press").key("depth").invalid(format!(
+                "a press of {} goes through the body, which is {} deep; give a smaller `depth` in [press]",
+                Length::from_si(scene.press.depth),
+                Length::from_si(room)
+            )));
+        }
+        Ok(())
+    }
+}
+
+fn coordinates(at: &Site<'_>, point: [Length; 3]) -> Result<[f64; 3], SceneError> {
+    each(at, point, &limits::COORDINATE)
+}
+
+fn each<K: Kind>(
+    at: &Site<'_>,
+    values: [Quantity<K>; 3],
+    limits: &Limits<Quantity<K>>,
+) -> Result<[f64; 3], SceneError> {
+    let mut si = [0.0; 3];
+    for (i, value) in values.into_iter().enumerate() {
+        si[i] = at.index(i).within(value, limits)?.si();
+    }
+    Ok(si)
+}
+
+fn unit_vector(at: &Site<'_>, vector: [f64; 3]) -> Result<[f64; 3], SceneError> {
+    // Scaled first, so that the squares neither overflow nor vanish.
+    let largest = vector
+        .iter()
+        .fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest <= 0.0 || vector.iter().any(|x| !x.is_finite()) {
+        return Err(at.invalid("a direction needs three finite numbers that are not all zero"));
+    }
+    let scaled = vector.map(|x| x / largest);
+    let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt() * largest;
+    // What is a unit vector already stays as it is to the bit.
+    Ok(if (length - 1.0).abs() < 1e-14 {
+        vector
+    } else {
+        scaled.map(|x| x * largest / length)
+    })
+}

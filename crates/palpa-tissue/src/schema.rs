@@ -1,0 +1,41 @@
+//! The JSON Schema of the scene file, made from the types that read it.
+
+use serde_json::Value;
+
+use crate::file::SceneFile;
+
+/// The JSON Schema (2020-12) of a scene file: keys, kinds, descriptions with ranges and defaults.
+///
+/// Editors use it for completion and checks while writing; [`Scene::load`](crate::Scene::load) checks more.
+pub fn scene_schema() -> Value {
+    let mut schema = schemars::schema_for!(SceneFile).to_value();
+    remove_null(&mut schema);
+    schema
+}
+
+/// Takes `null` out of every choice: TOML has no null, an optional key is left out.
+fn remove_null(schema: &mut Value) {
+    match schema {
+        Value::Object(object) => {
+            if let Some(Value::Array(types)) = object.get_mut("type") {
+                types.retain(|kind| kind != "null");
+                if let [one] = types.as_slice() {
+                    object["type"] = one.clone();
+                }
+            }
+            if let Some(Value::Array(choices)) = object.get_mut("anyOf") {
+                choices.retain(|choice| choice["type"] != "null");
+                if let [one] = choices.as_slice() {
+                    let one = one.clone();
+                    object.remove("anyOf");
+                    if let Value::Object(one) = one {
+                        object.extend(one);
+                    }
+                }
+            }
+            object.values_mut().for_each(remove_null);
+        }
+        Value::Array(items) => items.iter_mut().for_each(remove_null),
+        _ => {}
+    }
+}

@@ -1,0 +1,16 @@
+//! Tests of the scene file as a program sees it.
+
+#![expect(
+    clippy::float_cmp,
+    clippy::format_push_string,
+    clippy::unwrap_used,
+    reason = "units are exact to the bit where said; a test may panic, and need not be fast"
+)]
+
+mod catalogue;
+mod errors;
+mod robust;
+mod scenes;
+mod schema;
+mod thickness;
+mod units;

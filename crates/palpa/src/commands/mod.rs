@@ -1,0 +1,48 @@
+//! The commands, one module each.
+//!
+//! A command module has `pub struct Args` (derives [`clap::Args`]; its doc comments are the help text) and
+//! `pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome>`. To add one: write the module, and name it
+//! below once in [`Command`], once in [`Command::name`] and once in [`Command::run`].
+
+use clap::Subcommand;
+
+pub mod schema;
+
+use crate::cli::Context;
+
+/// How a command ended, other than by an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// It did what was asked. Exit code 0
+    Done,
+    /// It did what was asked, and what it found is not good. Exit code 1
+    NotGood,
+    /// It was asked to stop, and has left complete files of what was done until then. Exit code 130
+    Interrupted,
+}
+
+/// A command with its arguments.
+#[derive(Debug, Subcommand)]
+#[expect(missing_docs, reason = "a command's help text stands at its `Args`")]
+pub enum Command {
+    Schema(schema::Args),
+}
+
+impl Command {
+    /// The word on the command line, which also names the default output folder.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Schema(_) => "schema",
+        }
+    }
+
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// On bad input, and when a result cannot be written.
+    pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
+        match self {
+            Self::Schema(args) => schema::run(args, context),
+        }
+    }
+}

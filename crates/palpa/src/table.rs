@@ -1,0 +1,54 @@
+//! Small tables for people: right-aligned columns under their headers.
+
+use std::fmt;
+
+/// A table of text cells, printed with aligned columns.
+///
+/// ```
+/// let mut table = palpa::table::Table::new(["depth mm", "force N"]);
+/// table.push(["1.0".to_owned(), "0.031".to_owned()]);
+/// assert_eq!(table.to_string(), "depth mm  force N\n     1.0    0.031");
+/// ```
+#[derive(Debug, Clone)]
+pub struct Table<const N: usize> {
+    header: [String; N],
+    rows: Vec<[String; N]>,
+}
+
+impl<const N: usize> Table<N> {
+    /// An empty table under `header`; put the unit into the column's name.
+    pub fn new(header: [&str; N]) -> Self {
+        Self {
+            header: header.map(str::to_owned),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Appends a row.
+    pub fn push(&mut self, row: [String; N]) {
+        self.rows.push(row);
+    }
+}
+
+impl<const N: usize> fmt::Display for Table<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines = || std::iter::once(&self.header).chain(&self.rows);
+        let width: [usize; N] = std::array::from_fn(|column| {
+            lines()
+                .map(|line| line[column].chars().count())
+                .max()
+                .unwrap_or(0)
+        });
+        for (i, line) in lines().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            for (column, cell) in line.iter().enumerate() {
+                let gap = if column == 0 { "" } else { "  " };
+                let pad = width[column] - cell.chars().count();
+                write!(f, "{gap}{:pad$}{cell}", "")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,15 @@
+//! Integration tests of the command and of what it writes.
+
+mod cli;
+mod plot;
+mod vtu;
+
+use std::path::PathBuf;
+
+use palpa::output::OutDir;
+
+/// A folder under the target folder for results that people and the Python checks look at after the tests.
+fn results(name: &str) -> OutDir {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("results");
+    OutDir::create(path.join(name)).unwrap()
+}
