@@ -225,12 +225,14 @@ fn drop_duplicates(surface: &mut Surface) -> usize {
     doubles.len()
 }
 
-/// Triangles with the same three vertices as an earlier one, as pairs (the first, the double).
+/// Triangles with the same three vertices as an earlier one, as pairs (the first, the double). Those with a repeated vertex are
+/// flawed already and left out.
 pub(crate) fn duplicates(surface: &Surface) -> Vec<(u32, u32)> {
     let mut keys: Vec<([u32; 3], u32)> = surface
         .triangles
         .iter()
         .enumerate()
+        .filter(|(_, triangle)| !has_repeated_vertex(**triangle))
         .map(|(t, triangle)| {
             let mut key = *triangle;
             key.sort_unstable();

@@ -57,7 +57,7 @@ pub enum InterfaceBars {
 /// How the linear system of a step is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Solver {
-    /// Dense or sparse, whichever is faster for the size.
+    /// Whichever is fastest for the size, which has been the sparse one at every size measured.
     #[default]
     Auto,
     /// Cholesky of the reduced matrix as a dense one.

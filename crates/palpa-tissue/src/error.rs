@@ -213,12 +213,12 @@ impl<'a> Document<'a> {
 fn plain(message: &str) -> String {
     let message = message.trim();
     // Some messages repeat a value, whatever its length: the end says what was expected.
-    let message = match message.char_indices().nth(500) {
-        None => message.to_owned(),
-        Some(_) => {
-            let end = message.char_indices().rev().nth(250).map_or(0, |(i, _)| i);
-            format!("{} {}", shortened(message), &message[end..])
-        }
+    let message = if message.len() > 500 {
+        let end = message.char_indices().rev().nth(250);
+        let end = end.map_or(message, |(i, _)| &message[i..]);
+        format!("{} {end}", shortened(message))
+    } else {
+        message.to_owned()
     };
     message
         .replace('\n', "; ")

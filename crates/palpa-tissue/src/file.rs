@@ -256,8 +256,8 @@ pub(crate) struct PressTable {
     pub(crate) hold: Time,
     /// Whether the tool comes back up. Default: true.
     pub(crate) retract: bool,
-    /// By how much the depth grows from one result to the next, 0.1 µm to 100 mm, no more than the depth and no less
-    /// than a 5000th of it. Default: a 32nd of the depth.
+    /// By how much the depth grows from one result to the next: no more than the depth and no less than a 5000th of it.
+    /// Default: a 32nd of the depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) step: Option<Length>,
 }

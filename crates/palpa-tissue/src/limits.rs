@@ -70,7 +70,6 @@ pub(crate) const TOOL_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
 pub(crate) const DEPTH: Limits<Length> = between(1e-6, 0.5);
 pub(crate) const SPEED: Limits<Velocity> = between(1e-5, 1.0);
 pub(crate) const HOLD: Limits<Time> = between(0.0, 600.0);
-pub(crate) const STEP: Limits<Length> = between(1e-7, 0.1);
 pub(crate) const SUBSTEPS: Limits<u32> = numbers(1, 1024);
 pub(crate) const GAIN: Limits<f64> = numbers(0.0, 1.0);
 
@@ -129,7 +128,6 @@ mod tests {
         says("PressTable", "depth", &DEPTH);
         says("PressTable", "speed", &SPEED);
         says("PressTable", "hold", &HOLD);
-        says("PressTable", "step", &STEP);
         says("PressTable", "step", &format!("a {MAX_STEPS}th of it"));
         says("ReferenceTable", "substeps", &SUBSTEPS);
         says("ReferenceTable", "spring_gain", &GAIN);

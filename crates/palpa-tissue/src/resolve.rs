@@ -119,14 +119,12 @@ impl<'a> Reader<'a> {
         let step = match press.step {
             None => depth.si() / DEFAULT_STEPS,
             Some(step) => {
-                let at = at.key("step");
-                let step = at.within(step, &limits::STEP)?;
-                let (n, most) = (depth.si() / step.si(), limits::MAX_STEPS);
                 // A step that divides the depth evenly may miss the bound by rounding.
-                if step > depth || n > most * (1.0 + 1e-9) {
-                    return Err(at.invalid(format!(
-                        "a step of {step} does not fit a depth of {depth}; take a step between {} and the depth",
-                        Length::from_si(depth.si() / most)
+                let finest = depth.si() / limits::MAX_STEPS;
+                if step > depth || step.si() < finest * (1.0 - 1e-9) {
+                    return Err(at.key("step").invalid(format!(
+                        "a step of {step} does not fit a depth of {depth}; take {} to {depth}",
+                        Length::from_si(finest)
                     )));
                 }
                 step.si()
@@ -168,9 +166,14 @@ impl<'a> Reader<'a> {
                  or `bones` in [body]",
             ));
         }
-        let block_depth = match scene.body.skin {
+        let body_depth = match scene.body.skin {
             Skin::Generated(Generator::Block { size, .. }) => Some(size[2]),
-            _ => None,
+            Skin::Generated(Generator::Cylinder {
+                radius,
+                bone_radius,
+                ..
+            }) => Some(radius - bone_radius),
+            Skin::Generated(Generator::Forearm { .. }) | Skin::File(_) => None,
         };
         let layers: Option<f64> = scene
             .layers
@@ -180,7 +183,7 @@ impl<'a> Reader<'a> {
             .sum();
         // A file's thickness is not known here; then growth and press see to it.
         let Some(layers) = layers else { return Ok(()) };
-        if let Some(depth) = block_depth {
+        if let Some(depth) = body_depth {
             let too_thick = if reaches_down {
                 layers >= depth
             } else {
@@ -188,15 +191,14 @@ impl<'a> Reader<'a> {
             };
             if too_thick {
                 return Err(at.index(last).invalid(format!(
-                    "the layers are {} thick together, the block is {} deep; make the layers thinner or \
-                     the block deeper",
+                    "the layers are {} thick together, the body is {} deep; make the layers thinner or the body deeper",
                     Length::from_si(layers),
                     Length::from_si(depth)
                 )));
             }
         }
         let room = if reaches_down {
-            block_depth
+            body_depth
         } else {
             Some(layers)
         };
@@ -236,11 +238,11 @@ fn unit_vector(at: &Site<'_>, vector: [f64; 3]) -> Result<[f64; 3], SceneError> 
         return Err(at.invalid("a direction needs three finite numbers that are not all zero"));
     }
     let scaled = vector.map(|x| x / largest);
-    let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt() * largest;
+    let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
     // What is a unit vector already stays as it is to the bit.
-    Ok(if (length - 1.0).abs() < 1e-14 {
+    Ok(if (length * largest - 1.0).abs() < 1e-14 {
         vector
     } else {
-        scaled.map(|x| x * largest / length)
+        scaled.map(|x| x / length)
     })
 }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::catalogue;
 use crate::file::SceneFile;
 
 /// The JSON Schema (2020-12) of a scene file: keys, kinds, descriptions with ranges and defaults.
@@ -9,12 +10,15 @@ use crate::file::SceneFile;
 /// Editors use it for completion and checks while writing; [`Scene::load`](crate::Scene::load) checks more.
 pub fn scene_schema() -> Value {
     let mut schema = schemars::schema_for!(SceneFile).to_value();
-    remove_null(&mut schema);
+    tidy(&mut schema);
+    let tissues = catalogue().iter().map(|tissue| tissue.name.as_str());
+    schema["$defs"]["LayerTable"]["properties"]["tissue"]["examples"] = tissues.collect();
     schema
 }
 
-/// Takes `null` out of every choice: TOML has no null, an optional key is left out.
-fn remove_null(schema: &mut Value) {
+/// Takes `null` out of every choice (TOML has no null, an optional key is left out), and the line breaks of the source
+/// out of the descriptions.
+fn tidy(schema: &mut Value) {
     match schema {
         Value::Object(object) => {
             if let Some(Value::Array(types)) = object.get_mut("type") {
@@ -33,9 +37,13 @@ fn remove_null(schema: &mut Value) {
                     }
                 }
             }
-            object.values_mut().for_each(remove_null);
+            if let Some(Value::String(text)) = object.get_mut("description") {
+                let paragraphs: Vec<_> = text.split("\n\n").map(|p| p.replace('\n', " ")).collect();
+                *text = paragraphs.join("\n\n");
+            }
+            object.values_mut().for_each(tidy);
         }
-        Value::Array(items) => items.iter_mut().for_each(remove_null),
+        Value::Array(items) => items.iter_mut().for_each(tidy),
         _ => {}
     }
 }

@@ -1,1 +1,261 @@
-//! Cross-sections of layered bodies.
+//! Cross-sections: where a plane cuts a layered body or a surface, and the picture of it.
+//!
+//! A prism is cut along its faces: every face gives the segment between two cut edges, and the segments chain into the
+//! outline. Neighbours cut a shared face in the same segment, so the outlines tile the section without gaps or overlaps.
+//! A quad face counts as the surface that its cut edges suggest; where all its four edges are cut (a saddle), corners on
+//! the negative side of the plane are kept apart, which both neighbours see alike.
+
+use std::collections::BTreeMap;
+
+use palpa_mesh::{LayeredBody, Surface, Vec3};
+
+mod draw;
+
+pub use draw::{Panel, ToolOutline, draw};
+
+/// A point in the plane, in metres along its axes.
+pub type Point2 = [f64; 2];
+
+/// A plane with axes in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    origin: Vec3,
+    right: Vec3,
+    up: Vec3,
+    normal: Vec3,
+}
+
+impl Plane {
+    /// The plane through `origin` normal to `normal`; `up`, as far as it lies in the plane, is its upward axis. Looking
+    /// against the normal, the first axis points right.
+    ///
+    /// `None` if `normal` is zero or `up` is along it.
+    pub fn new(origin: Vec3, normal: Vec3, up: Vec3) -> Option<Self> {
+        let normal = normal.try_normalize(f64::MIN_POSITIVE)?;
+        let in_plane = up - normal * up.dot(&normal);
+        let up = in_plane.try_normalize(1e-9 * up.norm())?;
+        Some(Self {
+            origin,
+            right: up.cross(&normal),
+            up,
+            normal,
+        })
+    }
+
+    /// Height of a point above the plane. m
+    pub fn height(&self, point: &Vec3) -> f64 {
+        (point - self.origin).dot(&self.normal)
+    }
+
+    /// A point, projected onto the plane.
+    pub fn project(&self, point: &Vec3) -> Point2 {
+        let p = point - self.origin;
+        [p.dot(&self.right), p.dot(&self.up)]
+    }
+}
+
+/// A cut body.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Section {
+    /// The outlines of the cut prisms, each with its layer. Their vertices run either way round.
+    pub cells: Vec<(usize, Vec<Point2>)>,
+    /// The lines where the section meets the skin, the base and the borders between layers.
+    pub borders: Vec<Vec<Point2>>,
+    /// Names of the layers, from the skin down.
+    pub layer_names: Vec<String>,
+}
+
+/// An edge of the mesh, smaller node first.
+type Edge = [usize; 2];
+
+/// Cuts the body with its nodes at `positions`, in metres.
+///
+/// # Panics
+/// If `positions` does not hold one point per node.
+pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Section {
+    assert_eq!(positions.len(), body.n_nodes(), "one position per node");
+    let cut = Cut::new(positions, plane);
+    let mut cells = Vec::new();
+    let mut border_segments = Vec::new();
+    let n_intervals = body.n_levels - 1;
+    for t in 0..body.skin.triangles.len() {
+        for (i, &layer) in body.interval_layer.iter().enumerate() {
+            let [a, b, c, d, e, f] = body.prism(t, i);
+            if !cut.passes(&[a, b, c, d, e, f]) {
+                continue;
+            }
+            // Every face runs counter-clockwise seen from outside, so that the segments follow each other.
+            let mut segments = Vec::with_capacity(6);
+            cut.face(&[a, b, c], &mut segments);
+            if i == 0 || body.interval_layer[i - 1] != layer {
+                border_segments.extend(&segments);
+            }
+            let n_upper = segments.len();
+            cut.face(&[f, e, d], &mut segments);
+            if i + 1 == n_intervals {
+                border_segments.extend(&segments[n_upper..]);
+            }
+            for [p, q] in [[a, b], [b, c], [c, a]] {
+                cut.face(&[q, p, p + 1, q + 1], &mut segments);
+            }
+            cells.extend(
+                chains(&segments)
+                    .into_iter()
+                    .filter(|chain| chain.is_closed)
+                    .map(|chain| (layer, cut.points(&chain.edges))),
+            );
+        }
+    }
+    let borders = chains(&border_segments);
+    Section {
+        cells,
+        borders: borders.iter().map(|chain| cut.line(chain)).collect(),
+        layer_names: body.layer_names.clone(),
+    }
+}
+
+/// Cuts a surface: lines, whose last point is their first where they are closed.
+pub fn cut_surface(surface: &Surface, plane: &Plane) -> Vec<Vec<Point2>> {
+    let cut = Cut::new(&surface.points, plane);
+    let mut segments = Vec::new();
+    for triangle in &surface.triangles {
+        cut.face(&triangle.map(|v| v as usize), &mut segments);
+    }
+    chains(&segments)
+        .iter()
+        .map(|chain| cut.line(chain))
+        .collect()
+}
+
+/// Area of a simple polygon. m²
+pub fn polygon_area(polygon: &[Point2]) -> f64 {
+    let next = polygon.iter().cycle().skip(1);
+    let twice: f64 = polygon
+        .iter()
+        .zip(next)
+        .map(|(p, q)| p[0] * q[1] - p[1] * q[0])
+        .sum();
+    0.5 * twice.abs()
+}
+
+/// Points and their heights above the plane.
+struct Cut<'a> {
+    points: &'a [Vec3],
+    plane: &'a Plane,
+    heights: Vec<f64>,
+}
+
+impl<'a> Cut<'a> {
+    fn new(points: &'a [Vec3], plane: &'a Plane) -> Self {
+        let heights = points.iter().map(|p| plane.height(p)).collect();
+        Self {
+            points,
+            plane,
+            heights,
+        }
+    }
+
+    /// A node in the plane counts as above it: no node is ever on both sides.
+    fn is_above(&self, node: usize) -> bool {
+        self.heights[node] >= 0.0
+    }
+
+    fn passes(&self, nodes: &[usize]) -> bool {
+        nodes
+            .iter()
+            .any(|&n| self.is_above(n) != self.is_above(nodes[0]))
+    }
+
+    /// Appends the segments in which the plane cuts a face: each from the edge where the rim goes down through the
+    /// plane to the edge where it next comes up.
+    fn face(&self, rim: &[usize], segments: &mut Vec<[Edge; 2]>) {
+        let n = rim.len();
+        let edge = |i: usize| {
+            let [p, q] = [rim[i % n], rim[(i + 1) % n]];
+            [p.min(q), p.max(q)]
+        };
+        let sides = |i: usize| (self.is_above(rim[i % n]), self.is_above(rim[(i + 1) % n]));
+        for down in (0..n).filter(|&i| sides(i) == (true, false)) {
+            let up = (down + 1..down + n).find(|&i| sides(i) == (false, true));
+            segments.extend(up.map(|up| [edge(down), edge(up)]));
+        }
+    }
+
+    fn points(&self, edges: &[Edge]) -> Vec<Point2> {
+        edges.iter().map(|&edge| self.point(edge)).collect()
+    }
+
+    /// The points of a chain, with the first again at the end where it is closed.
+    fn line(&self, chain: &Chain) -> Vec<Point2> {
+        let mut points = self.points(&chain.edges);
+        if chain.is_closed {
+            points.push(points[0]);
+        }
+        points
+    }
+
+    fn point(&self, [a, b]: Edge) -> Point2 {
+        let [h_a, h_b] = [self.heights[a], self.heights[b]];
+        let share = h_a / (h_a - h_b);
+        self.plane
+            .project(&(self.points[a] + (self.points[b] - self.points[a]) * share))
+    }
+}
+
+/// Cut edges in the order of the line through them.
+struct Chain {
+    edges: Vec<Edge>,
+    is_closed: bool,
+}
+
+/// Joins directed segments end to start, open lines first. A line ends where no segment goes on.
+fn chains(segments: &[[Edge; 2]]) -> Vec<Chain> {
+    let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
+    let mut arrivals: BTreeMap<Edge, usize> = BTreeMap::new();
+    for &[from, to] in segments {
+        next.entry(from).or_default().push(to);
+        *arrivals.entry(to).or_default() += 1;
+    }
+    let open_starts: Vec<Edge> = next
+        .keys()
+        .filter(|edge| !arrivals.contains_key(*edge))
+        .copied()
+        .collect();
+    let mut chains: Vec<Chain> = open_starts
+        .into_iter()
+        .map(|start| follow(&mut next, start))
+        .collect();
+    while let Some((&start, _)) = next.first_key_value() {
+        chains.push(follow(&mut next, start));
+    }
+    chains
+}
+
+/// Takes the line from `start` out of `next`.
+fn follow(next: &mut BTreeMap<Edge, Vec<Edge>>, start: Edge) -> Chain {
+    let mut edges = vec![start];
+    let mut at = start;
+    while let Some(ends) = next.get_mut(&at) {
+        let to = ends.pop();
+        if ends.is_empty() {
+            next.remove(&at);
+        }
+        match to {
+            Some(to) if to == start => {
+                return Chain {
+                    edges,
+                    is_closed: true,
+                };
+            }
+            Some(to) => {
+                edges.push(to);
+                at = to;
+            }
+            None => break,
+        }
+    }
+    Chain {
+        edges,
+        is_closed: false,
+    }
+}

@@ -111,8 +111,13 @@ impl Grid {
     /// If there is not one value per point.
     #[must_use]
     pub fn with_point_scalars(mut self, name: &str, values: Vec<f64>) -> Self {
-        assert_eq!(values.len(), self.n_points(), "one value of {name} per point");
-        self.point_data.push(Array::new(name, 1, Values::Float(values)));
+        assert_eq!(
+            values.len(),
+            self.n_points(),
+            "one value of {name} per point"
+        );
+        self.point_data
+            .push(Array::new(name, 1, Values::Float(values)));
         self
     }
 
@@ -122,7 +127,11 @@ impl Grid {
     /// If there is not one value per point.
     #[must_use]
     pub fn with_point_vectors(mut self, name: &str, values: &[Vec3]) -> Self {
-        assert_eq!(values.len(), self.n_points(), "one value of {name} per point");
+        assert_eq!(
+            values.len(),
+            self.n_points(),
+            "one value of {name} per point"
+        );
         self.point_data
             .push(Array::new(name, 3, Values::Float(flat(values))));
         self
@@ -135,7 +144,8 @@ impl Grid {
     #[must_use]
     pub fn with_cell_scalars(mut self, name: &str, values: Vec<f64>) -> Self {
         assert_eq!(values.len(), self.n_cells(), "one value of {name} per cell");
-        self.cell_data.push(Array::new(name, 1, Values::Float(values)));
+        self.cell_data
+            .push(Array::new(name, 1, Values::Float(values)));
         self
     }
 
@@ -173,9 +183,16 @@ impl Grid {
         writeln!(w, "<Points>")?;
         write_floats(w, "Points", 3, &self.points)?;
         writeln!(w, "</Points>\n<Cells>")?;
-        let offsets = (0..self.n_cells()).map(|cell| i64::from(((cell + 1) * self.nodes_per_cell) as u32));
+        let offsets =
+            (0..self.n_cells()).map(|cell| i64::from(((cell + 1) * self.nodes_per_cell) as u32));
         let connectivity = self.connectivity.iter().map(|&node| i64::from(node));
-        write_array(w, "Int64", "connectivity", 1, connectivity.map(i64::to_le_bytes))?;
+        write_array(
+            w,
+            "Int64",
+            "connectivity",
+            1,
+            connectivity.map(i64::to_le_bytes),
+        )?;
         write_array(w, "Int64", "offsets", 1, offsets.map(i64::to_le_bytes))?;
         let types = std::iter::repeat_n([self.cell_type], self.n_cells());
         write_array(w, "UInt8", "types", 1, types)?;
@@ -229,7 +246,12 @@ pub fn write_series(w: &mut dyn Write, frames: &[(f64, String)]) -> io::Result<(
     writeln!(w, "</Collection>\n</VTKFile>")
 }
 
-fn write_floats(w: &mut dyn Write, name: &str, n_components: usize, values: &[f64]) -> io::Result<()> {
+fn write_floats(
+    w: &mut dyn Write,
+    name: &str,
+    n_components: usize,
+    values: &[f64],
+) -> io::Result<()> {
     let bytes = values.iter().map(|v| v.to_le_bytes());
     write_array(w, "Float64", name, n_components, bytes)
 }

@@ -172,7 +172,7 @@ fn is_sliver(surface: &Surface, t: usize) -> bool {
 
 fn check_size(diagonal: f64, distance: f64, findings: &mut Findings) {
     if diagonal > 0.0 && !BODY_SIZES.contains(&diagonal) {
-        let units = [("mm", 1e-3), ("cm", 1e-2), ("inch", 0.0254)];
+        let units = [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254)];
         let fitting = units
             .iter()
             .find(|(_, unit)| BODY_SIZES.contains(&(diagonal * unit)));

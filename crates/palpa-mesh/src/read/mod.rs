@@ -120,7 +120,6 @@ impl ReadNote {
     /// How much it matters.
     pub fn severity(&self) -> Severity {
         match self {
-            Self::FoldedPolygons { .. } => Severity::Unrepairable,
             Self::ShortFaces { .. } => Severity::Repairable,
             _ => Severity::Note,
         }

@@ -137,6 +137,7 @@ fn every_range_of_a_generator() {
         "kind = \"forearm\", scale = 10",
         "kind = \"forearm\", scale = inf",
         "kind = \"fore arm\"",
+        "kind = \"cylinder\" }\n[press]\ndepth = \"30 mm\"\n#",
         "spacing = \"5 mm\"",
         "kind = \"forearm\" }\nbones = [\"ulna.ply\"]\n#",
         "kind = \"forearm\" }\nsurface = \"skin.ply\"\n#",

@@ -157,6 +157,35 @@ fn an_inline_tissue_without_a_ratio_keeps_its_default() {
 }
 
 #[test]
+fn defaults_stay_within_the_ranges_they_are_read_with() {
+    for (thickness, depth) in [
+        ("10 um", "1 um"),
+        ("500 mm", "499 mm"),
+        ("0.7 mm", "0.3 mm"),
+    ] {
+        let scene = MINIMAL.replace("20 mm", thickness);
+        let scene = parse(&format!("{scene}[press]\ndepth = \"{depth}\""));
+        assert_eq!(parse(&scene.to_toml()), scene);
+    }
+}
+
+#[test]
+fn directions_of_any_length_become_unit_vectors() {
+    for direction in [
+        "[0, 0, -7]",
+        "[1e308, 1e308, -1e308]",
+        "[1e-320, 0, 0]",
+        "[0.1, 0.2, 0.3]",
+    ] {
+        let scene = parse(&format!("{MINIMAL}[press]\ndirection = {direction}"));
+        let unit = scene.press.direction.unwrap();
+        let length = unit.iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!((length - 1.0).abs() < 1e-15, "{direction} became {unit:?}");
+        assert_eq!(parse(&scene.to_toml()), scene);
+    }
+}
+
+#[test]
 fn the_written_scene_reads_well() {
     let mut settings = insta::Settings::clone_current();
     settings.set_prepend_module_to_snapshot(false);

@@ -6,6 +6,7 @@
 
 use clap::Subcommand;
 
+pub mod check;
 pub mod schema;
 
 use crate::cli::Context;
@@ -25,6 +26,7 @@ pub enum Outcome {
 #[derive(Debug, Subcommand)]
 #[expect(missing_docs, reason = "a command's help text stands at its `Args`")]
 pub enum Command {
+    Check(check::Args),
     Schema(schema::Args),
 }
 
@@ -32,6 +34,7 @@ impl Command {
     /// The word on the command line, which also names the default output folder.
     pub fn name(&self) -> &'static str {
         match self {
+            Self::Check(_) => "check",
             Self::Schema(_) => "schema",
         }
     }
@@ -42,6 +45,7 @@ impl Command {
     /// On bad input, and when a result cannot be written.
     pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
         match self {
+            Self::Check(args) => check::run(args, context),
             Self::Schema(args) => schema::run(args, context),
         }
     }

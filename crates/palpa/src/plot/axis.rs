@@ -48,7 +48,12 @@ impl Axis {
     }
 
     /// Fits the axis to data. `is_loose` widens it to whole ticks.
-    pub(super) fn fit(&self, values: impl Iterator<Item = f64>, n_ticks: f64, is_loose: bool) -> Fit {
+    pub(super) fn fit(
+        &self,
+        values: impl Iterator<Item = f64>,
+        n_ticks: f64,
+        is_loose: bool,
+    ) -> Fit {
         let [mut lo, mut hi] = self.range.unwrap_or_else(|| {
             values
                 .filter(|&v| self.shows(v))
@@ -129,6 +134,9 @@ impl Fit {
     }
 
     fn log(lo: f64, hi: f64) -> Self {
+        // Never less than a factor of 4, so that a 1, 2 or 5 is among the ticks.
+        let room = (4.0 * lo / hi).sqrt().max(1.0);
+        let [lo, hi] = [lo / room, hi * room];
         let first = lo.log10().floor() as i32;
         let last = hi.log10().ceil() as i32;
         let is_short = hi / lo < 50.0;
@@ -236,7 +244,10 @@ mod tests {
         assert_eq!(labels(&fit), ["0", "2", "4", "6", "8"]);
         assert!((fit.place(4.0) - 0.5).abs() < 1e-12);
         let fit = axis.fit([-0.13, 0.31].into_iter(), 6.0, true);
-        assert_eq!(labels(&fit), ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4"]);
+        assert_eq!(
+            labels(&fit),
+            ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4"]
+        );
     }
 
     #[test]
@@ -258,11 +269,24 @@ mod tests {
 
     #[test]
     fn constant_empty_and_unbounded_data_have_an_axis() {
-        for data in [vec![], vec![3.0], vec![0.0, 0.0], vec![f64::NAN, f64::INFINITY], vec![1e300, -1e300]] {
-            for axis in [Axis::linear("x"), Axis::log("x"), Axis::linear("x").with_zero()] {
+        for data in [
+            vec![],
+            vec![3.0],
+            vec![0.0, 0.0],
+            vec![f64::NAN, f64::INFINITY],
+            vec![1e300, -1e300],
+        ] {
+            for axis in [
+                Axis::linear("x"),
+                Axis::log("x"),
+                Axis::linear("x").with_zero(),
+            ] {
                 let fit = axis.fit(data.iter().copied(), 6.0, true);
                 assert!(fit.lo < fit.hi, "{data:?}: {fit:?}");
-                assert!(!fit.ticks.is_empty() && fit.ticks.len() < 30, "{data:?}: {fit:?}");
+                assert!(
+                    !fit.ticks.is_empty() && fit.ticks.len() < 30,
+                    "{data:?}: {fit:?}"
+                );
             }
         }
     }

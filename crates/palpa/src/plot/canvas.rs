@@ -31,9 +31,18 @@ impl Color {
     /// This colour, mixed with white: `share` 0 is white, 1 the colour itself.
     #[must_use]
     pub fn tint(self, share: f64) -> Self {
-        #[expect(clippy::cast_sign_loss, reason = "both ends of the mix are in 0..=255")]
-        let mix = |c: u8| (255.0 - (255.0 - f64::from(c)) * share.clamp(0.0, 1.0)).round() as u8;
-        Self(self.0.map(mix))
+        WHITE.mixed(self, share)
+    }
+
+    /// This colour with a share (0 to 1) of another.
+    #[must_use]
+    pub fn mixed(self, other: Self, share: f64) -> Self {
+        let share = share.clamp(0.0, 1.0);
+        #[expect(clippy::cast_sign_loss, reason = "between two values of 0..=255")]
+        let mix = |i: usize| {
+            (f64::from(self.0[i]) * (1.0 - share) + f64::from(other.0[i]) * share).round() as u8
+        };
+        Self([mix(0), mix(1), mix(2)])
     }
 }
 
@@ -224,7 +233,10 @@ impl Canvas {
         // Inter's capitals and digits are 0.73 em high.
         let drop = 0.365 * font.size;
         let place = if font.is_upward {
-            format!(r#"transform="translate({:.2} {y:.2}) rotate(-90)""#, x + drop)
+            format!(
+                r#"transform="translate({:.2} {y:.2}) rotate(-90)""#,
+                x + drop
+            )
         } else {
             format!(r#"x="{x:.2}" y="{:.2}""#, y + drop)
         };

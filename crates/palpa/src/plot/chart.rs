@@ -245,11 +245,7 @@ impl Chart {
             width: (frame.width - left - right).max(40.0),
             height: (frame.height - header - 46.0).max(40.0),
         };
-        let view = View {
-            plot,
-            x: &x,
-            y: &y,
-        };
+        let view = View { plot, x: &x, y: &y };
         self.draw_bands(canvas, &view);
         self.draw_axes(canvas, &view, frame);
         self.draw_guides(canvas, &view);
@@ -307,13 +303,23 @@ impl Chart {
         column(canvas, plot.x, AXIS_LINE);
 
         let middle = [plot.x + plot.width / 2.0, plot.y + plot.height / 2.0];
-        canvas.text([middle[0], plot.bottom() + 36.0], &scaled(&self.x, view.x), LABEL);
-        canvas.text([frame.x + 8.0, middle[1]], &scaled(&self.y, view.y), LABEL.upward());
+        canvas.text(
+            [middle[0], plot.bottom() + 36.0],
+            &scaled(&self.x, view.x),
+            LABEL,
+        );
+        canvas.text(
+            [frame.x + 8.0, middle[1]],
+            &scaled(&self.y, view.y),
+            LABEL.upward(),
+        );
     }
 
     fn draw_bands(&self, canvas: &mut Canvas, view: &View<'_>) {
         for band in &self.bands {
-            let [from, to] = band.range.map(|value| view.x.place(value).clamp(0.0, 1.0) * view.plot.width);
+            let [from, to] = band
+                .range
+                .map(|value| view.x.place(value).clamp(0.0, 1.0) * view.plot.width);
             let width = to - from;
             if width.is_nan() || width <= 0.0 {
                 continue;
@@ -353,7 +359,11 @@ impl Chart {
                 } else {
                     (x + 5.0, Anchor::Start)
                 };
-                canvas.text([x, plot.bottom() - 11.0], &guide.name, Font { anchor, ..REMARK });
+                canvas.text(
+                    [x, plot.bottom() - 11.0],
+                    &guide.name,
+                    Font { anchor, ..REMARK },
+                );
             } else if !guide.is_vertical && (0.0..=1.0).contains(&view.y.place(guide.at)) {
                 let y = view.y_of(guide.at);
                 canvas.line([plot.x, y], [plot.right(), y], GUIDE_LINE);
@@ -468,7 +478,10 @@ impl Chart {
     fn values(&self, axis: usize) -> impl Iterator<Item = f64> {
         self.series.iter().flat_map(move |series| {
             let points = series.points.iter().filter(|&&point| self.shows(point));
-            let spread = series.spread.iter().flat_map(|&[x, low, high]| [[x, low], [x, high]]);
+            let spread = series
+                .spread
+                .iter()
+                .flat_map(|&[x, low, high]| [[x, low], [x, high]]);
             points.copied().chain(spread).map(move |point| point[axis])
         })
     }
@@ -487,7 +500,10 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
         n_rows as f64 * HEIGHT + MARGIN + header,
     );
     if !title.is_empty() {
-        let font = Font { size: 19.0, ..TITLE };
+        let font = Font {
+            size: 19.0,
+            ..TITLE
+        };
         canvas.text([MARGIN, MARGIN + 10.0], title, font);
     }
     for (i, chart) in charts.iter().enumerate() {

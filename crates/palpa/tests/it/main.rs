@@ -1,7 +1,11 @@
 //! Integration tests of the command and of what it writes.
 
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
 mod cli;
+mod output;
 mod plot;
+mod section;
 mod vtu;
 
 use std::path::PathBuf;

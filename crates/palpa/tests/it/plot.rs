@@ -24,7 +24,7 @@ fn has_color(pixels: &Pixmap, color: Color) -> bool {
 fn curve(scale: f64, softening: f64) -> Vec<[f64; 2]> {
     (0..=64)
         .map(|i| f64::from(i) / 8.0)
-        .map(|depth| [depth, scale * ((depth / softening).exp() - 1.0)])
+        .map(|depth| [depth, scale * (depth / softening).exp_m1()])
         .collect()
 }
 
@@ -40,7 +40,7 @@ fn a_chart_shows_every_series_in_its_colour() {
         .map(|&[x, f]| [x, 0.85 * f, 1.2 * f])
         .collect();
     let measured = (0..9)
-        .map(|i| [f64::from(i), 0.33 * ((f64::from(i) / 4.1).exp() - 1.0)])
+        .map(|i| [f64::from(i), 0.33 * (f64::from(i) / 4.1).exp_m1()])
         .collect();
     let picture = Chart::new(
         Axis::linear("indentation [mm]"),
@@ -54,10 +54,7 @@ fn a_chart_shows_every_series_in_its_colour() {
     .series(Series::new("unloading", back).dashed())
     .series(Series::new("measured", measured).only_markers())
     .guide(Guide::y(2.0, "limit of the device"))
-    .note(
-        [6.0, 0.35 * (1.5_f64.exp() - 1.0)],
-        "the tool meets the muscle",
-    )
+    .note([6.0, 0.35 * 1.5_f64.exp_m1()], "the tool meets the muscle")
     .draw();
     let pixels = saved(&picture, "chart");
     assert_eq!((pixels.width(), pixels.height()), (1920, 1200));
