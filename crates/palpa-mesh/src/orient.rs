@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::topology::{Side, UnionFind, all_sides, by_edge, has_repeated_vertex, sides};
+use crate::topology::{Side, UnionFind, all_sides, by_edge, has_sides, sides};
 use crate::{Surface, Vec3};
 
 /// The least share of the volume of a ball of the same area below which the side on which an open sheet bulges is
@@ -36,13 +36,13 @@ pub(crate) struct Patch {
 }
 
 /// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more meet, which
-/// two belong together is not known, and no winding is carried across.
-pub(crate) fn patches(surface: &Surface) -> Vec<Patch> {
+/// two belong together is not known, and no winding is carried across. Triangles that have no sides among these are left out.
+pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
     let n = surface.triangles.len();
-    let all = all_sides(surface);
+    let has_sides = has_sides(surface, sides);
     let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); n];
     let mut sets = UnionFind::new(n);
-    for on_edge in by_edge(&all) {
+    for on_edge in by_edge(sides) {
         if let &[a, b] = on_edge {
             let agrees = a.is_forward != b.is_forward;
             neighbours[a.triangle as usize].push((b.triangle, agrees));
@@ -53,7 +53,7 @@ pub(crate) fn patches(surface: &Surface) -> Vec<Patch> {
     let mut is_odd: Vec<Option<bool>> = vec![None; n];
     sets.groups()
         .into_iter()
-        .filter(|group| !has_repeated_vertex(surface.triangles[group[0] as usize]))
+        .filter(|group| has_sides[group[0] as usize])
         .map(|triangles| {
             let mut is_one_sided = false;
             let mut open = vec![triangles[0]];
@@ -77,7 +77,9 @@ pub(crate) fn patches(surface: &Surface) -> Vec<Patch> {
                 .collect();
             // The majority is taken to be right, so that the fewest triangles turn.
             if 2 * is_odd.iter().filter(|&&odd| odd).count() > is_odd.len() {
-                is_odd.iter_mut().for_each(|odd| *odd = !*odd);
+                for odd in &mut is_odd {
+                    *odd = !*odd;
+                }
             }
             Patch {
                 triangles,
@@ -96,7 +98,7 @@ pub(crate) fn patches(surface: &Surface) -> Vec<Patch> {
 /// telling; the report counts both.
 pub fn orient(surface: &mut Surface) -> OrientReport {
     let mut report = OrientReport::default();
-    for patch in patches(surface) {
+    for patch in patches(surface, &all_sides(surface)) {
         if patch.is_one_sided {
             report.n_one_sided += 1;
             continue;

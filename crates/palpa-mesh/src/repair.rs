@@ -168,11 +168,10 @@ fn resolve_flat(surface: &mut Surface, flat: &[(usize, usize)]) -> usize {
     }
     let mut is_touched = vec![false; surface.triangles.len()];
     let mut is_dropped = vec![false; surface.triangles.len()];
-    let is_flat: Vec<bool> = {
-        let mut is_flat = vec![false; surface.triangles.len()];
-        flat.iter().for_each(|&(t, _)| is_flat[t] = true);
-        is_flat
-    };
+    let mut is_flat = vec![false; surface.triangles.len()];
+    for &(t, _) in flat {
+        is_flat[t] = true;
+    }
     let mut n_done = 0;
     for &(t, longest) in flat {
         if is_touched[t] {
@@ -217,9 +216,9 @@ fn resolve_flat(surface: &mut Surface, flat: &[(usize, usize)]) -> usize {
 fn drop_duplicates(surface: &mut Surface) -> usize {
     let doubles = duplicates(surface);
     let mut is_double = vec![false; surface.triangles.len()];
-    doubles
-        .iter()
-        .for_each(|&(_, t)| is_double[t as usize] = true);
+    for &(_, t) in &doubles {
+        is_double[t as usize] = true;
+    }
     let mut flags = is_double.iter();
     surface.triangles.retain(|_| flags.next() == Some(&false));
     doubles.len()

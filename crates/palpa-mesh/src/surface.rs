@@ -101,6 +101,7 @@ impl Surface {
     }
 
     /// A copy with every coordinate times `factor`, as from millimetres to metres by 0.001.
+    #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
             points: self.points.iter().map(|p| p * factor).collect(),

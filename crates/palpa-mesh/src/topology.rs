@@ -98,7 +98,16 @@ impl UnionFind {
     }
 }
 
-/// The triangles of each part that hangs together over edges, without those that have a repeated vertex.
+/// Whether each triangle has sides among these. `[n_triangles]`
+pub(crate) fn has_sides(surface: &Surface, sides: &[Side]) -> Vec<bool> {
+    let mut has_sides = vec![false; surface.triangles.len()];
+    for side in sides {
+        has_sides[side.triangle as usize] = true;
+    }
+    has_sides
+}
+
+/// The triangles of each part that hangs together over edges. Triangles that have no sides among these are left out.
 pub(crate) fn components(surface: &Surface, sides: &[Side]) -> Vec<Vec<u32>> {
     let mut sets = UnionFind::new(surface.triangles.len());
     for on_edge in by_edge(sides) {
@@ -107,6 +116,7 @@ pub(crate) fn components(surface: &Surface, sides: &[Side]) -> Vec<Vec<u32>> {
         }
     }
     let mut groups = sets.groups();
-    groups.retain(|group| !has_repeated_vertex(surface.triangles[group[0] as usize]));
+    let has_sides = has_sides(surface, sides);
+    groups.retain(|group| has_sides[group[0] as usize]);
     groups
 }

@@ -47,8 +47,12 @@ pub(crate) struct Freedom {
 impl Freedom {
     /// `v` seen from the frame; its first `n_free` entries are the free ones.
     #[inline]
-    pub(crate) fn to_local(&self, v: &Vec3) -> Vec3 {
-        if self.n_free == 3 { *v } else { self.frame.tr_mul(v) }
+    pub(crate) fn local(&self, v: &Vec3) -> Vec3 {
+        if self.n_free == 3 {
+            *v
+        } else {
+            self.frame.tr_mul(v)
+        }
     }
 
     /// The part of `v` that the node is free to follow.

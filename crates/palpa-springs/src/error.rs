@@ -5,7 +5,9 @@
 #[non_exhaustive]
 pub enum SpringError {
     /// The body names another number of layers than stiffnesses are given.
-    #[error("the body has {found} layers, but {given} stiffnesses are given; give one for each layer, from the skin down")]
+    #[error(
+        "the body has {found} layers, but {given} stiffnesses are given; give one for each layer, from the skin down"
+    )]
     LayerCount {
         /// Layers of the body.
         found: usize,
@@ -21,7 +23,9 @@ pub enum SpringError {
         value: f64,
     },
     /// A bar between two nodes that coincide or are not finite.
-    #[error("the bar between nodes {a} and {b} is {length} m long; the two must be apart: repair the mesh or thicken the layer")]
+    #[error(
+        "the bar between nodes {a} and {b} is {length} m long; the two must be apart: repair the mesh or thicken the layer"
+    )]
     BarLength {
         /// One end.
         a: usize,
@@ -31,7 +35,9 @@ pub enum SpringError {
         length: f64,
     },
     /// A bar whose stiffness is not a number ≥ 0.
-    #[error("the bar between nodes {a} and {b} has the stiffness {stiffness} N/m; it must be a number that is not negative")]
+    #[error(
+        "the bar between nodes {a} and {b} has the stiffness {stiffness} N/m; it must be a number that is not negative"
+    )]
     BarStiffness {
         /// One end.
         a: usize,
@@ -54,19 +60,25 @@ pub enum SpringError {
     #[error("no node is operated; name at least one node that the device holds")]
     NothingOperated,
     /// A node that is held by the device and fixed in space.
-    #[error("node {node} is operated and fixed at once; a node on the rigid base cannot be held by the device")]
+    #[error(
+        "node {node} is operated and fixed at once; a node on the rigid base cannot be held by the device"
+    )]
     OperatedAndFixed {
         /// The node.
         node: usize,
     },
     /// A plane of symmetry without a direction.
-    #[error("the plane of symmetry at node {node} has no direction: its normal is zero or not finite")]
+    #[error(
+        "the plane of symmetry at node {node} has no direction: its normal is zero or not finite"
+    )]
     Normal {
         /// The node.
         node: usize,
     },
     /// No memory or index range for the factor.
-    #[error("a system of {n_dofs} unknowns is too large to factorise here; make the mesh coarser or cut out a part")]
+    #[error(
+        "a system of {n_dofs} unknowns is too large to factorise here; make the mesh coarser or cut out a part"
+    )]
     TooLarge {
         /// Unknowns.
         n_dofs: usize,

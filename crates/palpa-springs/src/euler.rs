@@ -12,22 +12,72 @@ use palpa_mesh::Vec3;
 
 use crate::constraints::Role;
 use crate::model::SpringModel;
-use crate::network::direction;
+use crate::network::{Bar, direction};
 use crate::state::{Mode, SpringState, Workspace};
-use crate::step::{Method, Outcome, StepParams, bar_force, move_operated, step};
+use crate::step::{Method, Outcome, StepParams, bar_force, move_operated, nodal_forces, step};
 
 /// The step size of explicit Euler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EulerParams {
-    /// Step size relative to `1 / max_a Σ_i k_i L_i`: at rest stable below 2.
-    pub gain: f64,
+    /// `h` above, in 1/N: the same for all nodes.
+    pub step_size: f64,
 }
 
-impl Default for EulerParams {
-    /// Half of what is stable at rest.
-    fn default() -> Self {
-        Self { gain: 1.0 }
+impl EulerParams {
+    /// A fraction of the largest step size that is stable at rest, that is, under small loads.
+    ///
+    /// The smaller it is, the greater the load that it bears, and the more steps a force needs to cross the body.
+    pub fn of_stable(model: &SpringModel, fraction: f64) -> Self {
+        Self {
+            step_size: fraction * 4.0 / largest_tangent(model),
+        }
     }
+}
+
+/// The largest eigenvalue of the tangent of `Σ_i k_i (l_i − L_i) (P_i − P_a)` at rest, which is the stiffness of bars
+/// `k L`, over the free nodes. By power iteration, to about 1 %: the eigenvalues next to it are that near. N
+fn largest_tangent(model: &SpringModel) -> f64 {
+    const ITERATIONS: usize = 200;
+    let rest = &model.rest;
+    let span = |bar: &Bar| rest[bar.b as usize] - rest[bar.a as usize];
+    let directions: Vec<Vec3> = model.bars.iter().map(|bar| direction(span(bar))).collect();
+    let bars: Vec<Bar> = model
+        .bars
+        .iter()
+        .map(|bar| Bar {
+            stiffness: bar.stiffness * bar.length,
+            ..*bar
+        })
+        .collect();
+    // Any start that is not orthogonal to the mode does; a fixed one gives the same result in every run.
+    let mut x: Vec<Vec3> = (0..model.n_nodes())
+        .map(|i| {
+            let phase = i as f64;
+            Vec3::new(
+                (1.3 * phase).cos(),
+                (1.7 * phase).sin(),
+                (2.3 * phase).cos(),
+            )
+        })
+        .collect();
+    let mut image = x.clone();
+    let mut largest = 0.0;
+    for _ in 0..ITERATIONS {
+        for (freedom, x) in model.freedoms.iter().zip(&mut x) {
+            *x = freedom.project(x);
+        }
+        let norm = x.iter().map(Vec3::norm_squared).sum::<f64>().sqrt();
+        if norm == 0.0 {
+            break;
+        }
+        for x in &mut x {
+            *x /= norm;
+        }
+        nodal_forces(&bars, &directions, &x, &mut image);
+        largest = x.iter().zip(&image).map(|(x, kx)| x.dot(kx)).sum();
+        std::mem::swap(&mut x, &mut image);
+    }
+    largest
 }
 
 /// One step of explicit Euler: the operated nodes move, then every free node once, all from the same positions.
@@ -36,7 +86,7 @@ pub(crate) fn euler_step(
     state: &mut SpringState,
     ws: &mut Workspace,
     displacement: Vec3,
-    params: &EulerParams,
+    params: EulerParams,
 ) {
     for &node in &model.operated {
         state.positions[node] += displacement;
@@ -49,7 +99,7 @@ pub(crate) fn euler_step(
         ws.increments[a] += pull;
         ws.increments[b] -= pull;
     }
-    let h = 0.5 * params.gain / model.largest_pull;
+    let h = 0.5 * params.step_size;
     for (node, freedom) in model.freedoms.iter().enumerate() {
         if freedom.role == Role::Free {
             state.positions[node] += freedom.project(&ws.increments[node]) * h;
@@ -99,7 +149,10 @@ pub fn steps_to_cross(
     for i in 0..max_steps.max(1) {
         let moved = if i == 0 { displacement } else { Vec3::zeros() };
         let report = step(model, &mut state, &mut ws, moved, params);
-        if matches!(report.outcome, Outcome::Diverged { .. } | Outcome::NotFinite) {
+        if matches!(
+            report.outcome,
+            Outcome::Diverged { .. } | Outcome::NotFinite
+        ) {
             return None;
         }
         trace.push(state.fixed_reaction(model).norm());
@@ -118,10 +171,10 @@ pub fn steps_to_cross(
 }
 
 impl StepParams {
-    /// Explicit Euler alone, with its default step size.
-    pub fn euler() -> Self {
+    /// Explicit Euler alone, its step size a fraction of what is stable at rest.
+    pub fn euler(model: &SpringModel, fraction_of_stable: f64) -> Self {
         Self {
-            method: Method::Euler(EulerParams::default()),
+            method: Method::Euler(EulerParams::of_stable(model, fraction_of_stable)),
             ..Self::default()
         }
     }

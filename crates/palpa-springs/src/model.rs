@@ -22,8 +22,6 @@ pub struct SpringModel {
     pub(crate) stiffness_at: Vec<f64>,
     /// Number of bars at each node.
     pub(crate) n_bars_at: Vec<u32>,
-    /// Largest `Σ_i k_i L_i` over the bars at a node, the tangent of (3.21) at rest. N
-    pub(crate) largest_pull: f64,
     pub(crate) structure: Structure,
     /// Diagonal of the bounding box at rest, the scale by which a runaway is known. m
     pub(crate) size: f64,
@@ -71,12 +69,10 @@ impl SpringModel {
             .collect();
         let mut stiffness_at = vec![0.0; n_nodes];
         let mut n_bars_at = vec![0; n_nodes];
-        let mut pull_at = vec![0.0_f64; n_nodes];
         for bar in &network.bars {
             for end in [bar.a, bar.b] {
                 stiffness_at[end as usize] += bar.stiffness;
                 n_bars_at[end as usize] += 1;
-                pull_at[end as usize] += bar.stiffness * bar.length;
             }
         }
         let (low, high) = network.positions.iter().fold(
@@ -92,7 +88,6 @@ impl SpringModel {
             operated_bars,
             stiffness_at,
             n_bars_at,
-            largest_pull: pull_at.into_iter().fold(0.0, f64::max),
             size: (high - low).norm(),
         })
     }

@@ -102,7 +102,11 @@ impl Network {
     /// # Panics
     /// If `positions` are not one for each node.
     pub fn stiffness_matrix(&self, positions: &[Vec3]) -> DMatrix<f64> {
-        assert_eq!(positions.len(), self.n_nodes(), "one position for each node");
+        assert_eq!(
+            positions.len(),
+            self.n_nodes(),
+            "one position for each node"
+        );
         let n = 3 * self.n_nodes();
         let mut m1 = DMatrix::zeros(n, n);
         for bar in &self.bars {
@@ -193,9 +197,8 @@ impl BarNumbering {
 
     /// All bars with their ends and natural lengths, without stiffness yet.
     fn joined(&self, body: &LayeredBody) -> Vec<Bar> {
-        let mut ends = Vec::with_capacity(
-            self.first_diagonal + 2 * self.edges.len() * self.n_intervals(),
-        );
+        let mut ends =
+            Vec::with_capacity(self.first_diagonal + 2 * self.edges.len() * self.n_intervals());
         for &[i, j] in &self.edges {
             let (i, j) = (i as usize, j as usize);
             ends.extend((0..self.n_levels).map(|l| (body.node(i, l), body.node(j, l))));

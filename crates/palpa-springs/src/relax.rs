@@ -31,9 +31,8 @@ pub(crate) fn relax(
     ws: &mut Workspace,
     corrections: &Corrections,
 ) {
-    // `clamp` would let NaN through.
-    let spring_gain = corrections.spring_gain.max(0.0).min(1.0);
-    let shape_gain = corrections.shape_gain.max(0.0).min(1.0);
+    let spring_gain = held_to_range(corrections.spring_gain);
+    let shape_gain = held_to_range(corrections.shape_gain);
     ws.system.update_directions(&model.bars, &state.positions);
     let pulls = &mut ws.increments;
     pulls.fill(Vec3::zeros());
@@ -56,5 +55,15 @@ pub(crate) fn relax(
         let correction = (*pull - away * (shape_gain * mean)) * (0.5 / stiffness);
         *pull = freedom.project(&correction);
     }
-    nodal_forces(&model.bars, &ws.system.directions, &ws.increments, &mut ws.forces);
+    nodal_forces(
+        &model.bars,
+        &ws.system.directions,
+        &ws.increments,
+        &mut ws.forces,
+    );
+}
+
+/// A gain from 0 to 1; what is not a number is 0.
+fn held_to_range(gain: f64) -> f64 {
+    if gain > 0.0 { gain.min(1.0) } else { 0.0 }
 }

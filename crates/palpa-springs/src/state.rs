@@ -50,7 +50,11 @@ impl SpringState {
     /// # Panics
     /// If the state is not of this model.
     pub fn displacements(&self, model: &SpringModel) -> Vec<Vec3> {
-        assert_eq!(self.positions.len(), model.n_nodes(), "a state of another model");
+        assert_eq!(
+            self.positions.len(),
+            model.n_nodes(),
+            "a state of another model"
+        );
         let pairs = self.positions.iter().zip(&model.rest);
         pairs.map(|(now, rest)| now - rest).collect()
     }
@@ -60,7 +64,11 @@ impl SpringState {
     /// # Panics
     /// If the state is not of this model.
     pub fn fixed_reaction(&self, model: &SpringModel) -> Vec3 {
-        assert_eq!(self.positions.len(), model.n_nodes(), "a state of another model");
+        assert_eq!(
+            self.positions.len(),
+            model.n_nodes(),
+            "a state of another model"
+        );
         let pairs = model.freedoms.iter().zip(&self.node_forces);
         pairs
             .filter(|(freedom, _)| freedom.role == Role::Fixed)

@@ -141,8 +141,16 @@ pub fn step(
     displacement: Vec3,
     params: &StepParams,
 ) -> StepReport {
-    assert_eq!(state.positions.len(), model.n_nodes(), "a state of another model");
-    assert_eq!(ws.increments.len(), model.n_nodes(), "a workspace of another model");
+    assert_eq!(
+        state.positions.len(),
+        model.n_nodes(),
+        "a state of another model"
+    );
+    assert_eq!(
+        ws.increments.len(),
+        model.n_nodes(),
+        "a workspace of another model"
+    );
     ws.saved.copy_from(state);
     let mut free_residual = 0.0;
     let mut literal = Vec3::zeros();
@@ -182,7 +190,7 @@ fn advance(
     for _ in 0..n {
         match params.method {
             Method::Euler(euler) => {
-                euler_step(model, state, ws, part, &euler);
+                euler_step(model, state, ws, part, euler);
             }
             Method::FiniteElements => {
                 if finite_elements(model, state, ws, part, literal).is_ok() {
@@ -243,8 +251,12 @@ fn finite_elements(
         ws.forces[other as usize] -= pull;
         f1 += pull;
     }
-    ws.system
-        .solve(&model.structure, &model.freedoms, &ws.forces, &mut ws.increments);
+    ws.system.solve(
+        &model.structure,
+        &model.freedoms,
+        &ws.forces,
+        &mut ws.increments,
+    );
 
     let limit = MECHANISM_TRAVEL * part.norm();
     // Written so that NaN counts as too far.
@@ -253,7 +265,12 @@ fn finite_elements(
         return Err(Singular);
     }
     *literal += f1;
-    nodal_forces(&model.bars, &ws.system.directions, &ws.increments, &mut ws.forces);
+    nodal_forces(
+        &model.bars,
+        &ws.system.directions,
+        &ws.increments,
+        &mut ws.forces,
+    );
     Ok(())
 }
 
@@ -261,7 +278,12 @@ fn finite_elements(
 fn push_through(model: &SpringModel, state: &SpringState, ws: &mut Workspace, part: Vec3) {
     ws.system.update_directions(&model.bars, &state.positions);
     move_operated(model, ws, part);
-    nodal_forces(&model.bars, &ws.system.directions, &ws.increments, &mut ws.forces);
+    nodal_forces(
+        &model.bars,
+        &ws.system.directions,
+        &ws.increments,
+        &mut ws.forces,
+    );
 }
 
 pub(crate) fn move_operated(model: &SpringModel, ws: &mut Workspace, part: Vec3) {

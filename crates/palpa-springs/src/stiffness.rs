@@ -94,7 +94,14 @@ mod tests {
             Vec3::new(0.5, 0.75_f64.sqrt(), 0.0) * side,
         ];
         let down = Vec3::z() * height;
-        [top[0], top[1], top[2], top[0] - down, top[1] - down, top[2] - down]
+        [
+            top[0],
+            top[1],
+            top[2],
+            top[0] - down,
+            top[1] - down,
+            top[2] - down,
+        ]
     }
 
     #[test]

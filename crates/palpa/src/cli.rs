@@ -43,7 +43,7 @@ pub struct Options {
     /// Print the result as JSON on standard output, and nothing else there
     #[arg(long, global = true)]
     pub json: bool,
-    /// Folder for the files that are written [default: out/<COMMAND>]
+    /// Folder for the files that are written [default: out/COMMAND]
     #[arg(long, global = true, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

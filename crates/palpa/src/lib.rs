@@ -6,11 +6,13 @@
 // `println!` panics when the reader has gone, as in `palpa check … | head`: print through `cli::Context`.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod build;
 pub mod cli;
 pub mod commands;
 
 pub mod output;
 pub mod plot;
+pub mod press;
 pub mod section;
 pub mod table;
 pub mod vtu;

@@ -59,8 +59,11 @@ impl Plane {
 pub struct Section {
     /// The outlines of the cut prisms, each with its layer. Their vertices run either way round.
     pub cells: Vec<(usize, Vec<Point2>)>,
-    /// The lines where the section meets the skin, the base and the borders between layers.
+    /// The lines where the section meets the skin and the borders between layers; the last point of a closed one is its
+    /// first.
     pub borders: Vec<Vec<Point2>>,
+    /// The lines where the section meets the rigid base, likewise.
+    pub base: Vec<Vec<Point2>>,
     /// Names of the layers, from the skin down.
     pub layer_names: Vec<String>,
 }
@@ -77,6 +80,7 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
     let cut = Cut::new(positions, plane);
     let mut cells = Vec::new();
     let mut border_segments = Vec::new();
+    let mut base_segments = Vec::new();
     let n_intervals = body.n_levels - 1;
     for t in 0..body.skin.triangles.len() {
         for (i, &layer) in body.interval_layer.iter().enumerate() {
@@ -93,7 +97,7 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
             let n_upper = segments.len();
             cut.face(&[f, e, d], &mut segments);
             if i + 1 == n_intervals {
-                border_segments.extend(&segments[n_upper..]);
+                base_segments.extend(&segments[n_upper..]);
             }
             for [p, q] in [[a, b], [b, c], [c, a]] {
                 cut.face(&[q, p, p + 1, q + 1], &mut segments);
@@ -106,10 +110,10 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
             );
         }
     }
-    let borders = chains(&border_segments);
     Section {
         cells,
-        borders: borders.iter().map(|chain| cut.line(chain)).collect(),
+        borders: cut.lines(&border_segments),
+        base: cut.lines(&base_segments),
         layer_names: body.layer_names.clone(),
     }
 }
@@ -121,10 +125,7 @@ pub fn cut_surface(surface: &Surface, plane: &Plane) -> Vec<Vec<Point2>> {
     for triangle in &surface.triangles {
         cut.face(&triangle.map(|v| v as usize), &mut segments);
     }
-    chains(&segments)
-        .iter()
-        .map(|chain| cut.line(chain))
-        .collect()
+    cut.lines(&segments)
 }
 
 /// Area of a simple polygon. m²
@@ -185,13 +186,16 @@ impl<'a> Cut<'a> {
         edges.iter().map(|&edge| self.point(edge)).collect()
     }
 
-    /// The points of a chain, with the first again at the end where it is closed.
-    fn line(&self, chain: &Chain) -> Vec<Point2> {
-        let mut points = self.points(&chain.edges);
-        if chain.is_closed {
-            points.push(points[0]);
-        }
-        points
+    /// The lines that segments join into, with the first point again at the end where they are closed.
+    fn lines(&self, segments: &[[Edge; 2]]) -> Vec<Vec<Point2>> {
+        let line = |chain: Chain| {
+            let mut points = self.points(&chain.edges);
+            if chain.is_closed {
+                points.push(points[0]);
+            }
+            points
+        };
+        chains(segments).into_iter().map(line).collect()
     }
 
     fn point(&self, [a, b]: Edge) -> Point2 {

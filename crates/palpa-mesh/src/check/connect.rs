@@ -4,10 +4,10 @@ use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
 use serde::Serialize;
 
-use super::{FindingKind, Findings, N_LISTED, Severity, Spot, SurfaceReport, diagonal};
+use super::{FindingKind, Findings, N_LISTED, Severity, Spot, SurfaceReport, counted, diagonal};
 use crate::orient::{Enclosed, chains, patches};
-use crate::repair::{DEFAULT_WELD_TOLERANCE, used_bounds};
-use crate::topology::{Side, UnionFind, all_sides, by_edge, components, has_repeated_vertex};
+use crate::repair::{DEFAULT_WELD_TOLERANCE, duplicates, used_bounds};
+use crate::topology::{Side, UnionFind, by_edge, components, has_sides, sides};
 use crate::{Surface, Vec3};
 
 /// A boundary loop in one plane encloses a cut face, if that is more than this share of the area of its part; less is a hole.
@@ -50,11 +50,19 @@ pub struct BoundaryLoop {
 }
 
 pub(super) fn check(surface: &Surface, report: &mut SurfaceReport, findings: &mut Findings) {
-    let sides = all_sides(surface);
+    // Doubles have a finding of their own; with them, each of their edges would seem crowded.
+    let mut is_double = vec![false; surface.triangles.len()];
+    for (_, t) in duplicates(surface) {
+        is_double[t as usize] = true;
+    }
+    let sides = sides(
+        surface,
+        (0..surface.triangles.len() as u32).filter(|&t| !is_double[t as usize]),
+    );
     check_edges(surface, &sides, report, findings);
     check_vertices(surface, &sides, findings);
     // Volumes mean something only where the winding is one.
-    let wound = check_winding(surface, findings);
+    let wound = check_winding(surface, &sides, findings);
     let parts = components(surface, &sides);
     let area_of_part = check_parts(&wound, &sides, &parts, report, findings);
     check_boundary(surface, &sides, &parts, &area_of_part, report, findings);
@@ -76,9 +84,9 @@ fn check_edges(
             _ => crowded.push(on_edge[0].edge),
         }
         if on_edge.len() > 1 {
-            on_edge
-                .iter()
-                .for_each(|side| has_neighbour[side.triangle as usize] = true);
+            for side in on_edge {
+                has_neighbour[side.triangle as usize] = true;
+            }
         }
     }
     report.n_nonmanifold_edges = crowded.len();
@@ -86,12 +94,17 @@ fn check_edges(
         (FindingKind::NonManifoldEdge, Severity::Unrepairable),
         &crowded,
         |&edge| Spot::edge(surface, edge),
-        format!("{} edge(s) belong to three triangles or more", crowded.len()),
+        counted(
+            crowded.len(),
+            "edge belongs to three triangles or more",
+            "edges belong to three triangles or more",
+        ),
         "which of them are skin cannot be known: delete the inner ones (Blender: Select > All by Trait > Non Manifold; \
          MeshLab: Repair Non Manifold Edges), or remesh by volume",
     );
+    let has_sides = has_sides(surface, sides);
     let alone: Vec<u32> = (0..surface.triangles.len() as u32)
-        .filter(|&t| !has_neighbour[t as usize])
+        .filter(|&t| has_sides[t as usize] && !has_neighbour[t as usize])
         .collect();
     if 2 * alone.len() > surface.triangles.len() {
         findings.add(
@@ -127,9 +140,10 @@ fn check_vertices(surface: &Surface, sides: &[Side], findings: &mut Findings) {
         }
     }
     let mut fan_of_vertex = vec![u32::MAX; surface.points.len()];
+    let has_sides = has_sides(surface, sides);
     let mut pinched = Vec::new();
     for (t, triangle) in surface.triangles.iter().enumerate() {
-        if has_repeated_vertex(*triangle) {
+        if !has_sides[t] {
             continue;
         }
         for (k, &v) in triangle.iter().enumerate() {
@@ -148,17 +162,21 @@ fn check_vertices(surface: &Surface, sides: &[Side], findings: &mut Findings) {
         (FindingKind::NonManifoldVertex, Severity::Unrepairable),
         &pinched,
         |&v| Spot::vertex(surface, v),
-        format!("{} vertex/vertices at which parts meet that share no edge", pinched.len()),
+        counted(
+            pinched.len(),
+            "vertex at which parts meet that share no edge",
+            "vertices at which parts meet that share no edge",
+        ),
         "pull the parts apart or join them along an edge (MeshLab: Repair Non Manifold Vertices by Splitting)",
     );
 }
 
 /// Reports triangles wound against their neighbours and parts that face inward; returns the surface with one winding per part.
-fn check_winding(surface: &Surface, findings: &mut Findings) -> Surface {
+fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> Surface {
     let mut wound = surface.clone();
     let (mut odd, mut inverted, mut one_sided, mut unclear) = (vec![], vec![], vec![], vec![]);
     let (mut area, mut unclear_area) = (0.0, 0.0);
-    for patch in patches(surface) {
+    for patch in patches(surface, sides) {
         let first = patch.triangles[0];
         if patch.is_one_sided {
             one_sided.push(first);
@@ -194,9 +212,10 @@ fn check_winding(surface: &Surface, findings: &mut Findings) -> Surface {
         (FindingKind::Winding, Severity::Repairable),
         &odd,
         triangle,
-        format!(
-            "{} triangle(s) are wound against their neighbours",
-            odd.len()
+        counted(
+            odd.len(),
+            "triangle is wound against its neighbours",
+            "triangles are wound against their neighbours",
         ),
         "repair turns them to agree with the majority",
     );
@@ -204,16 +223,17 @@ fn check_winding(surface: &Surface, findings: &mut Findings) -> Surface {
         (FindingKind::Inverted, Severity::Repairable),
         &inverted,
         triangle,
-        format!("{} part(s) face inward: a closed one encloses negative volume, an open one bulges backward", inverted.len()),
-        "repair turns them outward; a sheet that is meant to be hollow (an armpit) must be kept as it is",
+        counted(inverted.len(), "part faces inward", "parts face inward"),
+        "closed, its volume is negative; open, it bulges backward: repair turns it; a sheet that is meant to be hollow (an armpit) is to be kept as it is",
     );
     findings.add(
         (FindingKind::OneSided, Severity::Unrepairable),
         &one_sided,
         triangle,
-        format!(
-            "{} part(s) have but one side, as a Möbius strip has",
-            one_sided.len()
+        counted(
+            one_sided.len(),
+            "part has but one side, as a Möbius strip has",
+            "parts have but one side, as a Möbius strip has",
         ),
         "cut the surface open where it is twisted, and close it the right way",
     );
@@ -221,9 +241,10 @@ fn check_winding(surface: &Surface, findings: &mut Findings) -> Surface {
         (FindingKind::UnclearSide, Severity::Note),
         &unclear,
         triangle,
-        format!(
-            "{} open part(s) are too flat to tell which side is out",
-            unclear.len()
+        counted(
+            unclear.len(),
+            "open part is too flat to tell which side is out",
+            "open parts are too flat to tell which side is out",
         ),
         "its winding is taken to be right: counter-clockwise seen from outside",
     );
@@ -288,7 +309,9 @@ fn check_boundary(
         .collect();
     let mut part_of = vec![0; surface.triangles.len()];
     for (p, part) in parts.iter().enumerate() {
-        part.iter().for_each(|&t| part_of[t as usize] = p);
+        for &t in part {
+            part_of[t as usize] = p;
+        }
     }
     let mut loops: Vec<(BoundaryLoop, [u32; 2])> = chains(&boundary)
         .iter()
@@ -310,7 +333,7 @@ fn check_boundary(
         (FindingKind::Hole, Severity::Unrepairable),
         &holes,
         spot,
-        format!("{} hole(s): boundary loops that are small, or not in one plane", holes.len()),
+        counted(holes.len(), "hole: a boundary loop that is small, or not in one plane", "holes: boundary loops that are small, or not in one plane"),
         "fill them (Blender: Mesh > Clean Up > Fill Holes; MeshLab: Close Holes); cut a limb along a plane",
     );
     findings.add(
@@ -318,8 +341,8 @@ fn check_boundary(
         &cuts,
         spot,
         format!(
-            "open at {} boundary loop(s), {} of them in one plane",
-            cuts.len(),
+            "open at {}, {} of them in one plane",
+            counted(cuts.len(), "boundary loop", "boundary loops"),
             cuts.iter().filter(|(l, _)| l.is_flat).count()
         ),
         "they are taken as cut faces of the body",
@@ -402,7 +425,7 @@ fn check_t_junctions(surface: &Surface, boundary: &[Side], findings: &mut Findin
         (FindingKind::TJunction, Severity::Unrepairable),
         &junctions,
         |&v| Spot::vertex(surface, v),
-        format!("{} vertex/vertices lie on edges that they do not end", junctions.len()),
+        counted(junctions.len(), "vertex lies on an edge that it does not end", "vertices lie on edges that they do not end"),
         "split those edges there (Blender: Merge by Distance after Subdivide; MeshLab: Snap Mismatched Borders), or remesh",
     );
 }

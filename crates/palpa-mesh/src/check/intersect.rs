@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_search_says_when_it_stops() {
-        let n = 30;
+        let n = 30_u32;
         let mut points = vec![];
         for i in 0..n {
             // A pencil of triangles round one axis, all crossing in it.
@@ -273,13 +273,11 @@ mod tests {
                 [[-x, -y, 0.0], [x, y, 0.0], [0.0, 0.0, 1.0 + f64::from(i)]].map(Vec3::from),
             );
         }
-        let triangles = (0..n as u32)
-            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
-            .collect();
+        let triangles = (0..n).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         let surface = Surface { points, triangles };
         let all = search(&surface, usize::MAX, usize::MAX);
         assert!(all.is_complete);
-        assert_eq!(all.pairs.len(), (n * (n - 1) / 2) as usize);
+        assert_eq!(all.pairs.len(), 30 * 29 / 2);
         let some = search(&surface, usize::MAX, 7);
         assert!(!some.is_complete && some.pairs.len() == 7);
     }

@@ -342,6 +342,11 @@ impl SurfaceFile {
     }
 }
 
+/// `n` things, with the words that follow for one and for more.
+fn counted(n: usize, one: &str, more: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { more })
+}
+
 /// A length for people, in the unit that fits it.
 fn length(metres: f64) -> String {
     match metres {

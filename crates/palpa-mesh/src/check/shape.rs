@@ -1,6 +1,6 @@
 //! Checks of vertices and triangles one by one, and of the size of the whole.
 
-use super::{FindingKind, Findings, Severity, Spot, SurfaceReport, diagonal, length};
+use super::{FindingKind, Findings, Severity, Spot, SurfaceReport, counted, diagonal, length};
 use crate::Surface;
 use crate::repair::{DEFAULT_WELD_TOLERANCE, duplicates, flaw, used_bounds};
 use crate::weld::weld_within;
@@ -87,9 +87,10 @@ fn check_vertices(surface: &Surface, findings: &mut Findings) {
         (FindingKind::NotFinite, Severity::Unrepairable),
         &wild,
         vertex,
-        format!(
-            "{} vertex/vertices with coordinates that are NaN, infinite or beyond 1e9",
-            wild.len()
+        counted(
+            wild.len(),
+            "vertex with coordinates that are NaN, infinite or beyond 1e9",
+            "vertices with coordinates that are NaN, infinite or beyond 1e9",
         ),
         "where they belong cannot be known: correct or delete them where the surface was made",
     );
@@ -98,7 +99,11 @@ fn check_vertices(surface: &Surface, findings: &mut Findings) {
         (FindingKind::UnusedVertex, Severity::Repairable),
         &unused,
         vertex,
-        format!("{} vertex/vertices belong to no triangle", unused.len()),
+        counted(
+            unused.len(),
+            "vertex belongs to no triangle",
+            "vertices belong to no triangle",
+        ),
         "repair drops them",
     );
     let tolerance = DEFAULT_WELD_TOLERANCE * used_bounds(surface).map_or(0.0, diagonal);
@@ -117,8 +122,8 @@ fn check_vertices(surface: &Surface, findings: &mut Findings) {
         &coincident,
         vertex,
         format!(
-            "{} vertex/vertices lie within {} of another",
-            coincident.len(),
+            "{} within {} of another",
+            counted(coincident.len(), "vertex lies", "vertices lie"),
             length(tolerance)
         ),
         "repair welds them",
@@ -135,7 +140,11 @@ fn check_triangles(surface: &Surface, findings: &mut Findings) {
         (FindingKind::Degenerate, Severity::Repairable),
         &degenerate,
         triangle,
-        format!("{} triangle(s) without area", degenerate.len()),
+        counted(
+            degenerate.len(),
+            "triangle without area",
+            "triangles without area",
+        ),
         "repair drops them, or turns an edge where dropping would leave a slit",
     );
     let doubles = duplicates(surface);
@@ -143,9 +152,10 @@ fn check_triangles(surface: &Surface, findings: &mut Findings) {
         (FindingKind::Duplicate, Severity::Repairable),
         &doubles,
         |&(first, double)| Spot::triangles(surface, &[first, double]),
-        format!(
-            "{} triangle(s) have the same vertices as another",
-            doubles.len()
+        counted(
+            doubles.len(),
+            "triangle has the same vertices as another",
+            "triangles have the same vertices as another",
         ),
         "repair keeps the first of each",
     );
@@ -156,7 +166,7 @@ fn check_triangles(surface: &Surface, findings: &mut Findings) {
         (FindingKind::Sliver, Severity::Note),
         &slivers,
         triangle,
-        format!("{} triangle(s) flatter than 1 : 100", slivers.len()),
+        counted(slivers.len(), "triangle flatter than 1 : 100", "triangles flatter than 1 : 100"),
         "prisms under them are poor elements; remesh for accuracy (Blender: Remesh; MeshLab: Isotropic Explicit Remeshing)",
     );
 }

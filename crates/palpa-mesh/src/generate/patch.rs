@@ -118,7 +118,10 @@ mod tests {
         for normal in large.skin.vertex_normals() {
             assert!((normal - Vec3::z()).norm() < 1e-15);
         }
-        assert_eq!(large.positions[large.node(15, 3)], Vec3::new(0.12, 0.12, -0.12));
+        assert_eq!(
+            large.positions[large.node(15, 3)],
+            Vec3::new(0.12, 0.12, -0.12)
+        );
         assert_eq!((centre_vertex(3, 3), centre_vertex(4, 4)), (4, 5));
     }
 

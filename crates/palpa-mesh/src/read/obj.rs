@@ -31,7 +31,7 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         }
     }
 
-    let mut n_before = 0;
+    let mut n_before = 0_u64;
     let mut n_other = 0;
     let mut corners = Vec::new();
     for (line, text) in lines(&text) {
@@ -111,7 +111,7 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Parsed<Resul
 }
 
 /// The vertex of a face corner: `7`, `7/1`, `7//3`, `7/1/3`, or counted back from the last vertex before, `-2`.
-fn corner(word: &str, n_before: usize, line: usize, builder: &Builder) -> Parsed<u32> {
+fn corner(word: &str, n_before: u64, line: usize, builder: &Builder) -> Parsed<u32> {
     let place = Place::Line(line);
     let index = word.split('/').next().unwrap_or("");
     let index: i64 = index
@@ -121,7 +121,7 @@ fn corner(word: &str, n_before: usize, line: usize, builder: &Builder) -> Parsed
     let from_zero = match index {
         1.. => index - 1,
         0 => -1,
-        _ => index.saturating_add(n_before as i64),
+        _ => index.saturating_add_unsigned(n_before),
     };
     match usize::try_from(from_zero) {
         Ok(v) if v < n => Ok(v as u32),

@@ -27,13 +27,16 @@ pub(super) fn triangulate(points: &[Vec3], corners: &[u32], triangles: &mut Vec<
             (points[corners[i] as usize] - points[corners[j] as usize]).norm_squared()
         };
         let is_first_shorter = length_sq(0, 2) <= length_sq(1, 3);
-        triangles.extend(
-            if first && (is_first_shorter || !second) || !first && !second && is_first_shorter {
-                [[a, b, c], [a, c, d]]
-            } else {
-                [[a, b, d], [b, c, d]]
-            },
-        );
+        let is_first = if first == second {
+            is_first_shorter
+        } else {
+            first
+        };
+        triangles.extend(if is_first {
+            [[a, b, c], [a, c, d]]
+        } else {
+            [[a, b, d], [b, c, d]]
+        });
         return first || second;
     }
     // Corners that are left, as a ring, and the ears among them. Clipping one changes its two neighbours.

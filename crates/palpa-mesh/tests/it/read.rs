@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use base64::Engine;
 use palpa_mesh::read::{Place, ReadNote};
 use palpa_mesh::{Format, ReadError, Surface, SurfaceFile, Vec3, read_surface, read_surface_bytes};
 use proptest::prelude::*;
@@ -376,7 +377,6 @@ fn gltf_with_its_buffer_beside_it_or_inside() {
     fs::write(&skin, gltf_square("", r#", "uri": "my%20skin.bin""#)).unwrap();
     let beside = read_surface(&skin).unwrap();
 
-    use base64::Engine;
     let data = base64::engine::general_purpose::STANDARD.encode(gltf_buffer());
     let uri = format!(r#", "uri": "data:application/octet-stream;base64,{data}""#);
     assert_eq!(read(Format::Gltf, gltf_square("", &uri)), beside);

@@ -9,16 +9,41 @@ use palpa_mesh::{Surface, Vec3};
 pub(crate) fn icosphere(n: usize) -> Surface {
     let g = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corners = [
-        [-1.0, g, 0.0], [1.0, g, 0.0], [-1.0, -g, 0.0], [1.0, -g, 0.0],
-        [0.0, -1.0, g], [0.0, 1.0, g], [0.0, -1.0, -g], [0.0, 1.0, -g],
-        [g, 0.0, -1.0], [g, 0.0, 1.0], [-g, 0.0, -1.0], [-g, 0.0, 1.0],
+        [-1.0, g, 0.0],
+        [1.0, g, 0.0],
+        [-1.0, -g, 0.0],
+        [1.0, -g, 0.0],
+        [0.0, -1.0, g],
+        [0.0, 1.0, g],
+        [0.0, -1.0, -g],
+        [0.0, 1.0, -g],
+        [g, 0.0, -1.0],
+        [g, 0.0, 1.0],
+        [-g, 0.0, -1.0],
+        [-g, 0.0, 1.0],
     ];
     let mut points: Vec<Vec3> = corners.iter().map(|&c| Vec3::from(c).normalize()).collect();
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11],
-        [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6], [7, 1, 8],
-        [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9],
-        [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..n {
         let mut middles: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -43,14 +68,23 @@ pub(crate) fn icosphere(n: usize) -> Surface {
 pub(crate) fn tube(around: u32, along: u32) -> Surface {
     let point = |i: u32, j: u32| {
         let (sin, cos) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
-        Vec3::new(0.2 * f64::from(j) / f64::from(along), 0.04 * cos, 0.04 * sin)
+        Vec3::new(
+            0.2 * f64::from(j) / f64::from(along),
+            0.04 * cos,
+            0.04 * sin,
+        )
     };
-    let points = (0..=along).flat_map(|j| (0..around).map(move |i| point(i, j))).collect();
+    let points = (0..=along)
+        .flat_map(|j| (0..around).map(move |i| point(i, j)))
+        .collect();
     let id = |i: u32, j: u32| j * around + i % around;
     let triangles = (0..along)
         .flat_map(|j| (0..around).map(move |i| (i, j)))
         .flat_map(|(i, j)| {
-            [[id(i, j), id(i + 1, j), id(i + 1, j + 1)], [id(i, j), id(i + 1, j + 1), id(i, j + 1)]]
+            [
+                [id(i, j), id(i + 1, j), id(i + 1, j + 1)],
+                [id(i, j), id(i + 1, j + 1), id(i, j + 1)],
+            ]
         })
         .collect();
     Surface { points, triangles }
@@ -69,7 +103,12 @@ pub(crate) fn moebius(n: u32) -> Surface {
         .collect();
     let id = |i: u32, side: u32| 2 * (i % n) + if i < n { side } else { 1 - side };
     let triangles = (0..n)
-        .flat_map(|i| [[id(i, 0), id(i, 1), id(i + 1, 0)], [id(i, 1), id(i + 1, 1), id(i + 1, 0)]])
+        .flat_map(|i| {
+            [
+                [id(i, 0), id(i, 1), id(i + 1, 0)],
+                [id(i, 1), id(i + 1, 1), id(i + 1, 0)],
+            ]
+        })
         .collect();
     Surface { points, triangles }
 }

@@ -50,7 +50,8 @@ impl Pattern {
                 col_ptr.push(row_idx.len());
             }
         }
-        let symbolic = analyse(&col_ptr, &row_idx, n_dofs).ok_or(SpringError::TooLarge { n_dofs })?;
+        let symbolic =
+            analyse(&col_ptr, &row_idx, n_dofs).ok_or(SpringError::TooLarge { n_dofs })?;
         Ok(Self::Sparse {
             lower: SymbolicSparseColMat::new_checked(n_dofs, n_dofs, col_ptr, None, row_idx),
             symbolic: Box::new(symbolic),

@@ -42,7 +42,7 @@ impl HistoricalInverse {
         self.matrix.fill(0.0);
         for (bar, c) in bars.iter().zip(directions) {
             let ends = [bar.a as usize, bar.b as usize];
-            let local = ends.map(|node| freedoms[node].to_local(c));
+            let local = ends.map(|node| freedoms[node].local(c));
             for (p, q, sign) in [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)] {
                 for i in 0..freedoms[ends[p]].n_free {
                     for j in 0..freedoms[ends[q]].n_free {
@@ -99,14 +99,9 @@ impl HistoricalInverse {
     }
 
     /// `U' = −M2⁻¹ F2`, written over the free directions of `increments`.
-    pub(crate) fn solve(
-        &mut self,
-        freedoms: &[Freedom],
-        forces: &[Vec3],
-        increments: &mut [Vec3],
-    ) {
+    pub(crate) fn solve(&mut self, freedoms: &[Freedom], forces: &[Vec3], increments: &mut [Vec3]) {
         for (node, freedom) in freedoms.iter().enumerate() {
-            let local = freedom.to_local(&forces[node]);
+            let local = freedom.local(&forces[node]);
             for i in 0..3 {
                 self.force[3 * node + i] = if i < freedom.n_free { local[i] } else { 0.0 };
             }

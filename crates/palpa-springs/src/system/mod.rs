@@ -63,11 +63,15 @@ impl Structure {
         };
         let nodes = node_pattern(network, &order);
         let pattern = match solver {
-            Solver::Sparse => Pattern::sparse(&nodes, n_dofs, |node| {
-                (start[node], freedoms[node].n_free)
-            })?,
+            Solver::Sparse => {
+                Pattern::sparse(&nodes, n_dofs, |node| (start[node], freedoms[node].n_free))?
+            }
             // The historical inverse forms its own matrix and only borrows the numbering.
-            _ => Pattern::dense(if solver == Solver::HistoricalInverse { 0 } else { n_dofs }),
+            _ => Pattern::dense(if solver == Solver::HistoricalInverse {
+                0
+            } else {
+                n_dofs
+            }),
         };
         let mut structure = Self {
             start,
@@ -93,15 +97,24 @@ impl Structure {
                 let (a, b) = (bar.a as usize, bar.b as usize);
                 let mut block = [NONE; 3];
                 if self.start[a] != NONE && self.start[b] != NONE {
-                    let (first, second) = if self.start[a] < self.start[b] { (a, b) } else { (b, a) };
+                    let (first, second) = if self.start[a] < self.start[b] {
+                        (a, b)
+                    } else {
+                        (b, a)
+                    };
                     for (c, entry) in block.iter_mut().take(freedoms[first].n_free).enumerate() {
-                        *entry = self.pattern.entry(self.start[second], self.start[first] + c);
+                        *entry = self
+                            .pattern
+                            .entry(self.start[second], self.start[first] + c);
                     }
                 }
                 block
             })
             .collect();
-        debug_assert_eq!(nodes.len(), self.start.iter().filter(|s| **s != NONE).count());
+        debug_assert_eq!(
+            nodes.len(),
+            self.start.iter().filter(|s| **s != NONE).count()
+        );
     }
 
     pub(crate) fn n_dofs(&self) -> usize {
@@ -161,8 +174,12 @@ impl System {
         for (scale, &entry) in self.scale.iter_mut().zip(&structure.diagonal) {
             *scale = self.values[entry];
         }
-        self.factor
-            .refactor(&structure.pattern, &mut self.values, &self.scale, SINGULAR_PIVOT)
+        self.factor.refactor(
+            &structure.pattern,
+            &mut self.values,
+            &self.scale,
+            SINGULAR_PIVOT,
+        )
     }
 
     fn assemble(&mut self, structure: &Structure, bars: &[crate::Bar], freedoms: &[Freedom]) {
@@ -170,10 +187,7 @@ impl System {
         for ((bar, c), block) in bars.iter().zip(&self.directions).zip(&structure.blocks) {
             let (a, b) = (bar.a as usize, bar.b as usize);
             let (start_a, start_b) = (structure.start[a], structure.start[b]);
-            let local = |node: usize| {
-                let c = freedoms[node].to_local(c);
-                (c, freedoms[node].n_free)
-            };
+            let local = |node: usize| (freedoms[node].local(c), freedoms[node].n_free);
             let (c_a, n_a) = local(a);
             let (c_b, n_b) = local(b);
             for (start, n, c) in [(start_a, n_a, c_a), (start_b, n_b, c_b)] {
@@ -221,7 +235,7 @@ impl System {
         for (node, &start) in structure.start.iter().enumerate() {
             if start != NONE {
                 let n = freedoms[node].n_free;
-                let local = freedoms[node].to_local(&forces[node]);
+                let local = freedoms[node].local(&forces[node]);
                 for (i, entry) in self.right_side[start..start + n].iter_mut().enumerate() {
                     *entry = -local[i];
                 }
@@ -234,7 +248,11 @@ impl System {
                 let n = freedoms[node].n_free;
                 let mut local = Vec3::zeros();
                 local.as_mut_slice()[..n].copy_from_slice(&self.right_side[start..start + n]);
-                increments[node] = if n == 3 { local } else { freedoms[node].frame * local };
+                increments[node] = if n == 3 {
+                    local
+                } else {
+                    freedoms[node].frame * local
+                };
             }
         }
     }

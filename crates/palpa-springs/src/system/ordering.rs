@@ -33,7 +33,11 @@ pub(crate) fn column_order(
     let mut pairs: Vec<(usize, usize)> = network
         .bars
         .iter()
-        .filter(|bar| [bar.a, bar.b].iter().all(|n| freedoms[*n as usize].n_free > 0))
+        .filter(|bar| {
+            [bar.a, bar.b]
+                .iter()
+                .all(|n| freedoms[*n as usize].n_free > 0)
+        })
         .map(|bar| {
             let [a, b] = [bar.a, bar.b].map(|n| rank[network.column[n as usize] as usize]);
             (a.max(b), a.min(b))

@@ -7,6 +7,7 @@
 use clap::Subcommand;
 
 pub mod check;
+pub mod press;
 pub mod schema;
 
 use crate::cli::Context;
@@ -27,6 +28,7 @@ pub enum Outcome {
 #[expect(missing_docs, reason = "a command's help text stands at its `Args`")]
 pub enum Command {
     Check(check::Args),
+    Press(press::Args),
     Schema(schema::Args),
 }
 
@@ -35,6 +37,7 @@ impl Command {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Check(_) => "check",
+            Self::Press(_) => "press",
             Self::Schema(_) => "schema",
         }
     }
@@ -46,6 +49,7 @@ impl Command {
     pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
         match self {
             Self::Check(args) => check::run(args, context),
+            Self::Press(args) => press::run(args, context),
             Self::Schema(args) => schema::run(args, context),
         }
     }

@@ -162,7 +162,7 @@ impl Fit {
                 };
                 if is_tick {
                     ticks.push((value, log_label(f64::from(digit), decade)));
-                } else {
+                } else if stride < 3 {
                     minor.push(value);
                 }
             }

@@ -87,6 +87,8 @@ pub(crate) struct Font {
     pub(crate) color: Color,
     pub(crate) anchor: Anchor,
     pub(crate) is_upward: bool,
+    /// A white rim keeps text readable across lines.
+    pub(crate) has_rim: bool,
 }
 
 impl Font {
@@ -97,6 +99,7 @@ impl Font {
             color,
             anchor,
             is_upward: false,
+            has_rim: false,
         }
     }
 
@@ -202,6 +205,15 @@ impl Canvas {
         );
     }
 
+    /// A closed ring through which what lies behind is seen.
+    pub(crate) fn veil(&mut self, ring: &[[f64; 2]], fill: Color, opacity: f64) {
+        let d = path(ring, true);
+        put!(
+            self,
+            r#"<path d="{d}" fill="{fill}" fill-opacity="{opacity}"/>"#
+        );
+    }
+
     pub(crate) fn rect(&mut self, frame: Frame, fill: Color) {
         let Frame {
             x,
@@ -240,9 +252,16 @@ impl Canvas {
         } else {
             format!(r#"x="{x:.2}" y="{:.2}""#, y + drop)
         };
+        let rim = if font.has_rim {
+            format!(
+                r#" stroke="{WHITE}" stroke-width="3" stroke-linejoin="round" paint-order="stroke""#
+            )
+        } else {
+            String::new()
+        };
         put!(
             self,
-            r#"<text {place} font-size="{}" font-weight="{}" fill="{}" text-anchor="{anchor}">{}</text>"#,
+            r#"<text {place} font-size="{}" font-weight="{}" fill="{}"{rim} text-anchor="{anchor}">{}</text>"#,
             font.size,
             if font.is_bold { 600 } else { 400 },
             font.color,

@@ -5,6 +5,7 @@ use super::canvas::{Anchor, Canvas, Color, Font, Frame, GRID, INK, MUTED, Stroke
 use super::{PALETTE, Picture};
 
 const TITLE: Font = Font::new(16.0, INK, Anchor::Start).bold();
+const PANEL_TITLE: Font = Font::new(13.5, INK, Anchor::Start).bold();
 const SUBTITLE: Font = Font::new(12.5, MUTED, Anchor::Start);
 const LABEL: Font = Font::new(13.0, INK, Anchor::Middle);
 const TICK: Font = Font::new(12.0, MUTED, Anchor::Middle);
@@ -220,12 +221,12 @@ impl Chart {
             width: 912.0,
             height: 564.0,
         };
-        self.draw_in(&mut canvas, frame);
+        self.draw_in(&mut canvas, frame, TITLE);
         canvas.finish()
     }
 
-    fn draw_in(&self, canvas: &mut Canvas, frame: Frame) {
-        let header = self.draw_header(canvas, frame);
+    fn draw_in(&self, canvas: &mut Canvas, frame: Frame, title: Font) {
+        let header = self.draw_header(canvas, frame, title);
         let n_y = (frame.height / 75.0).max(3.0);
         let n_x = (frame.width / 100.0).max(3.0);
         let x = self.x.fit(self.values(0), n_x, false);
@@ -258,9 +259,12 @@ impl Chart {
         self.draw_names(canvas, &view);
     }
 
-    fn draw_header(&self, canvas: &mut Canvas, frame: Frame) -> f64 {
+    fn draw_header(&self, canvas: &mut Canvas, frame: Frame, title: Font) -> f64 {
         let mut y = 0.0;
-        for (text, font, height) in [(&self.title, TITLE, 24.0), (&self.subtitle, SUBTITLE, 20.0)] {
+        for (text, font, height) in [
+            (&self.title, title, 1.5 * title.size),
+            (&self.subtitle, SUBTITLE, 20.0),
+        ] {
             if !text.is_empty() {
                 canvas.text([frame.x, frame.y + y + 8.0], text, font);
                 y += height;
@@ -381,13 +385,16 @@ impl Chart {
             .map(|point| view.point(point))
             .collect();
         if ring.len() > 2 {
-            canvas.polygon(&[&ring], color.tint(0.2), None);
+            canvas.veil(&ring, color, 0.2);
         }
         if series.has_line {
             for run in series.points.split(|&point| !self.shows(point)) {
-                if run.len() > 1 {
-                    let line: Vec<Point> = run.iter().map(|&point| view.point(point)).collect();
-                    canvas.polyline(&line, stroke(series, color));
+                let line: Vec<Point> = run.iter().map(|&point| view.point(point)).collect();
+                match line[..] {
+                    [] => {}
+                    // A point between gaps has no line; a dot as wide as the line shows it.
+                    [point] => canvas.circle(point, LINE_WIDTH / 2.0, color, stroke(series, color)),
+                    _ => canvas.polyline(&line, stroke(series, color)),
                 }
             }
         }
@@ -414,6 +421,7 @@ impl Chart {
             let font = Font {
                 anchor,
                 color: INK,
+                has_rim: true,
                 ..REMARK
             };
             // Below the line on its right, above it on its left: clear of a rising curve.
@@ -489,9 +497,9 @@ impl Chart {
 
 /// Draws several charts in one picture, row by row.
 pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
-    const WIDTH: f64 = 520.0;
-    const HEIGHT: f64 = 370.0;
-    const MARGIN: f64 = 20.0;
+    const WIDTH: f64 = 530.0;
+    const HEIGHT: f64 = 376.0;
+    const MARGIN: f64 = 26.0;
     let n_columns = n_columns.clamp(1, charts.len().max(1));
     let n_rows = charts.len().div_ceil(n_columns);
     let header = if title.is_empty() { 0.0 } else { 38.0 };
@@ -513,8 +521,7 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
             width: WIDTH - MARGIN,
             height: HEIGHT - MARGIN,
         };
-        // Inside a picture a panel's title is smaller than the picture's.
-        chart.draw_in(&mut canvas, frame);
+        chart.draw_in(&mut canvas, frame, PANEL_TITLE);
     }
     canvas.finish()
 }

@@ -3,7 +3,7 @@
 use palpa_mesh::Vec3;
 
 use super::{Plane, Point2, Section};
-use crate::plot::canvas::{Anchor, Canvas, Font, Frame, INK, MUTED, Stroke, WHITE};
+use crate::plot::canvas::{Anchor, Canvas, Font, INK, MUTED, Stroke, WHITE};
 use crate::plot::{Color, Picture};
 
 /// Colours of the layers from the skin down: skin, fat and muscle look like it; told apart in grey too.
@@ -15,7 +15,9 @@ const LAYERS: [Color; 6] = [
     Color::rgb(0x5f, 0x8f, 0x78),
     Color::rgb(0xb9, 0xa2, 0xcc),
 ];
-const BONE: Color = Color::rgb(0xe6, 0xe3, 0xda);
+const BONE: Color = Color::rgb(0xd8, 0xd4, 0xc8);
+/// What the columns end on and what does not move, as far as it is no bone.
+const CORE: Color = Color::rgb(0xf3, 0xf2, 0xee);
 const TOOL: Color = Color::rgb(0x33, 0x3f, 0x4d);
 
 const WIDTH: f64 = 960.0;
@@ -95,7 +97,7 @@ pub fn draw(title: &str, subtitle: &str, panels: &[Panel<'_>]) -> Picture {
     let panel_width = (WIDTH - 2.0 * MARGIN - LEGEND - gap * n) / n;
     // A tall section is shrunk rather than made a tall picture.
     let scale = (panel_width / size[0]).min(620.0 / size[1]);
-    let height = HEADER + 24.0 + (size[1] * scale).max(120.0) + FOOTER;
+    let height = HEADER + 34.0 + (size[1] * scale).max(120.0) + FOOTER;
     let mut canvas = Canvas::new(WIDTH, height);
     let font = Font::new(16.0, INK, Anchor::Start).bold();
     canvas.text([MARGIN, 26.0], title, font);
@@ -105,7 +107,7 @@ pub fn draw(title: &str, subtitle: &str, panels: &[Panel<'_>]) -> Picture {
         Font::new(12.5, MUTED, Anchor::Start),
     );
 
-    let top = HEADER + 24.0;
+    let top = HEADER + 34.0;
     for (i, panel) in panels.iter().enumerate() {
         let left = MARGIN + i as f64 * (panel_width + gap);
         let indent = (panel_width - size[0] * scale) / 2.0;
@@ -116,7 +118,7 @@ pub fn draw(title: &str, subtitle: &str, panels: &[Panel<'_>]) -> Picture {
             ]
         };
         let font = Font::new(13.0, INK, Anchor::Middle);
-        canvas.text([left + panel_width / 2.0, HEADER + 10.0], panel.title, font);
+        canvas.text([left + panel_width / 2.0, HEADER + 14.0], panel.title, font);
         draw_panel(&mut canvas, panel, &view);
     }
     draw_legend(
@@ -130,6 +132,9 @@ pub fn draw(title: &str, subtitle: &str, panels: &[Panel<'_>]) -> Picture {
 
 fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> Point2) {
     let seen = |points: &[Point2]| -> Vec<Point2> { points.iter().map(|&p| view(p)).collect() };
+    for core in panel.section.base.iter().filter(|line| is_closed(line)) {
+        canvas.polygon(&[&seen(core)], CORE, None);
+    }
     let bones: Vec<Vec<Point2>> = panel.bones.iter().map(|bone| seen(bone)).collect();
     for bone in &bones {
         canvas.polygon(&[bone], BONE, Some(Stroke::new(MUTED, 1.0)));
@@ -140,7 +145,7 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
         let edge = Stroke::new(shade(color), 0.45);
         canvas.polygon(&[&seen(cell)], color, Some(edge));
     }
-    for border in &panel.section.borders {
+    for border in panel.section.borders.iter().chain(&panel.section.base) {
         canvas.polyline(&seen(border), Stroke::new(INK, 1.1));
     }
     match panel.tool {
@@ -153,21 +158,27 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
 }
 
 fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
-    let swatch = |y: f64| Frame {
-        x,
-        y: y - 7.0,
-        width: 14.0,
-        height: 14.0,
+    let swatch = |y: f64| {
+        [
+            [x, y - 7.0],
+            [x + 14.0, y - 7.0],
+            [x + 14.0, y + 7.0],
+            [x, y + 7.0],
+        ]
     };
     let name = Font::new(12.5, INK, Anchor::Start);
     let mut entry = |color: Color, text: &str| {
-        canvas.rect(swatch(y), color);
+        canvas.polygon(&[&swatch(y)], color, Some(Stroke::new(shade(color), 0.5)));
         canvas.text([x + 22.0, y], text, name);
         y += 22.0;
     };
     let layers = panels.first().map_or(&[][..], |p| &p.section.layer_names);
     for (layer, name) in layers.iter().enumerate() {
         entry(LAYERS[layer % LAYERS.len()], name);
+    }
+    let base = panels.iter().flat_map(|panel| &panel.section.base);
+    if base.into_iter().any(|line| is_closed(line)) {
+        entry(CORE, "rigid core");
     }
     if panels.iter().any(|panel| !panel.bones.is_empty()) {
         entry(BONE, "bone");
@@ -194,6 +205,10 @@ fn draw_scale_bar(canvas: &mut Canvas, [x, y]: Point2, width: f64, scale: f64) {
     }
     let font = Font::new(12.0, INK, Anchor::Start);
     canvas.text([x + length + 8.0, y], &format!("{length_mm} mm"), font);
+}
+
+fn is_closed(line: &[Point2]) -> bool {
+    line.len() > 2 && line.first() == line.last()
 }
 
 /// A darker version of a colour.
