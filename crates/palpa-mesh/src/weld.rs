@@ -28,17 +28,23 @@ pub fn weld_exact(surface: &Surface) -> Welded {
     })
 }
 
+/// Cells from the origin up to which points are sorted into cells; a whole number beyond has no neighbours as `f64`.
+const END_OF_GRID: f64 = 9007199254740992.0;
+
 /// Makes one vertex of those within `tolerance` (in the unit of the points) of each other, the first of which stays where it
 /// is; so no vertex moves by more than the tolerance, whatever chains there are.
 pub fn weld_within(surface: &Surface, tolerance: f64) -> Welded {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return weld_exact(surface);
     }
-    // Cells as wide as the tolerance: whatever is near lies in this cell or one of its 26 neighbours. A float-to-integer
-    // cast saturates, so points beyond the grid share its last cell and are still compared by distance.
+    // Cells as wide as the tolerance: whatever is near lies in this cell or one of its 26 neighbours.
     let cell_of = |p: &Vec3| p.map(|x| (x / tolerance).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(surface.points.len());
     weld(surface, |p, candidate, kept| {
+        // Out there the tolerance is finer than the points are, and all of them would crowd into the last cell.
+        if p.amax() / tolerance > END_OF_GRID {
+            return None;
+        }
         let cell = cell_of(p);
         let is_near = |&v: &u32| (kept[v as usize] - p).norm() <= tolerance;
         let near = (0..27)
@@ -130,5 +136,16 @@ mod tests {
         };
         assert_eq!(weld_exact(&surface).new_index, [0, 1, 2]);
         assert_eq!(weld_within(&surface, 1.0).new_index, [0, 1, 2]);
+    }
+
+    #[test]
+    fn far_points_do_not_crowd_into_one_cell() {
+        // Compared pair by pair these would take 10¹⁰ steps.
+        let points = (0..100_000).map(|i| Vec3::new(1e300 + 1e290 * f64::from(i), 0.0, 0.0));
+        let surface = Surface {
+            points: points.collect(),
+            triangles: vec![],
+        };
+        assert_eq!(weld_within(&surface, 1e-6).surface.points.len(), 100_000);
     }
 }

@@ -2,6 +2,7 @@
 
 use anyhow::bail;
 use nalgebra::Unit;
+use palpa_mesh::quality::prism_shapes;
 use palpa_mesh::{LayeredBody, Vec3};
 use palpa_springs::{
     Constraints, Corrections, EulerParams, InterfaceBars, LayerStiffness, Method, Outcome, Solver, SpringModel,
@@ -77,6 +78,9 @@ pub struct Sample {
     pub bar_force_n: f64,
     /// Force left on free nodes, relative.
     pub free_residual: f64,
+    /// Prisms that are turned over: bars have no volume and do not prevent it. From the first one on the force is that
+    /// of the bars alone, no longer of a body.
+    pub n_inverted: usize,
     /// `converged`, `euler_fallback` or `diverged`.
     pub outcome: &'static str,
 }
@@ -85,6 +89,7 @@ pub struct Sample {
 #[derive(Debug)]
 pub struct Run<'a> {
     indentation: &'a Indentation,
+    body: &'a LayeredBody,
     /// The body's state.
     pub state: SpringState,
     workspace: Workspace,
@@ -154,10 +159,11 @@ impl Indentation {
         self.path.iter().rposition(|w| w.phase == Phase::Load).unwrap_or(0)
     }
 
-    /// Begins a run at rest.
-    pub fn start(&self) -> Run<'_> {
+    /// Begins a run at rest. `body` is the one that this was built on.
+    pub fn start<'a>(&'a self, body: &'a LayeredBody) -> Run<'a> {
         Run {
             indentation: self,
+            body,
             state: SpringState::new(&self.model),
             workspace: Workspace::new(&self.model),
             next: 0,
@@ -180,19 +186,27 @@ impl Run<'_> {
         };
         self.next = if outcome == "diverged" { path.len() } else { self.next + 1 };
         self.depth = waypoint.depth;
+        let shapes = prism_shapes(self.body, &self.state.positions);
         Some(Sample {
             phase: waypoint.phase,
-            time_s: waypoint.time,
-            depth_mm: waypoint.depth * 1e3,
-            force_n: -report.force.dot(direction),
+            time_s: tidy(waypoint.time),
+            depth_mm: tidy(waypoint.depth * 1e3),
+            // Plus zero: no sample is "minus nothing".
+            force_n: -report.force.dot(direction) + 0.0,
             force_x_n: report.force.x,
             force_y_n: report.force.y,
             force_z_n: report.force.z,
             bar_force_n: -report.bar_force.dot(direction),
             free_residual: report.free_residual,
+            n_inverted: shapes.iter().filter(|s| !s.is_valid()).count(),
             outcome,
         })
     }
+}
+
+/// Without the digits that binary fractions leave behind.
+fn tidy(x: f64) -> f64 {
+    (x * 1e9).round() / 1e9
 }
 
 /// Down in equal steps, a rest of a few samples, and back.

@@ -333,7 +333,11 @@ fn check_boundary(
         (FindingKind::Hole, Severity::Unrepairable),
         &holes,
         spot,
-        counted(holes.len(), "hole: a boundary loop that is small, or not in one plane", "holes: boundary loops that are small, or not in one plane"),
+        counted(
+            holes.len(),
+            "hole: a boundary loop that is small, or not in one plane",
+            "holes: boundary loops that are small, or not in one plane",
+        ),
         "fill them (Blender: Mesh > Clean Up > Fill Holes; MeshLab: Close Holes); cut a limb along a plane",
     );
     findings.add(
@@ -425,7 +429,11 @@ fn check_t_junctions(surface: &Surface, boundary: &[Side], findings: &mut Findin
         (FindingKind::TJunction, Severity::Unrepairable),
         &junctions,
         |&v| Spot::vertex(surface, v),
-        counted(junctions.len(), "vertex lies on an edge that it does not end", "vertices lie on edges that they do not end"),
+        counted(
+            junctions.len(),
+            "vertex lies on an edge that it does not end",
+            "vertices lie on edges that they do not end",
+        ),
         "split those edges there (Blender: Merge by Distance after Subdivide; MeshLab: Snap Mismatched Borders), or remesh",
     );
 }

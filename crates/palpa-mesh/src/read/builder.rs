@@ -8,8 +8,13 @@ use crate::{Surface, Vec3};
 /// the caps of a cylinder some hundred.
 const MAX_CORNERS: usize = 4096;
 
+/// What cutting all polygons of a file may cost, in squares of corners: as much for each byte, and so much in any case. A file
+/// of many polygons of thousands of corners would otherwise take minutes for each of its megabytes.
+const CUTTING_PER_BYTE: usize = 64;
+const CUTTING_AT_LEAST: usize = 100_000_000;
+
 /// A surface in the making.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Builder {
     pub(super) points: Vec<Vec3>,
     pub(super) n_objects: usize,
@@ -21,9 +26,27 @@ pub(super) struct Builder {
     n_folded: usize,
     first_folded: Option<Place>,
     notes: Vec<ReadNote>,
+    cutting_left: usize,
 }
 
 impl Builder {
+    /// For a file of so many bytes.
+    pub(super) fn new(n_bytes: usize) -> Self {
+        Self {
+            points: vec![],
+            n_objects: 0,
+            triangles: vec![],
+            n_faces: 0,
+            n_polygons: 0,
+            n_short_faces: 0,
+            first_short_face: None,
+            n_folded: 0,
+            first_folded: None,
+            notes: vec![],
+            cutting_left: CUTTING_AT_LEAST.saturating_add(n_bytes.saturating_mul(CUTTING_PER_BYTE)),
+        }
+    }
+
     pub(super) fn note(&mut self, note: ReadNote) {
         self.notes.push(note);
     }
@@ -51,6 +74,11 @@ impl Builder {
             }
             _ => {
                 self.n_polygons += 1;
+                if corners.len() > 4 {
+                    let left = self.cutting_left.checked_sub(corners.len().pow(2));
+                    let problem = "its polygons have too many corners; cut them into triangles in a mesh program";
+                    self.cutting_left = left.ok_or_else(|| Fault::new(place, problem))?;
+                }
                 if !triangulate(&self.points, corners, &mut self.triangles) {
                     self.n_folded += 1;
                     self.first_folded.get_or_insert(place);

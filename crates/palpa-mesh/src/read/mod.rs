@@ -267,7 +267,7 @@ pub fn read_surface_bytes(bytes: &[u8], format: Format) -> Result<SurfaceFile, C
 }
 
 fn parse(bytes: &[u8], format: Format, folder: Option<&Path>) -> Result<SurfaceFile, ContentError> {
-    let mut builder = Builder::default();
+    let mut builder = Builder::new(bytes.len());
     let parsed = match format {
         Format::Obj => obj::parse(bytes, &mut builder),
         Format::Stl => stl::parse(bytes, &mut builder),

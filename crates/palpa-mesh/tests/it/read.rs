@@ -1,5 +1,6 @@
 //! Readers: what each format may say, and what lies and slips must come to.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -135,6 +136,26 @@ fn obj_refusals() {
     insta::assert_snapshot!(refuse("v 1 1,5 2\nf 1 2 4"), @r#"OBJ, line 4: "1,5" is not a number, and the face in line 5 uses this vertex"#);
     insta::assert_snapshot!(refuse(""), @"OBJ, the file: 3 vertices but no faces; reconstruct a surface from the points first");
     insta::assert_snapshot!(refuse(&format!("f{}", " 1 2 3".repeat(2000))), @"OBJ, line 4: a face with 6000 corners, more than the 4096 that are read; cut it into triangles in a mesh program");
+}
+
+#[test]
+fn polygons_of_very_many_corners_do_not_take_minutes() {
+    // A star whose spikes all cross is the worst for cutting: no corner is ever an ear.
+    let n = 4000;
+    let mut text = String::new();
+    for i in 0..n {
+        let (y, x) = (f64::from(i) * 2.5).sin_cos();
+        writeln!(text, "v {x} {y} 0").unwrap();
+    }
+    let face: String = (1..=n).map(|i| format!(" {i}")).collect();
+    for _ in 0..40 {
+        writeln!(text, "f{face}").unwrap();
+    }
+    let message = refuse(Format::Obj, text);
+    assert!(
+        message.contains("its polygons have too many corners"),
+        "{message}"
+    );
 }
 
 fn binary_stl(n_announced: u32, triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {

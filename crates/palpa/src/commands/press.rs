@@ -13,7 +13,7 @@ use super::Outcome;
 use crate::build::{BuiltBody, build, in_mm};
 use crate::cli::Context;
 use crate::output::OutDir;
-use crate::plot::{Axis, Chart};
+use crate::plot::{Axis, Chart, Guide};
 use crate::press::{Indentation, Phase, Run, Sample};
 use crate::section::{Panel, Plane, ToolOutline, cut_body, cut_surface, draw};
 use crate::table::Table;
@@ -85,6 +85,8 @@ struct PressResult {
     at_depth_mm: f64,
     secant_stiffness_n_per_mm: Option<f64>,
     force_after_retract_n: Option<f64>,
+    /// Depth from which on prisms are turned over, so that the force is that of the bars alone.
+    inverted_from_mm: Option<f64>,
     material_status: String,
 }
 
@@ -202,7 +204,7 @@ fn record(
 ) -> anyhow::Result<Recorded> {
     let mut table = out.table::<Sample>("press.csv")?;
     let mut series = Series::new(args.frames, indentation);
-    let mut run = indentation.start();
+    let mut run = indentation.start(&built.growth.body);
     let mut recorded =
         Recorded { samples: Vec::new(), deepest: run.state.positions.clone(), deepest_depth: 0.0 };
     let progress = context.progress(indentation.n_samples(), "pressing");
@@ -328,6 +330,7 @@ fn result_of(samples: &[Sample], materials: &[MaterialStatus]) -> PressResult {
             .last()
             .filter(|s| s.phase == Phase::Retract && s.depth_mm == 0.0)
             .map(|s| s.force_n),
+        inverted_from_mm: good.iter().find(|s| s.n_inverted > 0).map(|s| s.depth_mm),
         material_status: status_line(materials),
     }
 }
@@ -439,6 +442,12 @@ fn conclude(
         "{}. Bars have Poisson's ratio ¼ whatever the tissue's.",
         r.material_status
     ))?;
+    if let Some(depth) = r.inverted_from_mm {
+        context.say(format!(
+            "from {depth:.2} mm on prisms are TURNED OVER: bars have no volume, and a soft layer is pressed through \
+             itself. Take the force up to there only"
+        ))?;
+    }
     if r.outcome == "diverged" {
         context.say("the last step DIVERGED; results end before it. Use more substeps or a smaller step")?;
     }
@@ -474,9 +483,14 @@ fn draw_pictures(
         .title("Force against depth")
         .subtitle(&subtitle)
         .line("loading", of_phase(&[Phase::Load, Phase::Hold]));
-    let retracting = of_phase(&[Phase::Retract]);
+    let mut retracting = of_phase(&[Phase::Retract]);
     if !retracting.is_empty() {
+        // The way back begins where the rest ended.
+        retracting.splice(0..0, of_phase(&[Phase::Load, Phase::Hold]).last().copied());
         depth_chart = depth_chart.series(crate::plot::Series::new("retracting", retracting).dashed());
+    }
+    if let Some(depth) = result.inverted_from_mm {
+        depth_chart = depth_chart.guide(Guide::x(depth, "prisms turned over"));
     }
     let time: Vec<[f64; 2]> = samples.iter().map(|s| [s.time_s, s.force_n]).collect();
     let time_chart = Chart::new(Axis::linear("time, s").with_zero(), Axis::linear("force, N").with_zero())
