@@ -13,6 +13,7 @@ pub mod commands;
 pub mod output;
 pub mod plot;
 pub mod press;
+pub mod reproduce;
 pub mod section;
 pub mod table;
 pub mod vtu;

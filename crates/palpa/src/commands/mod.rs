@@ -8,6 +8,7 @@ use clap::Subcommand;
 
 pub mod check;
 pub mod press;
+pub mod reproduce;
 pub mod schema;
 
 use crate::cli::Context;
@@ -29,6 +30,7 @@ pub enum Outcome {
 pub enum Command {
     Check(check::Args),
     Press(press::Args),
+    Reproduce(reproduce::Args),
     Schema(schema::Args),
 }
 
@@ -38,6 +40,7 @@ impl Command {
         match self {
             Self::Check(_) => "check",
             Self::Press(_) => "press",
+            Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
         }
     }
@@ -50,6 +53,7 @@ impl Command {
         match self {
             Self::Check(args) => check::run(args, context),
             Self::Press(args) => press::run(args, context),
+            Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),
         }
     }

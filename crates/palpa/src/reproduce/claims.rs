@@ -38,7 +38,13 @@ pub fn convergence() -> Result<Vec<Convergence>, SpringError> {
         };
         let (mut state, mut ws) = (SpringState::new(&model), Workspace::new(&model));
         for _ in 0..4 {
-            step(&model, &mut state, &mut ws, Vec3::new(0.0, 0.0, -0.01), &params);
+            step(
+                &model,
+                &mut state,
+                &mut ws,
+                Vec3::new(0.0, 0.0, -0.01),
+                &params,
+            );
         }
         state.force.z
     };
@@ -119,7 +125,13 @@ fn is_borne(model: &SpringModel, distance: f64, params: &StepParams) -> bool {
     let (mut state, mut ws) = (SpringState::new(model), Workspace::new(model));
     (0..540).all(|i| {
         let part = if i < 40 { distance / 40.0 } else { 0.0 };
-        let report = step(model, &mut state, &mut ws, Vec3::new(0.0, 0.0, part), params);
+        let report = step(
+            model,
+            &mut state,
+            &mut ws,
+            Vec3::new(0.0, 0.0, part),
+            params,
+        );
         report.outcome == Outcome::Converged
     })
 }

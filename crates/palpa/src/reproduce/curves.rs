@@ -43,8 +43,11 @@ pub fn readings() -> Vec<Reading> {
     let mut all = Vec::new();
     for n in [3, 4] {
         for lateral_spacing in [0.010, 0.020, 0.040, 0.080] {
-            for interface_bars in [InterfaceBars::Above, InterfaceBars::Below, InterfaceBars::Mean]
-            {
+            for interface_bars in [
+                InterfaceBars::Above,
+                InterfaceBars::Below,
+                InterfaceBars::Mean,
+            ] {
                 for is_corrected in [true, false] {
                     all.push(Reading {
                         n,
@@ -88,7 +91,10 @@ pub fn curve(body: Body, reading: &Reading) -> Result<Curve, SpringError> {
     for mm in 1..=DEPTH_MM {
         let down = Vec3::new(0.0, 0.0, -1.0e-3);
         let report = step(&model, &mut state, &mut ws, down, &params);
-        if matches!(report.outcome, Outcome::Diverged { .. } | Outcome::NotFinite) {
+        if matches!(
+            report.outcome,
+            Outcome::Diverged { .. } | Outcome::NotFinite
+        ) {
             break;
         }
         curve.push([mm as f64, report.force.z]);

@@ -54,7 +54,10 @@ pub fn knee(points: &[[f64; 2]]) -> Option<Knee> {
     let residual = |[x, y]: &[f64; 2]| (y - single.intercept - single.slope * x).powi(2);
     let before: f64 = points.iter().map(residual).sum();
     let low = points.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
-    let high = points.iter().map(|p| p[0]).fold(f64::NEG_INFINITY, f64::max);
+    let high = points
+        .iter()
+        .map(|p| p[0])
+        .fold(f64::NEG_INFINITY, f64::max);
     let mut best: Option<(f64, Knee)> = None;
     for trial in N_TRIALS / 10..=N_TRIALS * 9 / 10 {
         let at = low + (high - low) * trial as f64 / N_TRIALS as f64;
@@ -66,7 +69,11 @@ pub fn knee(points: &[[f64; 2]]) -> Option<Knee> {
                 at,
                 slope_before: b,
                 slope_change: (b + c) / b,
-                gain: if before > 0.0 { 1.0 - left / before } else { 0.0 },
+                gain: if before > 0.0 {
+                    1.0 - left / before
+                } else {
+                    0.0
+                },
             };
             best = Some((left, found));
         }
@@ -98,7 +105,9 @@ mod tests {
 
     #[test]
     fn a_line_is_found_exactly() {
-        let points: Vec<_> = (0..20).map(|i| [f64::from(i), 3.0 - 0.5 * f64::from(i)]).collect();
+        let points: Vec<_> = (0..20)
+            .map(|i| [f64::from(i), 3.0 - 0.5 * f64::from(i)])
+            .collect();
         let found = line(&points).unwrap();
         assert!((found.slope + 0.5).abs() < 1e-12 && (found.intercept - 3.0).abs() < 1e-12);
         assert!((found.r2 - 1.0).abs() < 1e-12);
@@ -132,7 +141,9 @@ mod tests {
 
     #[test]
     fn a_straight_line_has_no_knee_to_speak_of() {
-        let points: Vec<_> = (0..50).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
+        let points: Vec<_> = (0..50)
+            .map(|i| [f64::from(i), 2.0 * f64::from(i)])
+            .collect();
         let found = knee(&points).unwrap();
         assert!((found.slope_change - 1.0).abs() < 1e-9);
     }

@@ -6,6 +6,8 @@
 pub mod claims;
 pub mod curves;
 pub mod fit;
+pub mod picture;
+pub mod report;
 pub mod speed;
 
 use palpa_mesh::generate::patch::{centre_vertex, patch};

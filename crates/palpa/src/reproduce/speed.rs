@@ -4,9 +4,7 @@ use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
 use palpa_mesh::Vec3;
-use palpa_springs::{
-    InterfaceBars, Solver, SpringError, SpringState, StepParams, Workspace, step,
-};
+use palpa_springs::{InterfaceBars, Solver, SpringError, SpringState, StepParams, Workspace, step};
 use serde::Serialize;
 
 use super::{SOFT, Shape};
@@ -99,9 +97,19 @@ fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f64, S
     let params = StepParams::default();
     let mut n_done = 0_usize;
     let mut one = || {
-        let way = if n_done / 20 % 2 == 0 { -1.0e-3 } else { 1.0e-3 };
+        let way = if n_done / 20 % 2 == 0 {
+            -1.0e-3
+        } else {
+            1.0e-3
+        };
         n_done += 1;
-        step(&model, &mut state, &mut ws, Vec3::new(0.0, 0.0, way), &params)
+        step(
+            &model,
+            &mut state,
+            &mut ws,
+            Vec3::new(0.0, 0.0, way),
+            &params,
+        )
     };
     // The first step allocates and touches its memory.
     one();

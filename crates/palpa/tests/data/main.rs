@@ -6,6 +6,7 @@
 
 mod awkward;
 mod manifest;
+mod real;
 
 use std::path::PathBuf;
 
