@@ -56,7 +56,10 @@ impl SurfaceIndex {
             })
             .filter(|t| t.corners.iter().all(|p| p.iter().all(|x| x.is_finite())))
             .collect();
-        Self { tree: RTree::bulk_load(triangles), vertex_normals: surface.vertex_normals() }
+        Self {
+            tree: RTree::bulk_load(triangles),
+            vertex_normals: surface.vertex_normals(),
+        }
     }
 
     /// The point of the surface closest to `p`, or `None` for a surface without triangles.
@@ -66,7 +69,10 @@ impl SurfaceIndex {
         // At an edge or a vertex the face normal of one triangle may lie about the side; the vertex normals, mixed
         // by the barycentric weights, do not.
         let [a, b, c] = triangle.corners;
-        let face = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+        let face = (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_else(Vec3::zeros);
         let is_inside_face = weights.iter().all(|&w| w > 1e-9);
         let normal = if is_inside_face {
             face
@@ -79,13 +85,24 @@ impl SurfaceIndex {
         };
         let offset = p - point;
         let distance = offset.norm();
-        let signed_distance = if offset.dot(&normal) < 0.0 { -distance } else { distance };
-        Some(Closest { point, triangle: triangle.id, signed_distance })
+        let signed_distance = if offset.dot(&normal) < 0.0 {
+            -distance
+        } else {
+            distance
+        };
+        Some(Closest {
+            point,
+            triangle: triangle.id,
+            signed_distance,
+        })
     }
 
     /// The nearest meeting of the ray `origin + s direction` with the surface at `s > s_min`: `(s, triangle)`.
     pub fn ray(&self, origin: Vec3, direction: Vec3, s_min: f64) -> Option<(f64, u32)> {
-        let along = RaySelection { origin, inverse: direction.map(|x| 1.0 / x) };
+        let along = RaySelection {
+            origin,
+            inverse: direction.map(|x| 1.0 / x),
+        };
         self.tree
             .locate_with_selection_function(along)
             .filter_map(|t| Some((ray_triangle(origin, direction, t.corners)?, t.id)))
@@ -176,5 +193,7 @@ fn ray_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f
     let u = s.dot(&h) / det;
     let q = s.cross(&e1);
     let v = direction.dot(&q) / det;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| e2.dot(&q) / det)
+    // A little beyond the edges: a ray through a shared edge or vertex must not slip between the triangles.
+    const EDGE: f64 = 1e-6;
+    (u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE).then(|| e2.dot(&q) / det)
 }

@@ -5,11 +5,11 @@
 
 pub mod body;
 pub mod check;
-pub mod generate;
 pub mod distance;
+pub mod generate;
 pub mod growth;
-pub mod quality;
 pub mod orient;
+pub mod quality;
 pub mod read;
 pub mod repair;
 pub mod surface;

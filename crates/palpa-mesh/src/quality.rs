@@ -10,7 +10,11 @@
 use crate::{LayeredBody, Vec3};
 
 /// Points inside the triangle and in depth at which elements are integrated: 3 × 2.
-const TRIANGLE_POINTS: [[f64; 2]; 3] = [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
+const TRIANGLE_POINTS: [[f64; 2]; 3] = [
+    [1.0 / 6.0, 1.0 / 6.0],
+    [2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0],
+];
 const DEPTH_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// What the checks say of one prism.
@@ -36,7 +40,11 @@ impl PrismShape {
             let det = -e1.cross(&e2).dot(&e3);
             let lengths = e1.norm() * e2.norm() * e3.norm();
             min_jacobian = min_jacobian.min(det);
-            scaled = scaled.min(if lengths > 0.0 { det / lengths * 2.0 / 3.0_f64.sqrt() } else { 0.0 });
+            scaled = scaled.min(if lengths > 0.0 {
+                det / lengths * 2.0 / 3.0_f64.sqrt()
+            } else {
+                0.0
+            });
         }
         for [xi, eta] in TRIANGLE_POINTS {
             for zeta in DEPTH_POINTS {
@@ -44,7 +52,10 @@ impl PrismShape {
             }
         }
         // A right prism over a flat triangle can exceed 1 by rounding or by an obtuse corner elsewhere.
-        Self { min_jacobian, scaled_jacobian: scaled.clamp(-1.0, 1.0) }
+        Self {
+            min_jacobian,
+            scaled_jacobian: scaled.clamp(-1.0, 1.0),
+        }
     }
 
     /// Whether every determinant is positive.
@@ -78,7 +89,11 @@ pub fn prism_shapes(body: &LayeredBody, positions: &[Vec3]) -> Vec<PrismShape> {
 pub fn prism_volume(x: &[Vec3; 6]) -> f64 {
     let sum: f64 = TRIANGLE_POINTS
         .iter()
-        .flat_map(|&[xi, eta]| DEPTH_POINTS.iter().map(move |&zeta| jacobian(x, xi, eta, zeta)))
+        .flat_map(|&[xi, eta]| {
+            DEPTH_POINTS
+                .iter()
+                .map(move |&zeta| jacobian(x, xi, eta, zeta))
+        })
         .sum();
     sum / 12.0
 }

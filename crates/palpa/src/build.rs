@@ -6,7 +6,8 @@ use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
 use palpa_mesh::growth::{ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
-    Growth, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow, read_surface, repair,
+    Growth, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow,
+    read_surface, repair,
 };
 use palpa_tissue::{Generator, LengthUnit, Scene, Skin, Target, Thickness, read_thickness};
 
@@ -48,12 +49,19 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         Some(cutout) => Some((place_on(&skin, &cutout.at)?.1, cutout.radius)),
         None => None,
     };
-    let params = GrowthParams { layers: layer_specs(scene)?, cut_out };
+    let params = GrowthParams {
+        layers: layer_specs(scene)?,
+        cut_out,
+    };
     let growth = grow(&skin, &bones, &params)?;
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);
     }
-    Ok(BuiltBody { growth, bones, notes })
+    Ok(BuiltBody {
+        growth,
+        bones,
+        notes,
+    })
 }
 
 /// The skin vertex that a target names, and its position. A vertex number counts in `skin`.
@@ -65,7 +73,10 @@ pub fn place_on(skin: &Surface, target: &Target) -> anyhow::Result<(usize, Vec3)
         Target::Vertex(v) => {
             let n = skin.points.len();
             let Some(p) = skin.points.get(*v as usize) else {
-                bail!("skin vertex {v} is not there: the skin has {n} vertices, numbered from 0 to {}", n - 1);
+                bail!(
+                    "skin vertex {v} is not there: the skin has {n} vertices, numbered from 0 to {}",
+                    n - 1
+                );
             };
             return Ok((*v as usize, *p));
         }
@@ -73,7 +84,11 @@ pub fn place_on(skin: &Surface, target: &Target) -> anyhow::Result<(usize, Vec3)
         Target::Middle => area_centroid(skin),
     };
     let nearest = (0..skin.points.len())
-        .min_by(|&a, &b| (skin.points[a] - point).norm().total_cmp(&(skin.points[b] - point).norm()))
+        .min_by(|&a, &b| {
+            (skin.points[a] - point)
+                .norm()
+                .total_cmp(&(skin.points[b] - point).norm())
+        })
         .context("the skin has no vertices")?;
     let distance = (skin.points[nearest] - point).norm();
     let (lo, hi) = skin.bounds().unwrap_or_default();
@@ -107,20 +122,37 @@ fn area_centroid(surface: &Surface) -> Vec3 {
 }
 
 /// Reads a surface and repairs what is safe to repair; refuses what is not fit.
-fn usable_surface(path: &Path, unit: LengthUnit, notes: &mut Vec<String>) -> anyhow::Result<Surface> {
+fn usable_surface(
+    path: &Path,
+    unit: LengthUnit,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<Surface> {
     let file = read_surface(path)?;
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let name = path
+        .file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let mut surface = file.surface;
     if unit != LengthUnit::M {
         surface.points.iter_mut().for_each(|p| *p *= unit.metres());
     }
     notes.extend(file.notes.iter().map(|note| format!("{name}: {note}")));
-    if let Some(v) = surface.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
-        bail!("{}: vertex {v} has a coordinate that is not finite; see `palpa check`", path.display());
+    if let Some(v) = surface
+        .points
+        .iter()
+        .position(|p| !p.iter().all(|x| x.is_finite()))
+    {
+        bail!(
+            "{}: vertex {v} has a coordinate that is not finite; see `palpa check`",
+            path.display()
+        );
     }
     let (mended, report) = repair(&surface, &RepairOptions::default());
     if report.is_changed() {
-        notes.push(format!("{name}: repaired on the way in: {}", repairs(&report)));
+        notes.push(format!(
+            "{name}: repaired on the way in: {}",
+            repairs(&report)
+        ));
     }
     Ok(mended)
 }
@@ -133,17 +165,26 @@ fn repairs(report: &RepairReport) -> String {
         (report.n_unused, "unused vertices dropped"),
         (report.orientation.n_flipped, "triangles turned outward"),
     ];
-    let done: Vec<String> =
-        counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    let done: Vec<String> = counts
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
+        .collect();
     done.join(", ")
 }
 
 fn generated(generator: Generator) -> (Surface, Vec<Surface>) {
     match generator {
-        Generator::Block { size: [x, y, _], spacing } => {
-            (generate::block_skin([x, y], spacing), Vec::new())
-        }
-        Generator::Cylinder { length, radius, bone_radius, spacing } => {
+        Generator::Block {
+            size: [x, y, _],
+            spacing,
+        } => (generate::block_skin([x, y], spacing), Vec::new()),
+        Generator::Cylinder {
+            length,
+            radius,
+            bone_radius,
+            spacing,
+        } => {
             let (skin, bone) = generate::cylinder(length, radius, bone_radius, spacing);
             (skin, vec![bone])
         }
@@ -184,9 +225,10 @@ fn layer_specs(scene: &Scene) -> anyhow::Result<Vec<LayerSpec>> {
 fn thickness_field(thickness: &Thickness, unit: LengthUnit) -> anyhow::Result<ThicknessField> {
     Ok(match thickness {
         Thickness::Uniform(d) => ThicknessField::Constant(*d),
-        Thickness::Along { axis, table } => {
-            ThicknessField::AlongAxis { axis: Vec3::from(*axis), table: table.clone() }
-        }
+        Thickness::Along { axis, table } => ThicknessField::AlongAxis {
+            axis: Vec3::from(*axis),
+            table: table.clone(),
+        },
         Thickness::File(path) => {
             let samples: Vec<(Vec3, f64)> = read_thickness(path, unit)?
                 .iter()
@@ -206,7 +248,12 @@ fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<Stri
         palpa_tissue::Tool::Disc { radius } => radius,
         palpa_tissue::Tool::Node => 0.0,
     };
-    let depth: f64 = growth.report.layers.iter().map(|l| l.thickness.median).sum();
+    let depth: f64 = growth
+        .report
+        .layers
+        .iter()
+        .map(|l| l.thickness.median)
+        .sum();
     let wanted = tool + ENOUGH * depth;
     if radius < wanted {
         notes.push(format!(

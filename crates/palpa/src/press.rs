@@ -5,8 +5,8 @@ use nalgebra::Unit;
 use palpa_mesh::quality::prism_shapes;
 use palpa_mesh::{LayeredBody, Vec3};
 use palpa_springs::{
-    Constraints, Corrections, EulerParams, InterfaceBars, LayerStiffness, Method, Outcome, Solver, SpringModel,
-    SpringParams, SpringState, StepParams, Workspace, step,
+    Constraints, Corrections, EulerParams, InterfaceBars, LayerStiffness, Method, Outcome, Solver,
+    SpringModel, SpringParams, SpringState, StepParams, Workspace, step,
 };
 use palpa_tissue::{CutFaces, InPlane, Law, Scene, Tool};
 use serde::Serialize;
@@ -111,7 +111,10 @@ impl Indentation {
             None => Unit::try_new(-body.skin.vertex_normals()[vertex], f64::MIN_POSITIVE),
         };
         let Some(direction) = direction else {
-            bail!("the skin has no normal at vertex {vertex} ({}) mm; give a press direction", in_mm(at));
+            bail!(
+                "the skin has no normal at vertex {vertex} ({}) mm; give a press direction",
+                in_mm(at)
+            );
         };
         let tissue_depth = column_length(body, vertex);
         if scene.press.depth >= tissue_depth {
@@ -141,12 +144,30 @@ impl Indentation {
                 mesh_size * 1e3,
             ));
         }
-        if body.cut_faces.iter().any(|f| f.vertices.contains(&(vertex as u32))) {
+        if body
+            .cut_faces
+            .iter()
+            .any(|f| f.vertices.contains(&(vertex as u32)))
+        {
             notes.push("the press point lies on a cut face of the body; the force there is that of a free edge".into());
         }
-        let model = SpringModel::build(body, &spring_params(scene), &constraints(scene, body, operated, &mut notes))?;
+        let model = SpringModel::build(
+            body,
+            &spring_params(scene),
+            &constraints(scene, body, operated, &mut notes),
+        )?;
         let params = step_params(scene, &model);
-        Ok(Self { model, vertex, at, direction, tissue_depth, mesh_size, notes, params, path: path(scene) })
+        Ok(Self {
+            model,
+            vertex,
+            at,
+            direction,
+            tissue_depth,
+            mesh_size,
+            notes,
+            params,
+            path: path(scene),
+        })
     }
 
     /// Number of samples of a whole run.
@@ -156,7 +177,10 @@ impl Indentation {
 
     /// The index of the deepest sample, where loading ends.
     pub fn deepest(&self) -> usize {
-        self.path.iter().rposition(|w| w.phase == Phase::Load).unwrap_or(0)
+        self.path
+            .iter()
+            .rposition(|w| w.phase == Phase::Load)
+            .unwrap_or(0)
     }
 
     /// Begins a run at rest. `body` is the one that this was built on.
@@ -175,16 +199,32 @@ impl Indentation {
 impl Run<'_> {
     /// Goes on to the next sample; `None` at the end. A sample that diverged is the last.
     pub fn advance(&mut self) -> Option<Sample> {
-        let Indentation { model, direction, params, path, .. } = self.indentation;
+        let Indentation {
+            model,
+            direction,
+            params,
+            path,
+            ..
+        } = self.indentation;
         let waypoint = *path.get(self.next)?;
         let displacement = direction.into_inner() * (waypoint.depth - self.depth);
-        let report = step(model, &mut self.state, &mut self.workspace, displacement, params);
+        let report = step(
+            model,
+            &mut self.state,
+            &mut self.workspace,
+            displacement,
+            params,
+        );
         let outcome = match report.outcome {
             Outcome::Converged => "converged",
             Outcome::EulerFallback { .. } => "euler_fallback",
             Outcome::Diverged { .. } | Outcome::NotFinite => "diverged",
         };
-        self.next = if outcome == "diverged" { path.len() } else { self.next + 1 };
+        self.next = if outcome == "diverged" {
+            path.len()
+        } else {
+            self.next + 1
+        };
         self.depth = waypoint.depth;
         let shapes = prism_shapes(self.body, &self.state.positions);
         Some(Sample {
@@ -217,7 +257,11 @@ fn path(scene: &Scene) -> Vec<Waypoint> {
     let depth_at = |i: usize| press.depth * i as f64 / n as f64;
     let down = press.depth / press.speed;
     let mut path: Vec<Waypoint> = (0..=n)
-        .map(|i| Waypoint { phase: Phase::Load, time: depth_at(i) / press.speed, depth: depth_at(i) })
+        .map(|i| Waypoint {
+            phase: Phase::Load,
+            time: depth_at(i) / press.speed,
+            depth: depth_at(i),
+        })
         .collect();
     if press.hold > 0.0 {
         path.extend((1..=HOLD_SAMPLES).map(|i| Waypoint {
@@ -241,8 +285,12 @@ fn spring_params(scene: &Scene) -> SpringParams {
         .layers
         .iter()
         .map(|layer| match &layer.tissue.law {
-            Law::Elastic { young, .. } => LayerStiffness::Young { modulus: young.value },
-            Law::Spring { constant } => LayerStiffness::Spring { stiffness: constant.value },
+            Law::Elastic { young, .. } => LayerStiffness::Young {
+                modulus: young.value,
+            },
+            Law::Spring { constant } => LayerStiffness::Spring {
+                stiffness: constant.value,
+            },
         })
         .collect();
     SpringParams {
@@ -267,16 +315,26 @@ fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
     StepParams {
         substeps: reference.substeps as usize,
         method: match reference.solver {
-            palpa_tissue::Solver::Euler => Method::Euler(EulerParams::of_stable(model, EULER_FRACTION)),
+            palpa_tissue::Solver::Euler => {
+                Method::Euler(EulerParams::of_stable(model, EULER_FRACTION))
+            }
             _ => Method::FiniteElements,
         },
-        corrections: Corrections { spring_gain: reference.spring_gain, shape_gain: reference.shape_gain },
+        corrections: Corrections {
+            spring_gain: reference.spring_gain,
+            shape_gain: reference.shape_gain,
+        },
         ..StepParams::default()
     }
 }
 
 /// The base is fixed, the tool holds `operated`, cut faces as the scene says.
-fn constraints(scene: &Scene, body: &LayeredBody, operated: Vec<usize>, notes: &mut Vec<String>) -> Constraints {
+fn constraints(
+    scene: &Scene,
+    body: &LayeredBody,
+    operated: Vec<usize>,
+    notes: &mut Vec<String>,
+) -> Constraints {
     let mut constraints = Constraints::hold(body, operated);
     let nodes = |v: u32| (0..body.n_levels).map(move |l| body.node(v as usize, l));
     for face in &body.cut_faces {
@@ -284,7 +342,9 @@ fn constraints(scene: &Scene, body: &LayeredBody, operated: Vec<usize>, notes: &
         match scene.body.cut_faces {
             CutFaces::Free => {}
             CutFaces::Symmetric if face.is_flat => {
-                constraints.symmetric.extend(rim.flat_map(nodes).map(|node| (node, face.normal)));
+                constraints
+                    .symmetric
+                    .extend(rim.flat_map(nodes).map(|node| (node, face.normal)));
             }
             CutFaces::Symmetric => {
                 notes.push(format!(
@@ -306,7 +366,13 @@ fn constraints(scene: &Scene, body: &LayeredBody, operated: Vec<usize>, notes: &
 }
 
 /// Skin nodes of the side pressed on within `radius` of the tool's axis, and connected with the vertex in the middle.
-fn nodes_under_disc(body: &LayeredBody, vertex: usize, at: Vec3, direction: &Vec3, radius: f64) -> Vec<usize> {
+fn nodes_under_disc(
+    body: &LayeredBody,
+    vertex: usize,
+    at: Vec3,
+    direction: &Vec3,
+    radius: f64,
+) -> Vec<usize> {
     let normals = body.skin.vertex_normals();
     let is_under = |v: usize| {
         let r = body.skin.points[v] - at;
@@ -329,7 +395,10 @@ fn nodes_under_disc(body: &LayeredBody, vertex: usize, at: Vec3, direction: &Vec
             break;
         }
     }
-    (0..is_in.len()).filter(|&v| is_in[v]).map(|v| body.node(v, 0)).collect()
+    (0..is_in.len())
+        .filter(|&v| is_in[v])
+        .map(|v| body.node(v, 0))
+        .collect()
 }
 
 fn column_length(body: &LayeredBody, v: usize) -> f64 {

@@ -18,8 +18,14 @@ const LENGTH: f64 = 0.22;
 
 /// Girth along the arm, `[x, girth]` in m. The largest is 270 mm (general anthropometry, NASA-STD-3000 and ANSUR, quoted
 /// from memory: adults 270, s.d. 20); the wrist's 165 mm and the course between are assumed.
-const GIRTH: [[f64; 2]; 6] =
-    [[0.0, 0.262], [0.035, 0.270], [0.08, 0.257], [0.13, 0.222], [0.18, 0.184], [0.22, 0.165]];
+const GIRTH: [[f64; 2]; 6] = [
+    [0.0, 0.262],
+    [0.035, 0.270],
+    [0.08, 0.257],
+    [0.13, 0.222],
+    [0.18, 0.184],
+    [0.22, 0.165],
+];
 
 /// Width over height of the section, `[x, ratio]`. Assumed: nearly round at the elbow, flat at the wrist.
 const FLATNESS: [[f64; 2]; 3] = [[0.0, 1.05], [0.12, 1.12], [0.22, 1.38]];
@@ -54,10 +60,15 @@ const RADIUS: Bone = [
 /// # Panics
 /// Unless `spacing` and `scale` are positive.
 pub fn forearm(spacing: f64, scale: f64) -> (Surface, [Surface; 2]) {
-    assert!(spacing > 0.0 && scale > 0.0, "spacing {spacing} m, scale {scale}");
+    assert!(
+        spacing > 0.0 && scale > 0.0,
+        "spacing {spacing} m, scale {scale}"
+    );
     let largest = GIRTH.iter().map(|row| row[1]).fold(0.0, f64::max);
     let (n_rings, n_around) = resolution(LENGTH * scale, largest * scale, spacing);
-    let skin = tube(n_rings, n_around, Ends::Open, |along, angle| skin_point(along * LENGTH, angle) * scale);
+    let skin = tube(n_rings, n_around, Ends::Open, |along, angle| {
+        skin_point(along * LENGTH, angle) * scale
+    });
     (skin, [&ULNA, &RADIUS].map(|b| bone(b, scale)))
 }
 
@@ -67,7 +78,8 @@ fn skin_point(x: f64, angle: f64) -> Vec3 {
     let (width, height) = (flatness, 1.0 / flatness);
     // The perimeter of the ellipse of these half-axes, by Ramanujan's second formula (relative error below 1e-9 here).
     let h = ((width - height) / (width + height)).powi(2);
-    let perimeter = 0.5 * TAU * (width + height) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
+    let perimeter =
+        0.5 * TAU * (width + height) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
     let size = spline(&GIRTH, x, 1) / perimeter;
     Vec3::new(x, size * width * angle.cos(), size * height * angle.sin())
 }
@@ -79,7 +91,11 @@ fn bone(rows: &Bone, scale: f64) -> Surface {
     tube(n_rings, n_around, Ends::Closed, |along, angle| {
         let x = first + along * (last - first);
         let [y, z, half_width, half_height] = [1, 2, 3, 4].map(|column| spline(rows, x, column));
-        Vec3::new(x, y + half_width * angle.cos(), z + half_height * angle.sin()) * scale
+        Vec3::new(
+            x,
+            y + half_width * angle.cos(),
+            z + half_height * angle.sin(),
+        ) * scale
     })
 }
 
@@ -88,7 +104,10 @@ fn bone(rows: &Bone, scale: f64) -> Surface {
 fn spline<const N: usize>(rows: &[[f64; N]], x: f64, column: usize) -> f64 {
     let last = rows.len() - 1;
     let i = rows.partition_point(|row| row[0] <= x).clamp(1, last) - 1;
-    let ([x0, a], [x1, b]) = ([rows[i][0], rows[i][column]], [rows[i + 1][0], rows[i + 1][column]]);
+    let ([x0, a], [x1, b]) = (
+        [rows[i][0], rows[i][column]],
+        [rows[i + 1][0], rows[i + 1][column]],
+    );
     let h = x1 - x0;
     let t = ((x - x0) / h).clamp(0.0, 1.0);
     let slope = |k: usize| {
@@ -111,7 +130,10 @@ mod tests {
             let n = 20_000;
             let p = |i: usize| skin_point(x, i as f64 / n as f64 * TAU);
             let measured: f64 = (0..n).map(|i| (p(i + 1) - p(i)).norm()).sum();
-            assert!((measured / girth - 1.0).abs() < 1e-6, "{measured} at {x}, not {girth}");
+            assert!(
+                (measured / girth - 1.0).abs() < 1e-6,
+                "{measured} at {x}, not {girth}"
+            );
         }
     }
 
@@ -131,11 +153,22 @@ mod tests {
     fn surfaces_are_oriented_outward() {
         let (skin, bones) = forearm(0.006, 1.0);
         let volume = |s: &Surface| -> f64 {
-            (0..s.triangles.len()).map(|t| s.area_vector(t).dot(&s.corners(t)[0]) / 3.0).sum()
+            (0..s.triangles.len())
+                .map(|t| s.area_vector(t).dot(&s.corners(t)[0]) / 3.0)
+                .sum()
         };
-        assert!(bones.iter().all(|b| volume(b) > 2e-5 && b.boundary_loops().is_empty()));
+        assert!(
+            bones
+                .iter()
+                .all(|b| volume(b) > 2e-5 && b.boundary_loops().is_empty())
+        );
         assert_eq!(skin.boundary_loops().len(), 2);
         let normals = skin.vertex_normals();
-        assert!(skin.points.iter().zip(&normals).all(|(p, n)| n.y * p.y + n.z * p.z > 0.0));
+        assert!(
+            skin.points
+                .iter()
+                .zip(&normals)
+                .all(|(p, n)| n.y * p.y + n.z * p.z > 0.0)
+        );
     }
 }

@@ -10,10 +10,18 @@ use crate::{Surface, Vec3};
 /// # Panics
 /// Unless `0 < bone_radius < radius`, and `length` and `spacing` are positive.
 pub fn cylinder(length: f64, radius: f64, bone_radius: f64, spacing: f64) -> (Surface, Surface) {
-    assert!(0.0 < bone_radius && bone_radius < radius, "a bone of {bone_radius} m in a limb of {radius} m");
-    assert!(length > 0.0 && spacing > 0.0, "length {length} m, spacing {spacing} m");
+    assert!(
+        0.0 < bone_radius && bone_radius < radius,
+        "a bone of {bone_radius} m in a limb of {radius} m"
+    );
+    assert!(
+        length > 0.0 && spacing > 0.0,
+        "length {length} m, spacing {spacing} m"
+    );
     let circle = |radius: f64| {
-        move |along: f64, angle: f64| Vec3::new(along * length, radius * angle.cos(), radius * angle.sin())
+        move |along: f64, angle: f64| {
+            Vec3::new(along * length, radius * angle.cos(), radius * angle.sin())
+        }
     };
     let (n_rings, n_around) = resolution(length, TAU * radius, spacing);
     let skin = tube(n_rings, n_around, Ends::Open, circle(radius));
@@ -28,19 +36,28 @@ pub fn cylinder(length: f64, radius: f64, bone_radius: f64, spacing: f64) -> (Su
 /// # Panics
 /// Unless the sizes and `spacing` are positive.
 pub fn block_skin(size: [f64; 2], spacing: f64) -> Surface {
-    assert!(size.iter().all(|&s| s > 0.0) && spacing > 0.0, "size {size:?} m, spacing {spacing} m");
+    assert!(
+        size.iter().all(|&s| s > 0.0) && spacing > 0.0,
+        "size {size:?} m, spacing {spacing} m"
+    );
     let [nx, ny] = size.map(|s| (s / spacing).round().max(2.0) as usize);
     let mut skin = Surface::default();
     for j in 0..=ny {
         for i in 0..=nx {
             let at = [i as f64 / nx as f64 - 0.5, j as f64 / ny as f64 - 0.5];
-            skin.points.push(Vec3::new(at[0] * size[0], at[1] * size[1], 0.0));
+            skin.points
+                .push(Vec3::new(at[0] * size[0], at[1] * size[1], 0.0));
         }
     }
     let vertex = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     for j in 0..ny {
         for i in 0..nx {
-            let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+            let (a, b, c, d) = (
+                vertex(i, j),
+                vertex(i + 1, j),
+                vertex(i + 1, j + 1),
+                vertex(i, j + 1),
+            );
             // Diagonals alternate, so that the block has no grain.
             if (i + j) % 2 == 0 {
                 skin.triangles.extend([[a, b, c], [a, c, d]]);

@@ -20,14 +20,24 @@ pub enum Ends {
 ///
 /// # Panics
 /// With less than 2 rings or 3 vertices around.
-pub fn tube(n_rings: usize, n_around: usize, ends: Ends, section: impl Fn(f64, f64) -> Vec3) -> Surface {
-    assert!(n_rings >= 2 && n_around >= 3, "a tube needs 2 rings of 3 vertices, not {n_rings} of {n_around}");
+pub fn tube(
+    n_rings: usize,
+    n_around: usize,
+    ends: Ends,
+    section: impl Fn(f64, f64) -> Vec3,
+) -> Surface {
+    assert!(
+        n_rings >= 2 && n_around >= 3,
+        "a tube needs 2 rings of 3 vertices, not {n_rings} of {n_around}"
+    );
     let mut surface = Surface::default();
     for i in 0..n_rings {
         let along = i as f64 / (n_rings - 1) as f64;
         let turn = if i % 2 == 1 { 0.5 } else { 0.0 };
         for j in 0..n_around {
-            surface.points.push(section(along, (j as f64 + turn) / n_around as f64 * TAU));
+            surface
+                .points
+                .push(section(along, (j as f64 + turn) / n_around as f64 * TAU));
         }
     }
     let vertex = |i: usize, j: usize| (i * n_around + j % n_around) as u32;
@@ -45,12 +55,18 @@ pub fn tube(n_rings: usize, n_around: usize, ends: Ends, section: impl Fn(f64, f
     if ends == Ends::Closed {
         for (ring, is_first) in [(0, true), (n_rings - 1, false)] {
             let rim: Vec<u32> = (0..n_around).map(|j| vertex(ring, j)).collect();
-            let centre = rim.iter().map(|&v| surface.points[v as usize]).sum::<Vec3>() / n_around as f64;
+            let centre = rim
+                .iter()
+                .map(|&v| surface.points[v as usize])
+                .sum::<Vec3>()
+                / n_around as f64;
             let hub = surface.points.len() as u32;
             surface.points.push(centre);
             for j in 0..n_around {
                 let (a, b) = (rim[j], rim[(j + 1) % n_around]);
-                surface.triangles.push(if is_first { [hub, b, a] } else { [hub, a, b] });
+                surface
+                    .triangles
+                    .push(if is_first { [hub, b, a] } else { [hub, a, b] });
             }
         }
     }

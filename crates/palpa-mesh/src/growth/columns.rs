@@ -22,7 +22,10 @@ pub(super) struct Column {
 
 impl Column {
     fn starting_at(p: Vec3) -> Self {
-        Self { points: vec![p], arc: vec![0.0] }
+        Self {
+            points: vec![p],
+            arc: vec![0.0],
+        }
     }
 
     fn push(&mut self, p: Vec3) {
@@ -86,7 +89,9 @@ impl Confinement {
         if self.normals[v].is_empty() {
             return direction;
         }
-        self.project(v, direction).try_normalize(1e-9).unwrap_or(direction)
+        self.project(v, direction)
+            .try_normalize(1e-9)
+            .unwrap_or(direction)
     }
 }
 
@@ -111,7 +116,11 @@ pub(super) fn inward_directions(
     let normals = skin.vertex_normals();
     let edge = skin.mean_edge_length().max(f64::MIN_POSITIVE);
     let n_sweeps = ((smoothing_length / edge).powi(2).round() as usize).clamp(2, 40);
-    let mut directions: Vec<Vec3> = normals.iter().enumerate().map(|(v, n)| confinement.confine(v, -n)).collect();
+    let mut directions: Vec<Vec3> = normals
+        .iter()
+        .enumerate()
+        .map(|(v, n)| confinement.confine(v, -n))
+        .collect();
     for _ in 0..n_sweeps {
         directions = (0..directions.len())
             .map(|v| {
@@ -139,7 +148,10 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
         // Perceptron steps: each adds a little of the face that is least in sight. It ends when all are, or gives up
         // (a spike has no such direction; then the prisms are invalid and the growth says where).
         for _ in 0..100 {
-            let Some(worst) = faces[v].iter().min_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction))) else {
+            let Some(worst) = faces[v]
+                .iter()
+                .min_by(|a, b| a.dot(direction).total_cmp(&b.dot(direction)))
+            else {
                 break;
             };
             if worst.dot(direction) >= MIN_COS {
@@ -151,7 +163,8 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
     }
 }
 
-/// Straight columns along `directions`, as long as half of what lies between the skin and its far side, at most `depth`.
+/// Straight columns along `directions`, of length `depth`, but no longer than half of what lies between the skin and its
+/// far side.
 pub(super) fn straight_columns(
     skin: &Surface,
     index: &SurfaceIndex,
@@ -159,19 +172,45 @@ pub(super) fn straight_columns(
     depth: impl Fn(usize) -> f64,
 ) -> Vec<Column> {
     const SHARE_OF_THICKNESS: f64 = 0.45;
-    skin.points
-        .iter()
-        .enumerate()
-        .map(|(v, &p)| {
-            let d = directions[v];
-            let s_min = 1e-6 * depth(v);
-            // A hit on the back of the surface is its far side; one on its front is a fold of skin seen from outside.
-            let across = index.ray(p, d, s_min).map_or(f64::INFINITY, |(s, _)| s);
-            let mut column = Column::starting_at(p);
-            column.push(p + d * depth(v).min(SHARE_OF_THICKNESS * across));
+    let mut across: Vec<f64> = (0..skin.points.len())
+        .map(|v| {
+            index
+                .ray(skin.points[v], directions[v], 1e-6 * depth(v))
+                .map_or(f64::INFINITY, |(s, _)| s)
+        })
+        .collect();
+    limit_slope(skin, &mut across);
+    (0..skin.points.len())
+        .map(|v| {
+            let mut column = Column::starting_at(skin.points[v]);
+            let length = depth(v).min(SHARE_OF_THICKNESS * across[v]);
+            column.push(skin.points[v] + directions[v] * length);
             column
         })
         .collect()
+}
+
+/// Lowers values until none exceeds a neighbour's by more than the length of the edge between them: a ray that leaves
+/// a limb through its open end has met no far side, its neighbours have.
+fn limit_slope(skin: &Surface, values: &mut [f64]) {
+    let edges = skin.edges();
+    loop {
+        let mut is_changed = false;
+        // Both ways through the edges: a value travels far in one sweep whatever their order.
+        for &[a, b] in edges.iter().chain(edges.iter().rev()) {
+            let (a, b) = (a as usize, b as usize);
+            let length = (skin.points[a] - skin.points[b]).norm();
+            for (from, to) in [(a, b), (b, a)] {
+                if values[to] > (values[from] + length) * (1.0 + 1e-12) {
+                    values[to] = values[from] + length;
+                    is_changed = true;
+                }
+            }
+        }
+        if !is_changed {
+            return;
+        }
+    }
 }
 
 /// A column from the vertex `v` of the skin down to the core: it leaves along `direction` and turns into the core's field.

@@ -65,22 +65,42 @@ impl RigidCore {
         let axis = limb_axis(bones, cuts);
         let mut membranes = Vec::new();
         for (a, b) in neighbours(bones) {
-            if let Some((strip, half_thickness)) = membrane(&bones[a], &bones[b], axis, size / N_SLICES as f64, cuts, MEMBRANE_OVERHANG * size) {
-                let weighted = |s: Source| Source { area: s.area * MEMBRANE_WEIGHT, ..s };
+            if let Some((strip, half_thickness)) = membrane(
+                &bones[a],
+                &bones[b],
+                axis,
+                size / N_SLICES as f64,
+                cuts,
+                MEMBRANE_OVERHANG * size,
+            ) {
+                let weighted = |s: Source| Source {
+                    area: s.area * MEMBRANE_WEIGHT,
+                    ..s
+                };
                 sources.extend(thinned_sources(&strip, spacing).into_iter().map(weighted));
-                membranes.push(Membrane { strip: SurfaceIndex::build(&strip), half_thickness });
+                membranes.push(Membrane {
+                    strip: SurfaceIndex::build(&strip),
+                    half_thickness,
+                });
             }
         }
         let sources = mirrored(sources, cuts, size * MIRROR_REACH);
         let bones = bones.iter().map(SurfaceIndex::build).collect();
-        Self { bones, membranes, sources, softening_sq: (0.6 * spacing).powi(2) }
+        Self {
+            bones,
+            membranes,
+            sources,
+            softening_sq: (0.6 * spacing).powi(2),
+        }
     }
 
     /// Distance to the core, negative inside it; the crease between bone and membrane is rounded. m
     pub(super) fn distance(&self, x: Vec3) -> f64 {
         let bone = self.bone_distance(x);
         self.membranes.iter().fold(bone, |d, m| {
-            let Some(closest) = m.strip.closest(x) else { return d };
+            let Some(closest) = m.strip.closest(x) else {
+                return d;
+            };
             let to_membrane = (x - closest.point).norm() - m.half_thickness;
             smooth_min(d, to_membrane, 2.0 * m.half_thickness)
         })
@@ -128,10 +148,15 @@ impl RigidCore {
         for (id, bone) in bones.iter().enumerate() {
             for &p in &bone.points {
                 // Near the cut the closest point may lie on the rim, where the side is not defined.
-                if cuts.iter().any(|c| (p - c.point).dot(&c.normal) > -0.02 * size) {
+                if cuts
+                    .iter()
+                    .any(|c| (p - c.point).dot(&c.normal) > -0.02 * size)
+                {
                     continue;
                 }
-                let Some(closest) = skin.closest(p) else { continue };
+                let Some(closest) = skin.closest(p) else {
+                    continue;
+                };
                 if closest.signed_distance > worst.map_or(0.0, |w| w.0) {
                     worst = Some((closest.signed_distance, id, p));
                 }
@@ -139,7 +164,11 @@ impl RigidCore {
         }
         match worst {
             None => Ok(()),
-            Some((depth, bone, at)) => Err(GrowthError::BoneOutside { bone, depth, at: at.into() }),
+            Some((depth, bone, at)) => Err(GrowthError::BoneOutside {
+                bone,
+                depth,
+                at: at.into(),
+            }),
         }
     }
 }
@@ -164,7 +193,10 @@ fn thinned_sources(surface: &Surface, cell: f64) -> Vec<Source> {
     cells
         .into_values()
         .filter(|&(_, area)| area > 0.0)
-        .map(|(sum, area)| Source { point: sum / area, area })
+        .map(|(sum, area)| Source {
+            point: sum / area,
+            area,
+        })
         .collect()
 }
 
@@ -172,14 +204,19 @@ fn thinned_sources(surface: &Surface, cell: f64) -> Vec<Source> {
 fn mirrored(sources: Vec<Source>, cuts: &[CutFace], reach: f64) -> Vec<Source> {
     let flat: Vec<&CutFace> = cuts.iter().filter(|c| c.is_flat).collect();
     let height = |c: &CutFace, p: Vec3| (p - c.point).dot(&c.normal);
-    let inside: Vec<Source> =
-        sources.into_iter().filter(|s| flat.iter().all(|c| height(c, s.point) <= 0.0)).collect();
+    let inside: Vec<Source> = sources
+        .into_iter()
+        .filter(|s| flat.iter().all(|c| height(c, s.point) <= 0.0))
+        .collect();
     let mut all = inside.clone();
     for c in flat {
         for s in &inside {
             let h = height(c, s.point);
             if h > -reach {
-                all.push(Source { point: s.point - c.normal * (2.0 * h), area: s.area });
+                all.push(Source {
+                    point: s.point - c.normal * (2.0 * h),
+                    area: s.area,
+                });
             }
         }
     }
@@ -194,12 +231,18 @@ fn limb_axis(bones: &[Surface], cuts: &[CutFace]) -> Vec3 {
     {
         return axis;
     }
-    let points: Vec<Vec3> = bones.iter().flat_map(|b| b.points.iter().copied()).collect();
+    let points: Vec<Vec3> = bones
+        .iter()
+        .flat_map(|b| b.points.iter().copied())
+        .collect();
     let centre = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
     // Power iteration on the scatter of the points: the axis of a slender set is far ahead of the others.
     let mut axis = Vec3::new(1.0, 0.9, 0.8).normalize();
     for _ in 0..50 {
-        let next: Vec3 = points.iter().map(|p| (p - centre) * (p - centre).dot(&axis)).sum();
+        let next: Vec3 = points
+            .iter()
+            .map(|p| (p - centre) * (p - centre).dot(&axis))
+            .sum();
         axis = next.try_normalize(0.0).unwrap_or(axis);
     }
     axis
@@ -207,12 +250,16 @@ fn limb_axis(bones: &[Surface], cuts: &[CutFace]) -> Vec3 {
 
 /// Pairs of bones to be joined: each bone with the nearest of those before it (a tree).
 fn neighbours(bones: &[Surface]) -> Vec<(usize, usize)> {
-    let centres: Vec<Vec3> =
-        bones.iter().map(|b| b.points.iter().sum::<Vec3>() / b.points.len().max(1) as f64).collect();
+    let centres: Vec<Vec3> = bones
+        .iter()
+        .map(|b| b.points.iter().sum::<Vec3>() / b.points.len().max(1) as f64)
+        .collect();
     (1..bones.len())
         .filter_map(|b| {
             let nearest = (0..b).min_by(|&i, &j| {
-                (centres[i] - centres[b]).norm().total_cmp(&(centres[j] - centres[b]).norm())
+                (centres[i] - centres[b])
+                    .norm()
+                    .total_cmp(&(centres[j] - centres[b]).norm())
             })?;
             Some((nearest, b))
         })
@@ -228,7 +275,10 @@ struct SliceOfBone {
 fn slices(bone: &Surface, axis: Vec3, pitch: f64) -> BTreeMap<i64, SliceOfBone> {
     let mut members: BTreeMap<i64, Vec<Vec3>> = BTreeMap::new();
     for p in &bone.points {
-        members.entry((p.dot(&axis) / pitch).floor() as i64).or_default().push(*p);
+        members
+            .entry((p.dot(&axis) / pitch).floor() as i64)
+            .or_default()
+            .push(*p);
     }
     members
         .into_iter()
@@ -261,7 +311,9 @@ fn membrane(
     let mut rows: Vec<(i64, Vec3, Vec3)> = Vec::new();
     let (mut radius_sum, mut n) = (0.0, 0.0);
     for (slice, sa) in &slices_a {
-        let Some(sb) = slices_b.get(slice) else { continue };
+        let Some(sb) = slices_b.get(slice) else {
+            continue;
+        };
         let radius = sa.radius.min(sb.radius);
         if (sa.centre - sb.centre).norm() > MEMBRANE_REACH * radius {
             continue;
@@ -296,10 +348,18 @@ fn membrane(
 
 /// Continues the strip straight on beyond the flat cut faces that its ends are close to, so that columns of a cut face
 /// find a core where a bone ends a little before it.
-fn extend_to_cuts(rows: &mut Vec<(i64, Vec3, Vec3)>, axis: Vec3, pitch: f64, cuts: &[CutFace], reach: f64) {
+fn extend_to_cuts(
+    rows: &mut Vec<(i64, Vec3, Vec3)>,
+    axis: Vec3,
+    pitch: f64,
+    cuts: &[CutFace],
+    reach: f64,
+) {
     for is_last in [false, true] {
         let step = if is_last { axis * pitch } else { -axis * pitch };
-        let Some(&(slice, a, b)) = (if is_last { rows.last() } else { rows.first() }) else { return };
+        let Some(&(slice, a, b)) = (if is_last { rows.last() } else { rows.first() }) else {
+            return;
+        };
         // Distance to the cut face ahead, along the axis.
         let ahead = cuts
             .iter()
@@ -308,7 +368,11 @@ fn extend_to_cuts(rows: &mut Vec<(i64, Vec3, Vec3)>, axis: Vec3, pitch: f64, cut
             .find(|&d| d > 0.0 && d < reach);
         let Some(ahead) = ahead else { continue };
         for i in 1..=(ahead / pitch).ceil() as i64 + 1 {
-            let row = (slice + if is_last { i } else { -i }, a + step * i as f64, b + step * i as f64);
+            let row = (
+                slice + if is_last { i } else { -i },
+                a + step * i as f64,
+                b + step * i as f64,
+            );
             rows.insert(if is_last { rows.len() } else { 0 }, row);
         }
     }

@@ -42,7 +42,9 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
         let members = flood(seed, &neighbours, &mut region);
         let area: f64 = members.iter().map(|&t| areas[t].norm()).sum();
         // Flat as a whole, too: a smooth round surface also bends little from triangle to triangle.
-        let is_flat = members.iter().all(|&t| normal(t).dot(&normal(seed)) > FLAT_COS);
+        let is_flat = members
+            .iter()
+            .all(|&t| normal(t).dot(&normal(seed)) > FLAT_COS);
         if area < MIN_CAP_SHARE * total || !is_flat || members.len() < 3 {
             continue;
         }
@@ -57,7 +59,11 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
         }
     }
     let caps_area: f64 = caps.iter().flatten().map(|&t| areas[t].norm()).sum();
-    if caps_area > MAX_CAPS_SHARE * total { Vec::new() } else { caps }
+    if caps_area > MAX_CAPS_SHARE * total {
+        Vec::new()
+    } else {
+        caps
+    }
 }
 
 /// Pairs of triangles that share an edge which no third triangle uses.
@@ -68,7 +74,16 @@ fn triangle_pairs(surface: &Surface) -> Vec<(usize, usize)> {
             by_edge.entry([p.min(q), p.max(q)]).or_default().push(t);
         }
     }
-    by_edge.into_values().filter_map(|t| if let [a, b] = t[..] { Some((a, b)) } else { None }).collect()
+    by_edge
+        .into_values()
+        .filter_map(|t| {
+            if let [a, b] = t[..] {
+                Some((a, b))
+            } else {
+                None
+            }
+        })
+        .collect()
 }
 
 fn flood(seed: usize, neighbours: &[Vec<usize>], mark: &mut [usize]) -> Vec<usize> {
@@ -110,8 +125,14 @@ pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) ->
 /// The part of a surface within `radius` of `centre`, connected with the vertex nearest to it; ragged teeth and
 /// vertices at which only corners meet are trimmed.
 pub(super) fn cut_out(surface: &Surface, centre: Vec3, radius: f64) -> Surface {
-    let is_near: Vec<bool> = surface.points.iter().map(|p| (p - centre).norm() <= radius).collect();
-    let mut part = without_triangles(surface, |t| !surface.triangles[t].iter().all(|&v| is_near[v as usize]));
+    let is_near: Vec<bool> = surface
+        .points
+        .iter()
+        .map(|p| (p - centre).norm() <= radius)
+        .collect();
+    let mut part = without_triangles(surface, |t| {
+        !surface.triangles[t].iter().all(|&v| is_near[v as usize])
+    });
     loop {
         let before = part.triangles.len();
         part = trim_teeth(&part);
@@ -135,7 +156,10 @@ fn trim_teeth(surface: &Surface) -> Surface {
         loops_at[v as usize] += 1;
     }
     without_triangles(surface, |t| {
-        n_neighbours[t] < 2 || surface.triangles[t].iter().any(|&v| loops_at[v as usize] > 1)
+        n_neighbours[t] < 2
+            || surface.triangles[t]
+                .iter()
+                .any(|&v| loops_at[v as usize] > 1)
     })
 }
 
@@ -145,8 +169,16 @@ fn connected_with(surface: &Surface, centre: Vec3) -> Surface {
         neighbours[a].push(b);
         neighbours[b].push(a);
     }
-    let distance = |t: usize| surface.corners(t).iter().map(|p| (p - centre).norm()).fold(f64::INFINITY, f64::min);
-    let Some(seed) = (0..surface.triangles.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))) else {
+    let distance = |t: usize| {
+        surface
+            .corners(t)
+            .iter()
+            .map(|p| (p - centre).norm())
+            .fold(f64::INFINITY, f64::min)
+    };
+    let Some(seed) =
+        (0..surface.triangles.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    else {
         return surface.clone();
     };
     let mut mark = vec![usize::MAX; surface.triangles.len()];
@@ -164,7 +196,10 @@ pub(super) fn find_cut_faces(skin: &Surface) -> Vec<CutFace> {
             continue;
         }
         let sides = split_at_corners(skin, &rim);
-        let planes: Vec<CutFace> = sides.iter().map(|side| side_face(skin, &normals, side)).collect();
+        let planes: Vec<CutFace> = sides
+            .iter()
+            .map(|side| side_face(skin, &normals, side))
+            .collect();
         if sides.len() > 1 && sides.len() <= MAX_SIDES && planes.iter().all(|f| f.is_flat) {
             faces.extend(planes);
         } else {
@@ -189,10 +224,24 @@ fn limb_end(skin: &Surface, normals: &[Vec3], rim: &[u32]) -> Option<CutFace> {
         area -= (points[i] - centre).cross(&(points[(i + 1) % points.len()] - centre));
     }
     let normal = area.try_normalize(0.0)?;
-    let extent = points.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-    let is_flat = points.iter().all(|p| (p - centre).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
-    let steepness = rim.iter().map(|&v| normals[v as usize].dot(&normal).abs()).sum::<f64>() / rim.len() as f64;
-    (is_flat && steepness < 0.6).then(|| CutFace { vertices: rim.to_vec(), normal, point: centre, is_flat: true })
+    let extent = points
+        .iter()
+        .map(|p| (p - centre).norm())
+        .fold(0.0, f64::max);
+    let is_flat = points
+        .iter()
+        .all(|p| (p - centre).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
+    let steepness = rim
+        .iter()
+        .map(|&v| normals[v as usize].dot(&normal).abs())
+        .sum::<f64>()
+        / rim.len() as f64;
+    (is_flat && steepness < 0.6).then(|| CutFace {
+        vertices: rim.to_vec(),
+        normal,
+        point: centre,
+        is_flat: true,
+    })
 }
 
 /// A closed rim as runs of vertices between sharp turns; each run ends where the next begins.
@@ -220,12 +269,24 @@ fn split_at_corners(skin: &Surface, rim: &[u32]) -> Vec<Vec<u32>> {
 /// A run of rim vertices as a face whose normal points out of the skin, along it.
 fn side_face(skin: &Surface, normals: &[Vec3], side: &[u32]) -> CutFace {
     let p = |v: u32| skin.points[v as usize];
-    let outward: Vec3 =
-        side.windows(2).map(|e| (p(e[1]) - p(e[0])).cross(&(normals[e[0] as usize] + normals[e[1] as usize]))).sum();
+    let outward: Vec3 = side
+        .windows(2)
+        .map(|e| (p(e[1]) - p(e[0])).cross(&(normals[e[0] as usize] + normals[e[1] as usize])))
+        .sum();
     let normal = outward.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
     let point = side.iter().map(|&v| p(v)).sum::<Vec3>() / side.len() as f64;
-    let extent = side.iter().map(|&v| (p(v) - point).norm()).fold(0.0, f64::max);
+    let extent = side
+        .iter()
+        .map(|&v| (p(v) - point).norm())
+        .fold(0.0, f64::max);
     let is_flat = normal != Vec3::zeros()
-        && side.iter().all(|&v| (p(v) - point).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
-    CutFace { vertices: side.to_vec(), normal, point, is_flat }
+        && side
+            .iter()
+            .all(|&v| (p(v) - point).dot(&normal).abs() <= FLAT_TOLERANCE * extent);
+    CutFace {
+        vertices: side.to_vec(),
+        normal,
+        point,
+        is_flat,
+    }
 }

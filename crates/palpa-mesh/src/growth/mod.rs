@@ -144,7 +144,11 @@ pub enum GrowthError {
 ///
 /// # Errors
 /// [`GrowthError`], with the place.
-pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Result<Growth, GrowthError> {
+pub fn grow(
+    surface: &Surface,
+    bones: &[Surface],
+    params: &GrowthParams,
+) -> Result<Growth, GrowthError> {
     check_layers(&params.layers, bones)?;
     check_surface(surface, "the skin")?;
     for (i, bone) in bones.iter().enumerate() {
@@ -158,7 +162,12 @@ pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Resu
     if let Some((centre, radius)) = params.cut_out {
         skin = cut::cut_out(&skin, centre, radius);
         if skin.triangles.is_empty() {
-            return Err(GrowthError::Empty { what: format!("the skin within {:.1} mm of the cut-out's centre", radius * 1e3) });
+            return Err(GrowthError::Empty {
+                what: format!(
+                    "the skin within {:.1} mm of the cut-out's centre",
+                    radius * 1e3
+                ),
+            });
         }
     }
     let cuts = cut::find_cut_faces(&skin);
@@ -169,12 +178,22 @@ pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Resu
     let confinement = Confinement::new(skin.points.len(), &cuts);
     let skin_index = SurfaceIndex::build(&skin);
     let fixed_depth = |v: usize| -> f64 {
-        params.layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin.points[v])).sum()
+        params
+            .layers
+            .iter()
+            .filter_map(|l| l.thickness.as_ref())
+            .map(|t| t.at(skin.points[v]))
+            .sum()
     };
     check_thickness(&skin, &params.layers)?;
     let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
-    let mean_depth = (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
-    let smoothing = if reaches_bone { 2.0 * mean_depth.max(0.02 * size) } else { mean_depth };
+    let mean_depth =
+        (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
+    let smoothing = if reaches_bone {
+        2.0 * mean_depth.max(0.02 * size)
+    } else {
+        mean_depth
+    };
     let directions = columns::inward_directions(&skin, &rings, &confinement, smoothing);
 
     let (lines, core): (Vec<Column>, Option<RigidCore>) = if reaches_bone {
@@ -185,7 +204,10 @@ pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Resu
             .collect();
         (lines, Some(core))
     } else {
-        (columns::straight_columns(&skin, &skin_index, &directions, fixed_depth), None)
+        (
+            columns::straight_columns(&skin, &skin_index, &directions, fixed_depth),
+            None,
+        )
     };
     check_room(&skin, &params.layers, &lines)?;
 
@@ -194,12 +216,30 @@ pub fn grow(surface: &Surface, bones: &[Surface], params: &GrowthParams) -> Resu
         positions: vec![Vec3::zeros(); skin.points.len() * n_levels],
         skin,
         n_levels,
-        interval_layer: params.layers.iter().enumerate().flat_map(|(i, l)| vec![i; l.n_levels]).collect(),
+        interval_layer: params
+            .layers
+            .iter()
+            .enumerate()
+            .flat_map(|(i, l)| vec![i; l.n_levels])
+            .collect(),
         layer_names: params.layers.iter().map(|l| l.name.clone()).collect(),
         cut_faces: cuts,
     };
-    let outcome = untangle::place_levels(&mut body, &lines, &params.layers, &rings, &confinement, core.as_ref())?;
-    Ok(report::finish(body, &params.layers, outcome, core.as_ref(), caps.len()))
+    let outcome = untangle::place_levels(
+        &mut body,
+        &lines,
+        &params.layers,
+        &rings,
+        &confinement,
+        core.as_ref(),
+    )?;
+    Ok(report::finish(
+        body,
+        &params.layers,
+        outcome,
+        core.as_ref(),
+        caps.len(),
+    ))
 }
 
 /// What a layer that reaches down to the bone asks for at least, given the thickness of the layers above it. m
@@ -209,7 +249,11 @@ fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
 
 /// Where the levels of one column lie: arc lengths of its nodes, and the factor by which its layers were thinned.
 fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<f64>) -> f64 {
-    let fixed: f64 = layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin_point)).sum();
+    let fixed: f64 = layers
+        .iter()
+        .filter_map(|l| l.thickness.as_ref())
+        .map(|t| t.at(skin_point))
+        .sum();
     let nominal = |l: &LayerSpec| match &l.thickness {
         Some(t) => t.at(skin_point),
         None => least_fill(l, fixed).max(room - fixed),
@@ -231,7 +275,10 @@ fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<
 
 fn check_layers(layers: &[LayerSpec], bones: &[Surface]) -> Result<(), GrowthError> {
     let bad = |name: &str, reason: &str| {
-        Err(GrowthError::BadLayer { name: name.to_owned(), reason: reason.to_owned() })
+        Err(GrowthError::BadLayer {
+            name: name.to_owned(),
+            reason: reason.to_owned(),
+        })
     };
     let Some((last, above)) = layers.split_last() else {
         return bad("", "a body needs at least one layer");
@@ -245,17 +292,25 @@ fn check_layers(layers: &[LayerSpec], bones: &[Surface]) -> Result<(), GrowthErr
         }
     }
     if let Some(layer) = above.iter().find(|l| l.thickness.is_none()) {
-        return bad(&layer.name, "only the deepest layer can reach down to the bone; give this one a thickness");
+        return bad(
+            &layer.name,
+            "only the deepest layer can reach down to the bone; give this one a thickness",
+        );
     }
     if last.thickness.is_none() && bones.iter().all(|b| b.triangles.is_empty()) {
-        return bad(&last.name, "has no thickness and there is no bone to reach down to; give it a thickness or add bones");
+        return bad(
+            &last.name,
+            "has no thickness and there is no bone to reach down to; give it a thickness or add bones",
+        );
     }
     Ok(())
 }
 
 fn check_thickness(skin: &Surface, layers: &[LayerSpec]) -> Result<(), GrowthError> {
     for layer in layers {
-        let Some(thickness) = &layer.thickness else { continue };
+        let Some(thickness) = &layer.thickness else {
+            continue;
+        };
         for (v, &p) in skin.points.iter().enumerate() {
             let d = thickness.at(p);
             if !(d > 0.0 && d.is_finite()) {
@@ -263,7 +318,10 @@ fn check_thickness(skin: &Surface, layers: &[LayerSpec]) -> Result<(), GrowthErr
                     name: layer.name.clone(),
                     reason: format!(
                         "{:.3} mm thick at skin vertex {v} ({:.1}, {:.1}, {:.1}) mm; a thickness must be positive everywhere",
-                        d * 1e3, p.x * 1e3, p.y * 1e3, p.z * 1e3
+                        d * 1e3,
+                        p.x * 1e3,
+                        p.y * 1e3,
+                        p.z * 1e3
                     ),
                 });
             }
@@ -274,18 +332,29 @@ fn check_thickness(skin: &Surface, layers: &[LayerSpec]) -> Result<(), GrowthErr
 
 fn check_points(surface: &Surface, what: &str) -> Result<(), GrowthError> {
     if surface.triangles.is_empty() {
-        return Err(GrowthError::Empty { what: what.to_owned() });
+        return Err(GrowthError::Empty {
+            what: what.to_owned(),
+        });
     }
-    if let Some(v) = surface.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
-        return Err(GrowthError::BadSurface { reason: format!("vertex {v} of {what} is not finite") });
+    if let Some(v) = surface
+        .points
+        .iter()
+        .position(|p| !p.iter().all(|x| x.is_finite()))
+    {
+        return Err(GrowthError::BadSurface {
+            reason: format!("vertex {v} of {what} is not finite"),
+        });
     }
     Ok(())
 }
 
 fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
     check_points(surface, what)?;
-    let mut directed: Vec<[u32; 2]> =
-        surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    let mut directed: Vec<[u32; 2]> = surface
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .collect();
     directed.sort_unstable();
     if let Some(pair) = directed.windows(2).find(|w| w[0] == w[1]) {
         let [a, b] = pair[0];
@@ -294,12 +363,16 @@ fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
             reason: format!(
                 "the edge from vertex {a} to {b} at ({:.1}, {:.1}, {:.1}) mm belongs to several triangles of the same \
                  direction (mixed winding or more than two faces on an edge)",
-                p.x * 1e3, p.y * 1e3, p.z * 1e3
+                p.x * 1e3,
+                p.y * 1e3,
+                p.z * 1e3
             ),
         });
     }
     if let Some(t) = (0..surface.triangles.len()).find(|&t| surface.area_vector(t).norm() == 0.0) {
-        return Err(GrowthError::BadSurface { reason: format!("triangle {t} of {what} has no area") });
+        return Err(GrowthError::BadSurface {
+            reason: format!("triangle {t} of {what} has no area"),
+        });
     }
     Ok(())
 }
@@ -307,15 +380,25 @@ fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
 /// Refuses when the layers of given thickness find room nowhere.
 fn check_room(skin: &Surface, layers: &[LayerSpec], lines: &[Column]) -> Result<(), GrowthError> {
     let asked = |v: usize| -> f64 {
-        let fixed: f64 = layers.iter().filter_map(|l| l.thickness.as_ref()).map(|t| t.at(skin.points[v])).sum();
-        fixed + layers.iter().filter(|l| l.thickness.is_none()).map(|l| least_fill(l, fixed)).sum::<f64>()
+        let fixed: f64 = layers
+            .iter()
+            .filter_map(|l| l.thickness.as_ref())
+            .map(|t| t.at(skin.points[v]))
+            .sum();
+        fixed
+            + layers
+                .iter()
+                .filter(|l| l.thickness.is_none())
+                .map(|l| least_fill(l, fixed))
+                .sum::<f64>()
     };
     let best = (0..lines.len())
         .max_by(|&a, &b| (lines[a].length() / asked(a)).total_cmp(&(lines[b].length() / asked(b))));
     match best {
-        Some(v) if lines[v].length() < 0.999 * asked(v) => {
-            Err(GrowthError::NoRoom { asked: asked(v), room: lines[v].length() })
-        }
+        Some(v) if lines[v].length() < 0.999 * asked(v) => Err(GrowthError::NoRoom {
+            asked: asked(v),
+            room: lines[v].length(),
+        }),
         _ => Ok(()),
     }
 }

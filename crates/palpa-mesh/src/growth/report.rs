@@ -40,7 +40,13 @@ impl Spread {
         sorted.sort_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
         let at = |q: f64| sorted[(q * last as f64).round() as usize];
-        Some(Self { min: at(0.0), p05: at(0.05), median: at(0.5), p95: at(0.95), max: at(1.0) })
+        Some(Self {
+            min: at(0.0),
+            p05: at(0.05),
+            median: at(0.5),
+            p95: at(0.95),
+            max: at(1.0),
+        })
     }
 }
 
@@ -95,7 +101,11 @@ pub(super) fn finish(
     core: Option<&RigidCore>,
     n_caps: usize,
 ) -> Growth {
-    let Placement { thinning, used_share, shapes } = placement;
+    let Placement {
+        thinning,
+        used_share,
+        shapes,
+    } = placement;
     let n_intervals = body.n_levels - 1;
     let scaled_jacobian: Vec<f64> = shapes.iter().map(|s| s.scaled_jacobian).collect();
     let worst_at = |vertex: usize, value: f64| Worst {
@@ -106,11 +116,15 @@ pub(super) fn finish(
     let worst_prism = (0..shapes.len())
         .min_by(|&a, &b| scaled_jacobian[a].total_cmp(&scaled_jacobian[b]))
         .map_or(0, |p| p);
-    let worst_prism =
-        worst_at(body.skin.triangles[worst_prism / n_intervals][0] as usize, scaled_jacobian[worst_prism]);
+    let worst_prism = worst_at(
+        body.skin.triangles[worst_prism / n_intervals][0] as usize,
+        scaled_jacobian[worst_prism],
+    );
 
     let bases = (0..body.n_vertices()).map(|v| body.positions[body.node(v, body.n_levels - 1)]);
-    let stand_off: Vec<f64> = core.map_or_else(Vec::new, |core| bases.map(|p| core.bone_distance(p)).collect());
+    let stand_off: Vec<f64> = core.map_or_else(Vec::new, |core| {
+        bases.map(|p| core.bone_distance(p)).collect()
+    });
     let extreme = |values: &[f64], sign: f64| {
         (0..values.len())
             .max_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b])))
@@ -119,7 +133,11 @@ pub(super) fn finish(
     let vertex_areas = vertex_areas(&body);
     let total: f64 = vertex_areas.iter().sum();
     let share = |is_in: &dyn Fn(usize) -> bool| {
-        (0..body.n_vertices()).filter(|&v| is_in(v)).map(|v| vertex_areas[v]).sum::<f64>() / total
+        (0..body.n_vertices())
+            .filter(|&v| is_in(v))
+            .map(|v| vertex_areas[v])
+            .fold(0.0, |sum, area| sum + area)
+            / total
     };
     let report = GrowthReport {
         n_vertices: body.n_vertices(),
@@ -143,7 +161,13 @@ pub(super) fn finish(
         stand_off: Spread::of(&stand_off),
         worst_stand_off: extreme(&stand_off, 1.0),
     };
-    Growth { body, report, thinning, stand_off, scaled_jacobian }
+    Growth {
+        body,
+        report,
+        thinning,
+        stand_off,
+        scaled_jacobian,
+    }
 }
 
 /// A third of the area of the triangles around each vertex. m²
@@ -161,7 +185,9 @@ fn layer_reports(body: &LayeredBody, layers: &[LayerSpec]) -> Vec<LayerReport> {
         .iter()
         .enumerate()
         .filter_map(|(id, layer)| {
-            let intervals: Vec<usize> = (0..body.n_levels - 1).filter(|&i| body.interval_layer[i] == id).collect();
+            let intervals: Vec<usize> = (0..body.n_levels - 1)
+                .filter(|&i| body.interval_layer[i] == id)
+                .collect();
             let segment = |v: usize, i: usize| -> Vec3 {
                 body.positions[body.node(v, i + 1)] - body.positions[body.node(v, i)]
             };

@@ -36,13 +36,22 @@ impl ScatteredThickness {
         if samples.is_empty() || !samples.iter().all(is_finite) {
             return None;
         }
-        let points = samples.iter().map(|&(p, d)| GeomWithData::new(p.into(), d)).collect();
-        Some(Self { tree: RTree::bulk_load(points) })
+        let points = samples
+            .iter()
+            .map(|&(p, d)| GeomWithData::new(p.into(), d))
+            .collect();
+        Some(Self {
+            tree: RTree::bulk_load(points),
+        })
     }
 
     fn at(&self, p: Vec3) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (sample, distance_sq) in self.tree.nearest_neighbor_iter_with_distance_2(p.into()).take(N_NEAREST) {
+        for (sample, distance_sq) in self
+            .tree
+            .nearest_neighbor_iter_with_distance_2(p.into())
+            .take(N_NEAREST)
+        {
             if distance_sq == 0.0 {
                 return sample.data;
             }
@@ -84,15 +93,25 @@ mod tests {
             axis: Vec3::new(2.0, 0.0, 0.0),
             table: vec![[0.1, 0.001], [0.2, 0.003]],
         };
-        for (x, want) in [(0.0, 0.001), (0.1, 0.001), (0.15, 0.002), (0.2, 0.003), (9.0, 0.003)] {
-            assert!((field.at(Vec3::new(x, 5.0, 5.0)) - want).abs() < 1e-15, "at {x}");
+        for (x, want) in [
+            (0.0, 0.001),
+            (0.1, 0.001),
+            (0.15, 0.002),
+            (0.2, 0.003),
+            (9.0, 0.003),
+        ] {
+            assert!(
+                (field.at(Vec3::new(x, 5.0, 5.0)) - want).abs() < 1e-15,
+                "at {x}"
+            );
         }
     }
 
     #[test]
     fn samples_are_met_and_mixed_within_their_range() {
-        let samples: Vec<(Vec3, f64)> =
-            (0..10).map(|i| (Vec3::new(f64::from(i), 0.0, 0.0), f64::from(i))).collect();
+        let samples: Vec<(Vec3, f64)> = (0..10)
+            .map(|i| (Vec3::new(f64::from(i), 0.0, 0.0), f64::from(i)))
+            .collect();
         let field = Thickness::Scattered(ScatteredThickness::build(&samples).unwrap());
         assert_eq!(field.at(Vec3::new(3.0, 0.0, 0.0)), 3.0);
         let between = field.at(Vec3::new(3.5, 0.0, 0.0));

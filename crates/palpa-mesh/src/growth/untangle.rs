@@ -37,7 +37,11 @@ pub(super) fn place_levels(
 ) -> Result<Placement, GrowthError> {
     let n = body.n_vertices();
     let surroundings = Surroundings::new(body, rings, confinement, core);
-    let mut placement = Placement { thinning: vec![1.0; n], used_share: vec![1.0; n], shapes: Vec::new() };
+    let mut placement = Placement {
+        thinning: vec![1.0; n],
+        used_share: vec![1.0; n],
+        shapes: Vec::new(),
+    };
     let mut stale: Vec<usize> = (0..n).collect();
     for _ in 0..MAX_ROUNDS {
         for &v in &stale {
@@ -96,9 +100,18 @@ fn body_shapes(body: &LayeredBody) -> Vec<PrismShape> {
 }
 
 /// Vertices of the prisms that satisfy `is_in`, ascending.
-fn vertices_of(body: &LayeredBody, shapes: &[PrismShape], is_in: impl Fn(&PrismShape) -> bool) -> Vec<usize> {
+fn vertices_of(
+    body: &LayeredBody,
+    shapes: &[PrismShape],
+    is_in: impl Fn(&PrismShape) -> bool,
+) -> Vec<usize> {
     let mut marked = vec![false; body.n_vertices()];
-    for (triangle, column) in body.skin.triangles.iter().zip(shapes.chunks(body.n_levels - 1)) {
+    for (triangle, column) in body
+        .skin
+        .triangles
+        .iter()
+        .zip(shapes.chunks(body.n_levels - 1))
+    {
         if column.iter().any(&is_in) {
             triangle.iter().for_each(|&v| marked[v as usize] = true);
         }
@@ -123,15 +136,24 @@ impl<'a> Surroundings<'a> {
     ) -> Self {
         let mut triangles_at = vec![Vec::new(); body.n_vertices()];
         for (t, triangle) in body.skin.triangles.iter().enumerate() {
-            triangle.iter().for_each(|&v| triangles_at[v as usize].push(t as u32));
+            triangle
+                .iter()
+                .for_each(|&v| triangles_at[v as usize].push(t as u32));
         }
-        Self { triangles_at, rings, confinement, core }
+        Self {
+            triangles_at,
+            rings,
+            confinement,
+            core,
+        }
     }
 
     /// Moves the nodes of poor prisms, one by one, where that makes the worst prism around the node better; never where
     /// it makes it worse. Skin nodes stay; base nodes stay out of the bones; nodes of flat cut faces stay in them.
     fn relax(&self, body: &mut LayeredBody) {
-        let mut columns = vertices_of(body, &body_shapes(body), |s| s.scaled_jacobian < GOOD_ENOUGH || !s.is_valid());
+        let mut columns = vertices_of(body, &body_shapes(body), |s| {
+            s.scaled_jacobian < GOOD_ENOUGH || !s.is_valid()
+        });
         for _ in 0..MAX_SWEEPS {
             let mut improved = Vec::new();
             for &v in &columns {
@@ -160,7 +182,11 @@ impl<'a> Surroundings<'a> {
         let ring = &self.rings[v];
         let same_level = |u: &u32| body.positions[body.node(*u as usize, l)];
         let mean = ring.iter().map(same_level).sum::<Vec3>() / ring.len().max(1) as f64;
-        let reach = ring.iter().map(|u| (same_level(u) - start).norm()).sum::<f64>() / ring.len().max(1) as f64;
+        let reach = ring
+            .iter()
+            .map(|u| (same_level(u) - start).norm())
+            .sum::<f64>()
+            / ring.len().max(1) as f64;
         let mut candidates = vec![start.lerp(&mean, 0.5), start.lerp(&mean, 0.2)];
         if l + 1 < body.n_levels {
             candidates.push((body.positions[node - 1] + body.positions[node + 1]) * 0.5);
@@ -193,7 +219,11 @@ impl<'a> Surroundings<'a> {
         for &t in &self.triangles_at[v] {
             for i in intervals.clone() {
                 let shape = PrismShape::of(&body.prism(t as usize, i).map(|n| body.positions[n]));
-                let worth = if shape.is_valid() { shape.scaled_jacobian } else { shape.scaled_jacobian.min(0.0) };
+                let worth = if shape.is_valid() {
+                    shape.scaled_jacobian
+                } else {
+                    shape.scaled_jacobian.min(0.0)
+                };
                 worst = worst.min(worth);
             }
         }

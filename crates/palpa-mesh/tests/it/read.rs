@@ -147,9 +147,9 @@ fn polygons_of_very_many_corners_do_not_take_minutes() {
         let (y, x) = (f64::from(i) * 2.5).sin_cos();
         writeln!(text, "v {x} {y} 0").unwrap();
     }
-    let face: String = (1..=n).map(|i| format!(" {i}")).collect();
+    let corners: Vec<String> = (1..=n).map(|i: i32| i.to_string()).collect();
     for _ in 0..40 {
-        writeln!(text, "f{face}").unwrap();
+        writeln!(text, "f {}", corners.join(" ")).unwrap();
     }
     let message = refuse(Format::Obj, text);
     assert!(

@@ -101,10 +101,25 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let built = build(&scene)?;
     drop(spinner);
     let indentation = Indentation::build(&scene, &built)?;
-    let notes: Vec<String> = built.notes.iter().chain(&indentation.notes).cloned().collect();
+    let notes: Vec<String> = built
+        .notes
+        .iter()
+        .chain(&indentation.notes)
+        .cloned()
+        .collect();
     let materials = scene.material_status();
-    let scene_name = args.scene.as_deref().map_or("embedded forearm".to_owned(), |p| p.display().to_string());
-    announce(context, &scene_name, &scene, &built, &indentation, &materials)?;
+    let scene_name = args
+        .scene
+        .as_deref()
+        .map_or("embedded forearm".to_owned(), |p| p.display().to_string());
+    announce(
+        context,
+        &scene_name,
+        &scene,
+        &built,
+        &indentation,
+        &materials,
+    )?;
 
     let recorded = record(args, context, out, &built, &indentation)?;
     let result = result_of(&recorded.samples, &materials);
@@ -157,7 +172,11 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         press.hold = hold.si();
     }
     press.retract &= !args.no_retract;
-    for (name, value) in [("--depth", press.depth), ("--step", press.step), ("--speed", press.speed)] {
+    for (name, value) in [
+        ("--depth", press.depth),
+        ("--step", press.step),
+        ("--speed", press.speed),
+    ] {
         if !(value > 0.0) {
             bail!("{name} must be more than zero");
         }
@@ -178,10 +197,17 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
 fn parse_point(text: &str) -> anyhow::Result<[f64; 3]> {
     let parts: Vec<&str> = text.split(',').collect();
     let [x, y, z] = parts[..] else {
-        bail!("--at \"{text}\" has {} parts; give three lengths with units, as in \"120 mm,0 mm,40 mm\"", parts.len());
+        bail!(
+            "--at \"{text}\" has {} parts; give three lengths with units, as in \"120 mm,0 mm,40 mm\"",
+            parts.len()
+        );
     };
     let length = |part: &str| -> anyhow::Result<f64> {
-        Ok(part.trim().parse::<Length>().with_context(|| format!("--at \"{text}\""))?.si())
+        Ok(part
+            .trim()
+            .parse::<Length>()
+            .with_context(|| format!("--at \"{text}\""))?
+            .si())
     };
     Ok([length(x)?, length(y)?, length(z)?])
 }
@@ -205,8 +231,11 @@ fn record(
     let mut table = out.table::<Sample>("press.csv")?;
     let mut series = Series::new(args.frames, indentation);
     let mut run = indentation.start(&built.growth.body);
-    let mut recorded =
-        Recorded { samples: Vec::new(), deepest: run.state.positions.clone(), deepest_depth: 0.0 };
+    let mut recorded = Recorded {
+        samples: Vec::new(),
+        deepest: run.state.positions.clone(),
+        deepest_depth: 0.0,
+    };
     let progress = context.progress(indentation.n_samples(), "pressing");
     while let Some(sample) = run.advance() {
         table.push(&sample)?;
@@ -244,13 +273,18 @@ impl Series {
             _ => (0..n).map(|i| (i * last) / (n - 1)).collect(),
         };
         if n > 2
-            && let Some(nearest) = wanted.iter_mut().min_by_key(|w| w.abs_diff(indentation.deepest()))
+            && let Some(nearest) = wanted
+                .iter_mut()
+                .min_by_key(|w| w.abs_diff(indentation.deepest()))
         {
             *nearest = indentation.deepest();
         }
         wanted.sort_unstable();
         wanted.dedup();
-        Self { wanted, frames: Vec::new() }
+        Self {
+            wanted,
+            frames: Vec::new(),
+        }
     }
 
     fn offer(
@@ -267,10 +301,18 @@ impl Series {
         let growth = &built.growth;
         let body = &growth.body;
         let per_column = |values: &[f64]| -> Vec<f64> {
-            values.iter().flat_map(|&x| std::iter::repeat_n(x, body.n_levels)).collect()
+            values
+                .iter()
+                .flat_map(|&x| std::iter::repeat_n(x, body.n_levels))
+                .collect()
         };
-        let displacement: Vec<Vec3> =
-            run.state.positions.iter().zip(&body.positions).map(|(now, rest)| now - rest).collect();
+        let displacement: Vec<Vec3> = run
+            .state
+            .positions
+            .iter()
+            .zip(&body.positions)
+            .map(|(now, rest)| now - rest)
+            .collect();
         let mut grid = Grid::of_body(body, &run.state.positions)
             .with_point_vectors("displacement", &displacement)
             .with_point_vectors("force", &run.state.node_forces)
@@ -338,7 +380,11 @@ fn result_of(samples: &[Sample], materials: &[MaterialStatus]) -> PressResult {
 /// One sentence on how far the stiffnesses can be trusted.
 fn status_line(materials: &[MaterialStatus]) -> String {
     let named = |status: Status| -> Vec<&str> {
-        materials.iter().filter(|m| m.status == status).map(|m| m.tissue.as_str()).collect()
+        materials
+            .iter()
+            .filter(|m| m.status == status)
+            .map(|m| m.tissue.as_str())
+            .collect()
     };
     let parts: Vec<String> = [
         (Status::Measured, "measured"),
@@ -375,7 +421,12 @@ fn announce(
         table.push([
             layer.name.clone(),
             spec.levels.to_string(),
-            format!("{:.2} ({:.2}–{:.2})", t.median * 1e3, t.min * 1e3, t.max * 1e3),
+            format!(
+                "{:.2} ({:.2}–{:.2})",
+                t.median * 1e3,
+                t.min * 1e3,
+                t.max * 1e3
+            ),
             match (material.young, material.spring) {
                 (Some(young), _) => format!("E {:.1} kPa", young / 1e3),
                 (_, Some(spring)) => format!("k {spring:.3e} N/m per bar"),
@@ -422,12 +473,19 @@ fn conclude(
     notes: &[String],
 ) -> anyhow::Result<()> {
     const ROWS: usize = 12;
-    let loading: Vec<&Sample> = recorded.samples.iter().filter(|s| s.phase == Phase::Load).collect();
+    let loading: Vec<&Sample> = recorded
+        .samples
+        .iter()
+        .filter(|s| s.phase == Phase::Load)
+        .collect();
     let mut table = Table::new(["depth mm", "force N"]);
     let stride = loading.len().div_ceil(ROWS).max(1);
     for (i, sample) in loading.iter().enumerate() {
         if i % stride == 0 || i + 1 == loading.len() {
-            table.push([format!("{:.2}", sample.depth_mm), format!("{:.4}", sample.force_n)]);
+            table.push([
+                format!("{:.2}", sample.depth_mm),
+                format!("{:.4}", sample.force_n),
+            ]);
         }
     }
     context.say(table)?;
@@ -436,7 +494,8 @@ fn conclude(
         "largest force {:.3} N at {:.2} mm{}",
         r.max_force_n,
         r.at_depth_mm,
-        r.secant_stiffness_n_per_mm.map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
+        r.secant_stiffness_n_per_mm
+            .map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
     ))?;
     context.say(format!(
         "{}. Bars have Poisson's ratio ¼ whatever the tissue's.",
@@ -449,12 +508,17 @@ fn conclude(
         ))?;
     }
     if r.outcome == "diverged" {
-        context.say("the last step DIVERGED; results end before it. Use more substeps or a smaller step")?;
+        context.say(
+            "the last step DIVERGED; results end before it. Use more substeps or a smaller step",
+        )?;
     }
     for note in notes {
         context.say(format!("note: {note}"))?;
     }
-    context.say(format!("table, series and pictures in {}", folder.display()))?;
+    context.say(format!(
+        "table, series and pictures in {}",
+        folder.display()
+    ))?;
     if let Some(picture) = pictures.first() {
         context.say(format!("force against depth: {}", picture.display()))?;
     }
@@ -469,9 +533,17 @@ fn draw_pictures(
     recorded: &Recorded,
     result: &PressResult,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let samples: Vec<&Sample> = recorded.samples.iter().filter(|s| s.outcome != "diverged").collect();
+    let samples: Vec<&Sample> = recorded
+        .samples
+        .iter()
+        .filter(|s| s.outcome != "diverged")
+        .collect();
     let of_phase = |phases: &[Phase]| -> Vec<[f64; 2]> {
-        samples.iter().filter(|s| phases.contains(&s.phase)).map(|s| [s.depth_mm, s.force_n]).collect()
+        samples
+            .iter()
+            .filter(|s| phases.contains(&s.phase))
+            .map(|s| [s.depth_mm, s.force_n])
+            .collect()
     };
     let subtitle = format!(
         "{}; skin edges {:.1} mm near it; {}",
@@ -479,26 +551,39 @@ fn draw_pictures(
         indentation.mesh_size * 1e3,
         result.material_status
     );
-    let mut depth_chart = Chart::new(Axis::linear("depth, mm").with_zero(), Axis::linear("force, N").with_zero())
-        .title("Force against depth")
-        .subtitle(&subtitle)
-        .line("loading", of_phase(&[Phase::Load, Phase::Hold]));
+    let mut depth_chart = Chart::new(
+        Axis::linear("depth, mm").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against depth")
+    .subtitle(&subtitle)
+    .line("loading", of_phase(&[Phase::Load, Phase::Hold]));
     let mut retracting = of_phase(&[Phase::Retract]);
     if !retracting.is_empty() {
         // The way back begins where the rest ended.
         retracting.splice(0..0, of_phase(&[Phase::Load, Phase::Hold]).last().copied());
-        depth_chart = depth_chart.series(crate::plot::Series::new("retracting", retracting).dashed());
+        depth_chart =
+            depth_chart.series(crate::plot::Series::new("retracting", retracting).dashed());
     }
     if let Some(depth) = result.inverted_from_mm {
         depth_chart = depth_chart.guide(Guide::x(depth, "prisms turned over"));
     }
     let time: Vec<[f64; 2]> = samples.iter().map(|s| [s.time_s, s.force_n]).collect();
-    let time_chart = Chart::new(Axis::linear("time, s").with_zero(), Axis::linear("force, N").with_zero())
-        .title("Force against time")
-        .subtitle(&subtitle)
-        .line("force", time);
+    let time_chart = Chart::new(
+        Axis::linear("time, s").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against time")
+    .subtitle(&subtitle)
+    .line("force", time);
     let mut paths = Vec::new();
-    paths.extend(depth_chart.draw().save(out, "force_depth")?.into_iter().rev());
+    paths.extend(
+        depth_chart
+            .draw()
+            .save(out, "force_depth")?
+            .into_iter()
+            .rev(),
+    );
     paths.extend(time_chart.draw().save(out, "force_time")?);
     if let Some(picture) = section_picture(scene, built, indentation, recorded) {
         paths.extend(picture.save(out, "section")?);
@@ -516,20 +601,43 @@ fn section_picture(
     let body = &built.growth.body;
     let direction = indentation.direction.into_inner();
     // Across the limb where it has an end; else along the longest way.
-    let across = body.cut_faces.iter().find(|f| f.is_flat && f.normal.dot(&direction).abs() < 0.9).map(|f| f.normal);
-    let other = if direction.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
-    let plane = Plane::new(indentation.at, across.unwrap_or(other).cross(&direction).cross(&direction), -direction)?;
-    let bones: Vec<_> = built.bones.iter().flat_map(|b: &Surface| cut_surface(b, &plane)).collect();
+    let across = body
+        .cut_faces
+        .iter()
+        .find(|f| f.is_flat && f.normal.dot(&direction).abs() < 0.9)
+        .map(|f| f.normal);
+    let other = if direction.x.abs() < 0.7 {
+        Vec3::x()
+    } else {
+        Vec3::y()
+    };
+    let plane = Plane::new(
+        indentation.at,
+        across.unwrap_or(other).cross(&direction).cross(&direction),
+        -direction,
+    )?;
+    let bones: Vec<_> = built
+        .bones
+        .iter()
+        .flat_map(|b: &Surface| cut_surface(b, &plane))
+        .collect();
     let tool = |at: Vec3| match scene.tool {
         Tool::Disc { radius } => ToolOutline::disc(&plane, &at, &direction, radius),
         Tool::Node => ToolOutline::node(&plane, &at),
     };
-    let (rest, pressed) =
-        (cut_body(body, &body.positions, &plane), cut_body(body, &recorded.deepest, &plane));
+    let (rest, pressed) = (
+        cut_body(body, &body.positions, &plane),
+        cut_body(body, &recorded.deepest, &plane),
+    );
     let depth = recorded.deepest_depth;
     let pressed_title = format!("pressed {depth:.1} mm");
     let panels = [
-        Panel { title: "at rest", section: &rest, bones: &bones, tool: Some(tool(indentation.at)) },
+        Panel {
+            title: "at rest",
+            section: &rest,
+            bones: &bones,
+            tool: Some(tool(indentation.at)),
+        },
         Panel {
             title: &pressed_title,
             section: &pressed,
@@ -537,6 +645,9 @@ fn section_picture(
             tool: Some(tool(indentation.at + direction * (depth * 1e-3))),
         },
     ];
-    let subtitle = format!("through ({}) mm, the press direction downward", in_mm(indentation.at));
+    let subtitle = format!(
+        "through ({}) mm, the press direction downward",
+        in_mm(indentation.at)
+    );
     Some(draw("Section through the press point", &subtitle, &panels))
 }

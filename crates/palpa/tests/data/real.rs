@@ -100,21 +100,56 @@ impl Case {
             .arg(&scene)
             .output()
             .unwrap();
-        assert!(run.status.success(), "{}: {}", self.name, String::from_utf8_lossy(&run.stderr));
+        assert!(
+            run.status.success(),
+            "{}: {}",
+            self.name,
+            String::from_utf8_lossy(&run.stderr)
+        );
         let report: Value = serde_json::from_slice(&run.stdout).unwrap();
         let body = &report["body"];
         println!("{}: {}", self.name, serde_json::to_string(body).unwrap());
-        assert!(body["n_prisms"].as_u64().unwrap() >= self.n_prisms, "{body}");
-        assert!(body["scaled_jacobian"]["min"].as_f64().unwrap() > 0.0, "{body}");
-        assert!(body["scaled_jacobian"]["p05"].as_f64().unwrap() > 0.25, "{body}");
-        assert!(body["thinned_share"].as_f64().unwrap() <= self.thinned_share, "{body}");
+        assert!(
+            body["n_prisms"].as_u64().unwrap() >= self.n_prisms,
+            "{body}"
+        );
+        assert!(
+            body["scaled_jacobian"]["min"].as_f64().unwrap() > 0.0,
+            "{body}"
+        );
+        assert!(
+            body["scaled_jacobian"]["p05"].as_f64().unwrap() > 0.25,
+            "{body}"
+        );
+        assert!(
+            body["thinned_share"].as_f64().unwrap() <= self.thinned_share,
+            "{body}"
+        );
         let samples = report["samples"].as_array().unwrap();
-        let forces: Vec<f64> = samples.iter().map(|s| s["force_n"].as_f64().unwrap()).collect();
+        let forces: Vec<f64> = samples
+            .iter()
+            .map(|s| s["force_n"].as_f64().unwrap())
+            .collect();
         println!("{}: forces {forces:?} N", self.name);
         let loading = &forces[..3];
-        assert!(loading[0].abs() < 1e-9 && loading[1] > 0.01 && loading[2] > loading[1], "{forces:?}");
-        assert!(samples.iter().all(|s| s["n_inverted"] == 0 && s["outcome"] == "converged"), "{samples:?}");
-        for file in ["press.csv", "press.pvd", "force_depth.svg", "force_depth.png", "section.svg", "section.png"] {
+        assert!(
+            loading[0].abs() < 1e-9 && loading[1] > 0.01 && loading[2] > loading[1],
+            "{forces:?}"
+        );
+        assert!(
+            samples
+                .iter()
+                .all(|s| s["n_inverted"] == 0 && s["outcome"] == "converged"),
+            "{samples:?}"
+        );
+        for file in [
+            "press.csv",
+            "press.pvd",
+            "force_depth.svg",
+            "force_depth.png",
+            "section.svg",
+            "section.png",
+        ] {
             assert!(out.join(file).is_file(), "{}: no {file}", self.name);
         }
         report
@@ -126,7 +161,9 @@ fn results() -> PathBuf {
 }
 
 fn last_force(report: &Value) -> f64 {
-    report["samples"].as_array().unwrap().last().unwrap()["force_n"].as_f64().unwrap()
+    report["samples"].as_array().unwrap().last().unwrap()["force_n"]
+        .as_f64()
+        .unwrap()
 }
 
 #[test]
@@ -156,15 +193,23 @@ fn a_forearm_with_its_bones_is_pressed_at_both_resolutions() {
 fn a_calf_with_its_bones_is_pressed_at_both_resolutions() {
     let Some(data) = crate::data() else { return };
     CALF.press(&data);
-    let fine =
-        Case { name: "calf_10k", skin: "calf_mri/calf_skin_open_10k.ply", n_prisms: 80_000, ..CALF };
+    let fine = Case {
+        name: "calf_10k",
+        skin: "calf_mri/calf_skin_open_10k.ply",
+        n_prisms: 80_000,
+        ..CALF
+    };
     fine.press(&data);
 }
 
 #[test]
 fn closed_limbs_grow_as_their_open_skins_do() {
     let Some(data) = crate::data() else { return };
-    let closed = Case { name: "forearm_2k_closed", skin: "forearm/forearm_skin_2k.obj", ..FOREARM };
+    let closed = Case {
+        name: "forearm_2k_closed",
+        skin: "forearm/forearm_skin_2k.obj",
+        ..FOREARM
+    };
     let report = closed.press(&data);
     assert_eq!(report["body"]["n_caps"], 2);
 }
@@ -178,6 +223,9 @@ fn parts_without_bones_are_pressed_at_a_fixed_depth() {
         ("abdomen", "parts/abdomen_3k.obj"),
     ] {
         let report = Case { name, skin, ..PART }.press(&data);
-        assert_eq!(report["body"]["n_caps"], 2, "{name}: the cut faces are found");
+        assert_eq!(
+            report["body"]["n_caps"], 2,
+            "{name}: the cut faces are found"
+        );
     }
 }
