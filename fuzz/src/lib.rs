@@ -9,8 +9,20 @@ pub fn read_check_repair(bytes: &[u8], format: Format) {
         return;
     };
     let n = file.surface.points.len();
-    assert!(file.surface.triangles.iter().flatten().all(|&v| (v as usize) < n));
+    assert!(
+        file.surface
+            .triangles
+            .iter()
+            .flatten()
+            .all(|&v| (v as usize) < n)
+    );
     check_surface(&file.surface);
-    let (repaired, _) = repair(&file.surface, &RepairOptions { recentre: true, ..RepairOptions::default() });
+    let (repaired, _) = repair(
+        &file.surface,
+        &RepairOptions {
+            recentre: true,
+            ..RepairOptions::default()
+        },
+    );
     check_surface(&repaired);
 }

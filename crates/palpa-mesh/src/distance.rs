@@ -181,6 +181,10 @@ fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, [f64; 3]) {
     (a + ab * v + ac * w, [1.0 - v - w, v, w])
 }
 
+/// How far beyond the edges, in barycentric coordinates, a ray still meets a triangle: through a shared edge or vertex
+/// it must not slip between two.
+const EDGE: f64 = 1e-6;
+
 /// Ray parameter at which `origin + s direction` passes a triangle (Möller and Trumbore 1997).
 fn ray_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     let (e1, e2) = (b - a, c - a);
@@ -193,7 +197,5 @@ fn ray_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f
     let u = s.dot(&h) / det;
     let q = s.cross(&e1);
     let v = direction.dot(&q) / det;
-    // A little beyond the edges: a ray through a shared edge or vertex must not slip between the triangles.
-    const EDGE: f64 = 1e-6;
     (u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE).then(|| e2.dot(&q) / det)
 }

@@ -141,7 +141,9 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
     let mut faces: Vec<Vec<Vec3>> = vec![Vec::new(); directions.len()];
     for (t, triangle) in skin.triangles.iter().enumerate() {
         if let Some(n) = skin.area_vector(t).try_normalize(0.0) {
-            triangle.iter().for_each(|&v| faces[v as usize].push(-n));
+            for &v in triangle {
+                faces[v as usize].push(-n);
+            }
         }
     }
     for (v, direction) in directions.iter_mut().enumerate() {

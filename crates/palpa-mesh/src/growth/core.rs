@@ -7,7 +7,7 @@
 //! ```text
 //! ψ(x) = Σ_j A_j / (|x − y_j|² + ε²)
 //! ```
-//! over the points y_j of bones and membrane with their areas A_j. It is smooth, rises towards the core, and rounds off
+//! over the points `y_j` of bones and membrane with their areas `A_j`. It is smooth, rises towards the core, and rounds off
 //! the creases of the true distance, at which neighbouring lines of steepest descent would part or meet. Lines of a
 //! smooth gradient never cross. (The potential of charges, exponent 1 in place of 2, is harmonic, but drags the columns
 //! of the flanks too far round; exponent 4, close to the true distance, crowds them on the nearer bone.) Sources are
@@ -112,7 +112,7 @@ impl RigidCore {
             .iter()
             .filter_map(|b| b.closest(x))
             .map(|c| c.signed_distance)
-            .min_by(|a, b| a.total_cmp(b))
+            .min_by(f64::total_cmp)
             .unwrap_or(f64::INFINITY)
     }
 
@@ -135,41 +135,40 @@ impl RigidCore {
         }
         sum.try_normalize(0.0).unwrap_or_else(Vec3::zeros)
     }
+}
 
-    /// Refuses bones that come through the skin (beyond the cut faces they may).
-    pub(super) fn check_inside(
-        &self,
-        bones: &[Surface],
-        skin: &SurfaceIndex,
-        cuts: &[CutFace],
-        size: f64,
-    ) -> Result<(), GrowthError> {
-        let mut worst: Option<(f64, usize, Vec3)> = None;
-        for (id, bone) in bones.iter().enumerate() {
-            for &p in &bone.points {
-                // Near the cut the closest point may lie on the rim, where the side is not defined.
-                if cuts
-                    .iter()
-                    .any(|c| (p - c.point).dot(&c.normal) > -0.02 * size)
-                {
-                    continue;
-                }
-                let Some(closest) = skin.closest(p) else {
-                    continue;
-                };
-                if closest.signed_distance > worst.map_or(0.0, |w| w.0) {
-                    worst = Some((closest.signed_distance, id, p));
-                }
+/// Refuses bones that come through the skin (beyond the cut faces they may).
+pub(super) fn check_inside(
+    bones: &[Surface],
+    skin: &SurfaceIndex,
+    cuts: &[CutFace],
+    size: f64,
+) -> Result<(), GrowthError> {
+    let mut worst: Option<(f64, usize, Vec3)> = None;
+    for (id, bone) in bones.iter().enumerate() {
+        for &p in &bone.points {
+            // Near the cut the closest point may lie on the rim, where the side is not defined.
+            if cuts
+                .iter()
+                .any(|c| (p - c.point).dot(&c.normal) > -0.02 * size)
+            {
+                continue;
+            }
+            let Some(closest) = skin.closest(p) else {
+                continue;
+            };
+            if closest.signed_distance > worst.map_or(0.0, |w| w.0) {
+                worst = Some((closest.signed_distance, id, p));
             }
         }
-        match worst {
-            None => Ok(()),
-            Some((depth, bone, at)) => Err(GrowthError::BoneOutside {
-                bone,
-                depth,
-                at: at.into(),
-            }),
-        }
+    }
+    match worst {
+        None => Ok(()),
+        Some((depth, bone, at)) => Err(GrowthError::BoneOutside {
+            bone,
+            depth,
+            at: at.into(),
+        }),
     }
 }
 

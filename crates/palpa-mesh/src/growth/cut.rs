@@ -32,7 +32,7 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
             neighbours[b].push(a);
         }
     }
-    let total: f64 = areas.iter().map(|a| a.norm()).sum();
+    let total: f64 = areas.iter().map(nalgebra::Matrix::norm).sum();
     let mut region = vec![usize::MAX; n];
     let mut caps = Vec::new();
     for seed in 0..n {

@@ -2,7 +2,7 @@
 //!
 //! 1. Flat caps of a closed limb are found and taken off; the rims become cut faces.
 //! 2. Every skin vertex gets a *column*: a line inward that leaves along the smoothed normal and turns into the field of
-//!    the rigid [`core`] (bones), or runs straight where there is no bone.
+//!    the rigid core (bones), or runs straight where there is no bone.
 //! 3. Levels are put on the columns by the thickness of the layers; where there is no room, all layers thin in proportion.
 //! 4. Every prism is measured. Where one is turned over or flat, the columns around it are evened out and, if that is not
 //!    enough, shortened; the core then stands off the bone there. If nothing helps, growth is refused, saying where.
@@ -198,7 +198,7 @@ pub fn grow(
 
     let (lines, core): (Vec<Column>, Option<RigidCore>) = if reaches_bone {
         let core = RigidCore::build(bones, &cuts, size);
-        core.check_inside(bones, &skin_index, &cuts, size)?;
+        core::check_inside(bones, &skin_index, &cuts, size)?;
         let lines = (0..skin.points.len())
             .map(|v| columns::column_to_core(v, skin.points[v], directions[v], &core, &confinement))
             .collect();

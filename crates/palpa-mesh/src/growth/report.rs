@@ -175,7 +175,9 @@ fn vertex_areas(body: &LayeredBody) -> Vec<f64> {
     let mut areas = vec![0.0; body.n_vertices()];
     for (t, triangle) in body.skin.triangles.iter().enumerate() {
         let third = body.skin.area_vector(t).norm() / 3.0;
-        triangle.iter().for_each(|&v| areas[v as usize] += third);
+        for &v in triangle {
+            areas[v as usize] += third;
+        }
     }
     areas
 }

@@ -113,7 +113,9 @@ fn vertices_of(
         .zip(shapes.chunks(body.n_levels - 1))
     {
         if column.iter().any(&is_in) {
-            triangle.iter().for_each(|&v| marked[v as usize] = true);
+            for &v in triangle {
+                marked[v as usize] = true;
+            }
         }
     }
     (0..marked.len()).filter(|&v| marked[v]).collect()
@@ -136,9 +138,9 @@ impl<'a> Surroundings<'a> {
     ) -> Self {
         let mut triangles_at = vec![Vec::new(); body.n_vertices()];
         for (t, triangle) in body.skin.triangles.iter().enumerate() {
-            triangle
-                .iter()
-                .for_each(|&v| triangles_at[v as usize].push(t as u32));
+            for &v in triangle {
+                triangles_at[v as usize].push(t as u32);
+            }
         }
         Self {
             triangles_at,

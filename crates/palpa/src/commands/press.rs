@@ -177,7 +177,7 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         ("--step", press.step),
         ("--speed", press.speed),
     ] {
-        if !(value > 0.0) {
+        if value <= 0.0 || value.is_nan() {
             bail!("{name} must be more than zero");
         }
     }

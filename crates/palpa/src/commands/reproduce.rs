@@ -138,7 +138,7 @@ fn say_figures(context: &Context, figures: &Figures) -> anyhow::Result<()> {
 
     context.say(format_args!(
         "\nThe same over all {} readings of what the text leaves open, lowest to highest",
-        figures.sweep.len()
+        figures.sweep.len() / RANGES_MM.len()
     ))?;
     let mut table = Table::new([
         "range mm",

@@ -135,3 +135,24 @@ fn is_borne(model: &SpringModel, distance: f64, params: &StepParams) -> bool {
         report.outcome == Outcome::Converged
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_converge_at_first_order() {
+        let errors: Vec<f64> = convergence().unwrap().iter().map(|row| row.error).collect();
+        for pair in errors.windows(2) {
+            assert!((3.0..7.0).contains(&(pair[0] / pair[1])), "{errors:?}");
+        }
+    }
+
+    #[test]
+    fn euler_at_large_steps_diverges_where_the_combined_method_does_not() {
+        let row = euler(0.95).unwrap();
+        assert_eq!(row.is_borne_by_combined, Some(true));
+        assert!(row.steps_to_cross[0].unwrap() > 10);
+        assert_eq!(combined_steps_to_cross().unwrap(), [Some(1); 3]);
+    }
+}

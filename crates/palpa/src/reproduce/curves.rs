@@ -209,3 +209,38 @@ pub struct SweepRow {
     /// See `uniform_slope_change`.
     pub bottom_slope_change: Option<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_uniform_body_is_proportional_and_layers_are_felt_from_the_first_millimetre() {
+        let curves = Curves::compute(MAIN).unwrap();
+        let [uniform, middle, bottom] = &curves.bodies;
+        assert_eq!(uniform.len(), DEPTH_MM + 1);
+        assert!(r2(uniform, 60).unwrap() > 0.99, "figure 4.2");
+        assert!(r2(uniform, 120).unwrap() > 0.97);
+        // A deep hard layer is felt at once, not when the node comes to its depth; the nearer one more.
+        let first = [middle, bottom].map(|curve| slope_ratio(curve, uniform)[0]);
+        assert!(
+            first[0] > 1.3 && first[1] > 1.1 && first[0] > first[1],
+            "{first:?}"
+        );
+        // The uniform body bends about as much as the layered ones do: its knee is the method's own.
+        let row = curves.row(DEPTH_MM);
+        assert!(row.uniform_slope_change.unwrap() > 1.5);
+        // As in a first trial of the method: knees at 50 to 70 mm in either layered body.
+        for knee in [row.middle_knee_mm, row.bottom_knee_mm] {
+            assert!((50.0..70.0).contains(&knee.unwrap()), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_curve_that_ends_early_has_no_fit_beyond_its_end() {
+        let short: Curve = (0..=70).map(|i| [f64::from(i), f64::from(i)]).collect();
+        assert!(r2(&short, 60).is_some());
+        assert_eq!(r2(&short, 90), None);
+        assert_eq!(slopes(&short).len(), 7);
+    }
+}

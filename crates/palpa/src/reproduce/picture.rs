@@ -129,9 +129,9 @@ fn speed_chart(report: &Report) -> Chart {
     };
     Chart::new(Axis::log("nodes"), Axis::log("steps per second"))
         .title("Speed")
-        .subtitle("one step: assemble, factor, solve, correct; one core")
+        .subtitle("whole steps, one core; dotted: the haptic rate")
         .series(Series::new("ours", points(&|row| Some(row.steps_per_s))).with_markers())
         .series(Series::new("dense inverse", points(&|row| row.naive_steps_per_s)).with_markers())
         .series(Series::new("2009", points(&|row| row.thesis_steps_per_s)).with_markers())
-        .guide(Guide::y(1000.0, "haptic rate"))
+        .guide(Guide::y(1000.0, ""))
 }

@@ -97,7 +97,7 @@ fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f64, S
     let params = StepParams::default();
     let mut n_done = 0_usize;
     let mut one = || {
-        let way = if n_done / 20 % 2 == 0 {
+        let way = if (n_done / 20).is_multiple_of(2) {
             -1.0e-3
         } else {
             1.0e-3
