@@ -184,8 +184,10 @@ fn advance(
     free_residual: &mut f64,
     literal: &mut Vec3,
 ) -> Outcome {
-    let n = params.substeps.max(1);
-    let part = displacement / n as f64;
+    // A tool at rest moves nothing by finite elements: only the corrections go on.
+    let is_resting = displacement == Vec3::zeros() && params.method == Method::FiniteElements;
+    let n = if is_resting { 0 } else { params.substeps.max(1) };
+    let part = displacement / n.max(1) as f64;
     let mut n_fallbacks = 0;
     for _ in 0..n {
         match params.method {

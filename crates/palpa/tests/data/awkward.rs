@@ -11,8 +11,9 @@ const MEMORY_KIB: usize = 500_000;
 
 /// Exit code, and what must stand in the JSON report or, with code 2, in the error.
 ///
-/// The table was written from the README beside the data before the first run. Rows that came out other than guessed, because
-/// the file turned out to be sounder or worse when read properly, say so.
+/// What each file must give was decided from the README beside the data before the first run; the words that must stand
+/// in the report were put in from the first output. Rows that came out other than decided, because the file turned out to
+/// be sounder or worse when read properly, say so.
 const EXPECTED: [(&str, i32, &[&str]); 31] = [
     // Positions are ±inf: nothing can be known about the shape.
     ("assimp_BoxWithInfinites.glb", 1, &["not-finite"]),
