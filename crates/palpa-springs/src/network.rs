@@ -52,8 +52,11 @@ impl Network {
     ///
     /// # Errors
     /// If stiffnesses do not fit the layers or are not positive, or two joined nodes coincide.
+    ///
+    /// # Panics
+    /// If an interval of the body is of a layer without a name.
     pub fn from_body(body: &LayeredBody, params: &SpringParams) -> Result<Self, SpringError> {
-        let n_layers = body.interval_layer.iter().max().map_or(0, |l| l + 1);
+        let n_layers = body.layer_names.len();
         if params.layers.len() != n_layers {
             return Err(SpringError::LayerCount {
                 found: n_layers,

@@ -186,7 +186,11 @@ fn advance(
 ) -> Outcome {
     // A tool at rest moves nothing by finite elements: only the corrections go on.
     let is_resting = displacement == Vec3::zeros() && params.method == Method::FiniteElements;
-    let n = if is_resting { 0 } else { params.substeps.max(1) };
+    let n = if is_resting {
+        0
+    } else {
+        params.substeps.max(1)
+    };
     let part = displacement / n.max(1) as f64;
     let mut n_fallbacks = 0;
     for _ in 0..n {

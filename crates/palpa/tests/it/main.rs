@@ -6,6 +6,7 @@ mod check;
 mod cli;
 mod output;
 mod plot;
+mod press;
 mod section;
 mod vtu;
 
