@@ -17,6 +17,7 @@
 //! kept and the shear stiffness `C_44` gives way. Derivation and measured figures: `docs/theory/spring_stiffness.md`.
 
 use palpa_mesh::Vec3;
+use palpa_mesh::quality::prism_volume;
 
 /// The share of the in-level and of the vertical bars in `C_11` and `C_33` is not let fall below this, so that no bar
 /// is without stiffness.
@@ -68,19 +69,6 @@ pub(crate) fn prism_bar_stiffness(corners: &[Vec3; 6], modulus: f64) -> PrismBar
         vertical: [0, 1, 2].map(|s| share(w_vertical, 3.0, corners[s] - corners[s + 3])),
         diagonal: [0, 1, 2].map(|s| diagonal(s).map(|bar| share(w_diagonal, 6.0, bar))),
     }
-}
-
-/// Volume of a prism whose side faces may be warped: the mean of the two ways to cut it into tetrahedra that follow
-/// its corners round.
-fn prism_volume(corners: &[Vec3; 6]) -> f64 {
-    let tetrahedron = |[a, b, c, d]: [usize; 4]| {
-        let [a, b, c, d] = [corners[a], corners[b], corners[c], corners[d]];
-        (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
-    };
-    let one = [[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]];
-    let other = [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]];
-    let sum = |cut: [[usize; 4]; 3]| cut.into_iter().map(|t| tetrahedron(t).abs()).sum::<f64>();
-    0.5 * (sum(one) + sum(other))
 }
 
 #[cfg(test)]

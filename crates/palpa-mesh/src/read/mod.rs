@@ -156,7 +156,7 @@ impl std::fmt::Display for Place {
 #[non_exhaustive]
 pub enum ReadError {
     /// The file is not there or not readable.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}; check the path and its permissions", path.display())]
     Io {
         /// The file.
         path: PathBuf,

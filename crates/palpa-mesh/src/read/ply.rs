@@ -131,7 +131,7 @@ impl Header {
             let first = words.next().unwrap_or("");
             match (i, first) {
                 (0, "ply") | (_, "comment" | "obj_info" | "") => {}
-                (0, _) => return Err(fault("a PLY file starts with the word ply".to_owned())),
+                (0, _) => return Err(fault("a PLY file starts with the word ply; give a file of another format its own extension".to_owned())),
                 (_, "format") => {
                     encoding = Some(match words.next().unwrap_or("") {
                         "ascii" => Encoding::Ascii,

@@ -217,12 +217,23 @@ fn closed_limbs_grow_as_their_open_skins_do() {
 #[test]
 fn parts_without_bones_are_pressed_at_a_fixed_depth() {
     let Some(data) = crate::data() else { return };
-    for (name, skin) in [
-        ("thigh", "parts/thigh_3k.obj"),
-        ("upperarm", "parts/upperarm_2k.obj"),
-        ("abdomen", "parts/abdomen_3k.obj"),
+    for (name, skin, at) in [
+        ("thigh", "parts/thigh_3k.obj", None),
+        ("upperarm", "parts/upperarm_2k.obj", None),
+        // On the belly, beside the navel.
+        (
+            "abdomen",
+            "parts/abdomen_3k.obj",
+            Some(r#"["30 mm", "280 mm", "130 mm"]"#),
+        ),
     ] {
-        let report = Case { name, skin, ..PART }.press(&data);
+        let report = Case {
+            name,
+            skin,
+            at,
+            ..PART
+        }
+        .press(&data);
         assert_eq!(
             report["body"]["n_caps"], 2,
             "{name}: the cut faces are found"
