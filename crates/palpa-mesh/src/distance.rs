@@ -8,8 +8,10 @@ use crate::{Surface, Vec3};
 #[derive(Debug)]
 pub struct SurfaceIndex {
     tree: RTree<IndexedTriangle>,
-    /// Area-weighted normals of vertices: what decides the side when a vertex is closest.
+    /// Normals of vertices, weighted by the angles of the triangles: they decide the side where a vertex is closest.
     vertex_normals: Vec<Vec3>,
+    /// For each directed edge, ascending, the unit normal of its triangle; both of an edge decide the side beside it.
+    edge_normals: Vec<([u32; 2], Vec3)>,
 }
 
 /// The closest point of a surface.
@@ -56,9 +58,11 @@ impl SurfaceIndex {
             })
             .filter(|t| t.corners.iter().all(|p| p.iter().all(|x| x.is_finite())))
             .collect();
+        let (vertex_normals, edge_normals) = pseudo_normals(surface);
         Self {
             tree: RTree::bulk_load(triangles),
-            vertex_normals: surface.vertex_normals(),
+            vertex_normals,
+            edge_normals,
         }
     }
 
@@ -66,23 +70,7 @@ impl SurfaceIndex {
     pub fn closest(&self, p: Vec3) -> Option<Closest> {
         let triangle = self.tree.nearest_neighbor(p.into())?;
         let (point, weights) = closest_on_triangle(p, triangle.corners);
-        // At an edge or a vertex the face normal of one triangle may lie about the side; the vertex normals, mixed
-        // by the barycentric weights, do not.
-        let [a, b, c] = triangle.corners;
-        let face = (b - a)
-            .cross(&(c - a))
-            .try_normalize(0.0)
-            .unwrap_or_else(Vec3::zeros);
-        let is_inside_face = weights.iter().all(|&w| w > 1e-9);
-        let normal = if is_inside_face {
-            face
-        } else {
-            let mut sum = Vec3::zeros();
-            for (v, w) in triangle.vertices.iter().zip(weights) {
-                sum += self.vertex_normals[*v as usize] * w;
-            }
-            sum
-        };
+        let normal = self.pseudo_normal(triangle, weights);
         let offset = p - point;
         let distance = offset.norm();
         let signed_distance = if offset.dot(&normal) < 0.0 {
@@ -97,12 +85,31 @@ impl SurfaceIndex {
         })
     }
 
+    /// The vector whose sign against the offset tells the side: the normal of the face, the sum of both faces' normals
+    /// at an edge, the angle-weighted sum at a vertex (Bærentzen and Aanæs 2005).
+    fn pseudo_normal(&self, triangle: &IndexedTriangle, weights: [f64; 3]) -> Vec3 {
+        let on: Vec<usize> = (0..3).filter(|&i| weights[i] > 1e-9).collect();
+        match on[..] {
+            [i] => self.vertex_normals[triangle.vertices[i] as usize],
+            [i, j] => {
+                let (a, b) = (triangle.vertices[i], triangle.vertices[j]);
+                let of = |edge: [u32; 2]| {
+                    let at = self.edge_normals.partition_point(|(e, _)| *e < edge);
+                    self.edge_normals[at..]
+                        .iter()
+                        .take_while(|(e, _)| *e == edge)
+                        .map(|(_, n)| n)
+                        .sum::<Vec3>()
+                };
+                of([a, b]) + of([b, a])
+            }
+            _ => unit_normal(triangle.corners),
+        }
+    }
+
     /// The nearest meeting of the ray `origin + s direction` with the surface at `s > s_min`: `(s, triangle)`.
     pub fn ray(&self, origin: Vec3, direction: Vec3, s_min: f64) -> Option<(f64, u32)> {
-        let along = RaySelection {
-            origin,
-            inverse: direction.map(|x| 1.0 / x),
-        };
+        let along = RaySelection { origin, direction };
         self.tree
             .locate_with_selection_function(along)
             .filter_map(|t| Some((ray_triangle(origin, direction, t.corners)?, t.id)))
@@ -111,10 +118,38 @@ impl SurfaceIndex {
     }
 }
 
+/// Unit normal of a triangle; zero if it has no area.
+fn unit_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a)
+        .cross(&(c - a))
+        .try_normalize(0.0)
+        .unwrap_or_else(Vec3::zeros)
+}
+
+/// Angle-weighted vertex normals, and the normals at directed edges in ascending order.
+fn pseudo_normals(surface: &Surface) -> (Vec<Vec3>, Vec<([u32; 2], Vec3)>) {
+    let mut at_vertices = vec![Vec3::zeros(); surface.points.len()];
+    let mut at_edges = Vec::with_capacity(3 * surface.triangles.len());
+    for (t, triangle) in surface.triangles.iter().enumerate() {
+        let corners = surface.corners(t);
+        let normal = unit_normal(corners);
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let angle = (corners[j] - corners[i]).angle(&(corners[k] - corners[i]));
+            if angle.is_finite() {
+                at_vertices[triangle[i] as usize] += normal * angle;
+            }
+            at_edges.push(([triangle[i], triangle[j]], normal));
+        }
+    }
+    at_edges.sort_by_key(|(edge, _)| *edge);
+    (at_vertices, at_edges)
+}
+
 /// Visits the boxes that a ray passes.
 struct RaySelection {
     origin: Vec3,
-    inverse: Vec3,
+    direction: Vec3,
 }
 
 impl RaySelection {
@@ -122,13 +157,20 @@ impl RaySelection {
         let (lo, hi) = (envelope.lower(), envelope.upper());
         let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
         for i in 0..3 {
-            let a = (lo[i] - self.origin[i]) * self.inverse[i];
-            let b = (hi[i] - self.origin[i]) * self.inverse[i];
-            // `min`/`max` drop the NaN of a ray that runs inside a slab's face.
+            let (o, d) = (self.origin[i], self.direction[i]);
+            if d == 0.0 {
+                // Along the slab: 0/0 on its faces would hide what the ray runs in.
+                if o < lo[i] || o > hi[i] {
+                    return false;
+                }
+                continue;
+            }
+            let (a, b) = ((lo[i] - o) / d, (hi[i] - o) / d);
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        enter <= leave
+        // Rounding must not lose a box that the ray only grazes.
+        enter <= leave + 1e-12 * (1.0 + leave.abs())
     }
 }
 
@@ -198,4 +240,116 @@ fn ray_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f
     let q = s.cross(&e1);
     let v = direction.dot(&q) / det;
     (u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE).then(|| e2.dot(&q) / det)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::cylinder;
+
+    /// A closed box with a grid of `n` cells a side, from 0 to 1; rays along an axis meet its vertices and edges.
+    fn gridded_box(n: u32) -> Surface {
+        let mut surface = Surface::default();
+        for side in 0..6_usize {
+            let (axis, is_far) = (side / 2, side % 2 == 1);
+            let start = surface.points.len() as u32;
+            for i in 0..=n {
+                for j in 0..=n {
+                    let mut p = Vec3::zeros();
+                    p[axis] = f64::from(u8::from(is_far));
+                    p[(axis + 1) % 3] = f64::from(i) / f64::from(n);
+                    p[(axis + 2) % 3] = f64::from(j) / f64::from(n);
+                    surface.points.push(p);
+                }
+            }
+            for i in 0..n {
+                for j in 0..n {
+                    let [a, b] = [start + i * (n + 1) + j, start + (i + 1) * (n + 1) + j];
+                    let quad = if is_far {
+                        [[a, b, b + 1], [a, b + 1, a + 1]]
+                    } else {
+                        [[a, b + 1, b], [a, a + 1, b + 1]]
+                    };
+                    surface.triangles.extend(quad);
+                }
+            }
+        }
+        crate::weld_exact(&surface).surface
+    }
+
+    #[test]
+    fn rays_along_an_axis_meet_the_far_side_under_every_vertex() {
+        let index = SurfaceIndex::build(&gridded_box(4));
+        for i in 0..=4 {
+            for j in 0..=4 {
+                let [u, v] = [i, j].map(|k| f64::from(k) / 4.0);
+                for (origin, direction) in [
+                    (Vec3::new(u, v, 0.0), Vec3::z()),
+                    (Vec3::new(1.0, u, v), -Vec3::x()),
+                    (Vec3::new(u, 1.0, v), -Vec3::y()),
+                ] {
+                    let hit = index.ray(origin, direction, 1e-6);
+                    assert!(
+                        hit.is_some_and(|(s, _)| (s - 1.0).abs() < 1e-12),
+                        "{origin:?} {direction:?}: {hit:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rays_and_closest_points_agree_with_brute_force() {
+        let (_, bone) = cylinder(0.1, 0.04, 0.015, 8e-3);
+        let index = SurfaceIndex::build(&bone);
+        let mut seed = 7_u64;
+        let mut random = || {
+            seed = seed
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for _ in 0..500 {
+            let p = Vec3::new(0.05 + 0.15 * random(), 0.08 * random(), 0.08 * random());
+            let d = Vec3::new(random(), random(), random());
+            let all = || (0..bone.triangles.len()).map(|t| bone.corners(t));
+            let nearest = all()
+                .map(|c| (closest_on_triangle(p, c).0 - p).norm())
+                .fold(f64::INFINITY, f64::min);
+            let found = index.closest(p).unwrap();
+            assert!((found.signed_distance.abs() - nearest).abs() < 1e-15);
+            // The bone is a polygon of 20 sides and more in a circle of 15 mm.
+            let radial = p.yz().norm();
+            if p.x > 0.002 && p.x < 0.098 && (radial - 0.015).abs() > 4e-4 {
+                assert_eq!(
+                    found.signed_distance < 0.0,
+                    radial < 0.015,
+                    "{p:?}: {found:?}"
+                );
+            }
+            let first = all()
+                .filter_map(|c| ray_triangle(p, d, c))
+                .filter(|&s| s > 0.0)
+                .min_by(f64::total_cmp);
+            assert_eq!(index.ray(p, d, 0.0).map(|(s, _)| s), first);
+        }
+    }
+
+    #[test]
+    fn the_side_is_right_at_sharp_edges_and_corners() {
+        let index = SurfaceIndex::build(&gridded_box(3));
+        for (p, is_inside) in [
+            (Vec3::new(-0.1, -0.1, -0.1), false),
+            (Vec3::new(-0.2, -0.01, 0.5), false),
+            (Vec3::new(0.01, 0.02, 0.01), true),
+            (Vec3::new(1.3, 1.0, 1.0), false),
+            (Vec3::new(0.99, 0.999, 0.98), true),
+        ] {
+            assert_eq!(
+                index.closest(p).unwrap().signed_distance < 0.0,
+                is_inside,
+                "{p:?}"
+            );
+        }
+    }
 }

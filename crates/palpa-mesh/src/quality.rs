@@ -51,6 +51,13 @@ impl PrismShape {
                 min_jacobian = min_jacobian.min(jacobian(x, xi, eta, zeta));
             }
         }
+        // The minimum drops NaN: a corner that is not finite must not look fine.
+        if !x.iter().all(|p| p.iter().all(|c| c.is_finite())) {
+            return Self {
+                min_jacobian: f64::NAN,
+                scaled_jacobian: -1.0,
+            };
+        }
         // A right prism over a flat triangle can exceed 1 by rounding or by an obtuse corner elsewhere.
         Self {
             min_jacobian,
@@ -58,7 +65,7 @@ impl PrismShape {
         }
     }
 
-    /// Whether every determinant is positive.
+    /// Whether every determinant is positive (NaN is not).
     pub fn is_valid(&self) -> bool {
         self.min_jacobian > 0.0
     }
@@ -96,4 +103,47 @@ pub fn prism_volume(x: &[Vec3; 6]) -> f64 {
         })
         .sum();
     sum / 12.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn right_prism(height: f64) -> [Vec3; 6] {
+        let top = [
+            Vec3::zeros(),
+            Vec3::x(),
+            Vec3::new(0.5, 0.75_f64.sqrt(), 0.0),
+        ];
+        std::array::from_fn(|i| top[i % 3] - Vec3::z() * if i < 3 { 0.0 } else { height })
+    }
+
+    #[test]
+    fn a_right_prism_over_an_equilateral_triangle_is_perfect() {
+        for height in [0.01, 1.0, 30.0] {
+            let shape = PrismShape::of(&right_prism(height));
+            assert!(
+                (shape.scaled_jacobian - 1.0).abs() < 1e-12 && shape.is_valid(),
+                "{shape:?}"
+            );
+            let volume = 0.75_f64.sqrt() / 2.0 * height;
+            assert!((prism_volume(&right_prism(height)) / volume - 1.0).abs() < 1e-12);
+            assert!((shape.min_jacobian / (2.0 * volume) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn turned_over_flat_and_unknown_prisms_are_not_valid() {
+        let turned = PrismShape::of(&right_prism(-1.0));
+        assert!(!turned.is_valid() && turned.scaled_jacobian < -0.99);
+        assert!(!PrismShape::of(&right_prism(0.0)).is_valid());
+        let mut one_corner_through = right_prism(1.0);
+        one_corner_through[4].z = 0.1;
+        assert!(!PrismShape::of(&one_corner_through).is_valid());
+        for bad in [f64::NAN, f64::INFINITY] {
+            let mut x = right_prism(1.0);
+            x[2].y = bad;
+            assert!(!PrismShape::of(&x).is_valid(), "{bad}");
+        }
+    }
 }

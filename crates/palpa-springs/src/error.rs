@@ -75,6 +75,17 @@ pub enum SpringError {
         /// The node.
         node: usize,
     },
+    /// A dense solver on a system that only a sparse one bears.
+    #[error(
+        "{n_nodes} nodes are too many for a dense solver, whose step grows with their cube; up to {limit} are taken: \
+         use the sparse solver, or a coarser mesh"
+    )]
+    TooLargeForDense {
+        /// Nodes.
+        n_nodes: usize,
+        /// Most nodes.
+        limit: usize,
+    },
     /// No memory or index range for the factor.
     #[error(
         "a system of {n_dofs} unknowns is too large to factorise here; make the mesh coarser or cut out a part"

@@ -8,6 +8,9 @@ use crate::network::{Bar, Network};
 use crate::params::{Solver, SpringParams};
 use crate::system::Structure;
 
+/// Most nodes for a dense solver: two matrices of 3N × 3N take 144 MB, and a step of Gauss–Jordan some 20 s.
+const MAX_DENSE_NODES: usize = 1000;
+
 /// A network of bars under constraints, ready to be stepped.
 #[derive(Debug)]
 pub struct SpringModel {
@@ -55,6 +58,13 @@ impl SpringModel {
     ) -> Result<Self, SpringError> {
         network.check()?;
         let n_nodes = network.n_nodes();
+        if matches!(solver, Solver::Dense | Solver::HistoricalInverse) && n_nodes > MAX_DENSE_NODES
+        {
+            return Err(SpringError::TooLargeForDense {
+                n_nodes,
+                limit: MAX_DENSE_NODES,
+            });
+        }
         let freedoms = freedoms(n_nodes, constraints)?;
         let operated: Vec<usize> = (0..n_nodes)
             .filter(|&n| freedoms[n].role == Role::Operated)

@@ -121,8 +121,12 @@ pub struct StepReport {
     /// Force on the tool by the bars as they are stretched now, in their present directions. It equals `force` for small
     /// displacements; the difference is what the linear increments leave out. N
     pub bar_force: Vec3,
-    /// Largest force left on a free node by the last part that finite elements did, over the largest nodal force in it.
+    /// Largest force left on a free node by the last part that finite elements did, over the largest nodal force in it;
+    /// 0 if they did none.
     pub free_residual: f64,
+    /// Largest force on a free node that the path has not brought to equilibrium, over the largest nodal force, after the
+    /// corrections and whatever way the step went.
+    pub imbalance: f64,
     /// The force as (3.17), (3.18) give it to the letter: the reaction of this step's displacement *before* the free
     /// nodes moved, over the duration in ms. For comparison; never send it to a device. N/ms
     pub literal_force: Option<Vec3>,
@@ -171,6 +175,7 @@ pub fn step(
         force_increment: state.force - ws.saved.force,
         bar_force: bar_force(model, &state.positions),
         free_residual,
+        imbalance: residual_of_free_nodes(model, &state.node_forces),
         literal_force: params.literal_duration_ms.map(|dt| -literal / dt),
     }
 }

@@ -304,6 +304,42 @@ impl Scene {
     }
 }
 
+impl Press {
+    /// Checks the numbers against the ranges of the scene file, for a program that has set its own.
+    ///
+    /// # Errors
+    /// What is out of range, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        use crate::limits::{DEPTH, HOLD, SPEED};
+        use crate::units::{Length, Time, Velocity};
+        let [depth, step] = [self.depth, self.step].map(Length::from_si);
+        let (speed, hold) = (Velocity::from_si(self.speed), Time::from_si(self.hold));
+        if !DEPTH.contains(&depth) {
+            return Err(format!(
+                "a depth of {depth} is outside the allowed range {DEPTH}"
+            ));
+        }
+        if !SPEED.contains(&speed) {
+            return Err(format!(
+                "a speed of {speed} is outside the allowed range {SPEED}"
+            ));
+        }
+        if !HOLD.contains(&hold) {
+            return Err(format!(
+                "a hold of {hold} is outside the allowed range {HOLD}"
+            ));
+        }
+        let least = self.depth / crate::limits::MAX_STEPS;
+        if !(least..=self.depth).contains(&self.step) {
+            return Err(format!(
+                "a step of {step} does not fit a depth of {depth}; give {} to {depth}",
+                Length::from_si(least)
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// The embedded scene.
 impl Default for Scene {
     fn default() -> Self {

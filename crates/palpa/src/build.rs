@@ -21,6 +21,8 @@ pub struct BuiltBody {
     pub growth: Growth,
     /// Bone surfaces, in metres.
     pub bones: Vec<Surface>,
+    /// The skin vertex of the body that the scene presses on.
+    pub press_vertex: usize,
     /// What was done to the surfaces on the way and a user should know.
     pub notes: Vec<String>,
 }
@@ -34,75 +36,95 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     let (skin, bones) = match &scene.body.skin {
         Skin::File(path) => {
             let unit = scene.body.unit;
-            let skin = usable_surface(path, unit, &mut notes)?;
+            let skin = read_in_metres(path, unit, &mut notes)?;
             let bones = scene
                 .body
                 .bones
                 .iter()
-                .map(|path| usable_surface(path, unit, &mut notes))
-                .collect::<Result<Vec<_>, _>>()?;
+                .map(|path| {
+                    let bone = read_in_metres(path, unit, &mut notes)?;
+                    Ok(mended(&bone, path, &mut notes))
+                })
+                .collect::<anyhow::Result<Vec<_>>>()?;
             (skin, bones)
         }
         Skin::Generated(generator) => generated(*generator),
     };
+    // Numbers of vertices count in the surface as it was read, before anything is mended or cut away: from here on
+    // places go by position.
+    let press_at = point_of(&skin, &scene.press.target)?;
     let cut_out = match &scene.body.cutout {
-        Some(cutout) => Some((place_on(&skin, &cutout.at)?.1, cutout.radius)),
+        Some(cutout) => point_of(&skin, &cutout.at)?.map(|centre| (centre, cutout.radius)),
         None => None,
     };
+    let skin = match &scene.body.skin {
+        Skin::File(path) => mended(&skin, path, &mut notes),
+        Skin::Generated(_) => skin,
+    };
+    let cut_out = cut_out.map(|(centre, radius)| (skin.points[nearest(&skin, centre)], radius));
     let params = GrowthParams {
         layers: layer_specs(scene)?,
         cut_out,
     };
     let growth = grow(&skin, &bones, &params)?;
+    let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);
     }
     Ok(BuiltBody {
         growth,
         bones,
+        press_vertex,
         notes,
     })
 }
 
-/// The skin vertex that a target names, and its position. A vertex number counts in `skin`.
-///
-/// # Errors
-/// When the vertex is not there, or the point is far from the skin.
-pub fn place_on(skin: &Surface, target: &Target) -> anyhow::Result<(usize, Vec3)> {
-    let point = match target {
-        Target::Vertex(v) => {
-            let n = skin.points.len();
-            let Some(p) = skin.points.get(*v as usize) else {
-                bail!(
-                    "skin vertex {v} is not there: the skin has {n} vertices, numbered from 0 to {}",
-                    n - 1
-                );
-            };
-            return Ok((*v as usize, *p));
-        }
-        Target::Point(p) => Vec3::from(*p),
-        Target::Middle => area_centroid(skin),
-    };
-    let nearest = (0..skin.points.len())
-        .min_by(|&a, &b| {
-            (skin.points[a] - point)
-                .norm()
-                .total_cmp(&(skin.points[b] - point).norm())
-        })
-        .context("the skin has no vertices")?;
-    let distance = (skin.points[nearest] - point).norm();
+/// The point that a target names on the skin as it was read; `None` for the middle.
+fn point_of(skin: &Surface, target: &Target) -> anyhow::Result<Option<Vec3>> {
+    match target {
+        Target::Vertex(v) => match skin.points.get(*v as usize) {
+            Some(p) => Ok(Some(*p)),
+            None => bail!(
+                "skin vertex {v} is not there: the skin has {} vertices, numbered from 0",
+                skin.points.len()
+            ),
+        },
+        Target::Point(p) => Ok(Some(Vec3::from(*p))),
+        Target::Middle => Ok(None),
+    }
+}
+
+/// The vertex of the body's skin at a place, refused where the place is not on the skin.
+fn vertex_at(skin: &Surface, at: Option<Vec3>, target: &Target) -> anyhow::Result<usize> {
+    let point = at.unwrap_or_else(|| area_centroid(skin));
+    let vertex = nearest(skin, point);
+    let distance = (skin.points[vertex] - point).norm();
     let (lo, hi) = skin.bounds().unwrap_or_default();
-    if matches!(target, Target::Point(_)) && distance > FAR_FROM_SKIN * (hi - lo).norm() {
-        bail!(
+    let size = (hi - lo).norm();
+    match target {
+        // Welding moves a vertex by less than this.
+        Target::Vertex(v) if distance > 1e-5 * size => bail!(
+            "skin vertex {v} at ({}) mm is not part of the grown skin: it lies on a flat cut face or outside the \
+             cut-out; press another vertex",
+            in_mm(point)
+        ),
+        Target::Point(_) if distance > FAR_FROM_SKIN * size => bail!(
             "the point ({}) mm is {:.1} mm away from the skin, which reaches from ({}) to ({}) mm; check the point, \
              its unit and its frame",
             in_mm(point),
             distance * 1e3,
             in_mm(lo),
             in_mm(hi),
-        );
+        ),
+        _ => Ok(vertex),
     }
-    Ok((nearest, skin.points[nearest]))
+}
+
+fn nearest(skin: &Surface, point: Vec3) -> usize {
+    let distance = |v: usize| (skin.points[v] - point).norm_squared();
+    (0..skin.points.len())
+        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(0)
 }
 
 /// A point in millimetres, for messages.
@@ -121,22 +143,22 @@ fn area_centroid(surface: &Surface) -> Vec3 {
     if area > 0.0 { sum / area } else { sum }
 }
 
-/// Reads a surface and repairs what is safe to repair; refuses what is not fit.
-fn usable_surface(
+/// Reads a surface; refuses one with a coordinate that is no number.
+fn read_in_metres(
     path: &Path,
     unit: LengthUnit,
     notes: &mut Vec<String>,
 ) -> anyhow::Result<Surface> {
     let file = read_surface(path)?;
-    let name = path
-        .file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy();
-    let mut surface = file.surface;
-    if unit != LengthUnit::M {
-        surface.points.iter_mut().for_each(|p| *p *= unit.metres());
-    }
-    notes.extend(file.notes.iter().map(|note| format!("{name}: {note}")));
+    notes.extend(
+        file.notes
+            .iter()
+            .map(|note| format!("{}: {note}", file_name(path))),
+    );
+    let surface = match unit {
+        LengthUnit::M => file.surface,
+        unit => file.surface.scaled(unit.metres()),
+    };
     if let Some(v) = surface
         .points
         .iter()
@@ -147,14 +169,26 @@ fn usable_surface(
             path.display()
         );
     }
-    let (mended, report) = repair(&surface, &RepairOptions::default());
+    Ok(surface)
+}
+
+/// The surface with what is safe to repair repaired.
+fn mended(surface: &Surface, path: &Path, notes: &mut Vec<String>) -> Surface {
+    let (mended, report) = repair(surface, &RepairOptions::default());
     if report.is_changed() {
         notes.push(format!(
-            "{name}: repaired on the way in: {}",
+            "{}: repaired on the way in: {}",
+            file_name(path),
             repairs(&report)
         ));
     }
-    Ok(mended)
+    mended
+}
+
+fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
 }
 
 fn repairs(report: &RepairReport) -> String {
@@ -198,6 +232,7 @@ fn generated(generator: Generator) -> (Surface, Vec<Surface>) {
 fn layer_specs(scene: &Scene) -> anyhow::Result<Vec<LayerSpec>> {
     let mut specs = Vec::new();
     let mut above = 0.0;
+    let is_block = matches!(scene.body.skin, Skin::Generated(Generator::Block { .. }));
     for layer in &scene.layers {
         let thickness = match &layer.thickness {
             Some(thickness) => Some(thickness_field(thickness, scene.body.unit)?),
@@ -209,8 +244,17 @@ fn layer_specs(scene: &Scene) -> anyhow::Result<Vec<LayerSpec>> {
                 _ => None,
             },
         };
-        if let Some(ThicknessField::Constant(d)) = &thickness {
-            above += d;
+        match &thickness {
+            Some(ThicknessField::Constant(d)) => above += d,
+            // The rest of a block is known only where the layers above are the same everywhere.
+            Some(_) if is_block && scene.layers.last().is_some_and(|l| l.thickness.is_none()) => {
+                bail!(
+                    "layer \"{}\" of a block varies in thickness, so the last layer cannot take the rest of the depth; \
+                 give the last layer a thickness",
+                    layer.tissue.name
+                )
+            }
+            _ => {}
         }
         specs.push(LayerSpec {
             name: layer.tissue.name.clone(),

@@ -11,7 +11,7 @@ use palpa_springs::{
 use palpa_tissue::{CutFaces, InPlane, Law, Scene, Tool};
 use serde::Serialize;
 
-use crate::build::{BuiltBody, in_mm, place_on};
+use crate::build::{BuiltBody, in_mm};
 
 /// Edges within this many tool radii of the press point make the mesh size near the tool.
 const NEAR_TOOL: f64 = 2.0;
@@ -76,12 +76,16 @@ pub struct Sample {
     pub force_z_n: f64,
     /// Pushing back by the bars as they are stretched now; its difference to `force_n` is what the increments leave out.
     pub bar_force_n: f64,
-    /// Force left on free nodes, relative.
-    pub free_residual: f64,
+    /// (3.18) to the letter, along the direction: the reaction before the free nodes moved over the step's duration. It
+    /// depends on the step; for comparison only, never sent to a device. N/ms
+    pub literal_n_per_ms: f64,
+    /// Largest force on a free node that is not in equilibrium, over the largest nodal force.
+    pub imbalance: f64,
     /// Prisms that are turned over: bars have no volume and do not prevent it. From the first one on the force is that
     /// of the bars alone, no longer of a body.
     pub n_inverted: usize,
-    /// `converged`, `euler_fallback` or `diverged`.
+    /// `converged`, `euler_fallback` (a singular step was done by explicit Euler) or `diverged`: then the state is the one
+    /// before, the forces are those of the sample before, and the run ends.
     pub outcome: &'static str,
 }
 
@@ -95,6 +99,7 @@ pub struct Run<'a> {
     workspace: Workspace,
     next: usize,
     depth: f64,
+    time: f64,
 }
 
 impl Indentation {
@@ -105,7 +110,8 @@ impl Indentation {
     pub fn build(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
         let body = &built.growth.body;
         let mut notes = Vec::new();
-        let (vertex, at) = place_on(&body.skin, &scene.press.target)?;
+        let vertex = built.press_vertex;
+        let at = body.skin.points[vertex];
         let direction = match scene.press.direction {
             Some(d) => Unit::try_new(Vec3::from(d), f64::MIN_POSITIVE),
             None => Unit::try_new(-body.skin.vertex_normals()[vertex], f64::MIN_POSITIVE),
@@ -192,6 +198,7 @@ impl Indentation {
             workspace: Workspace::new(&self.model),
             next: 0,
             depth: 0.0,
+            time: 0.0,
         }
     }
 }
@@ -208,6 +215,17 @@ impl Run<'_> {
         } = self.indentation;
         let waypoint = *path.get(self.next)?;
         let displacement = direction.into_inner() * (waypoint.depth - self.depth);
+        // Springs do not relax with time: at rest nothing happens, whatever the number of samples.
+        let corrections = match waypoint.phase {
+            Phase::Hold => Corrections::OFF,
+            Phase::Load | Phase::Retract => params.corrections,
+        };
+        let duration_ms = (waypoint.time - self.time) * 1e3;
+        let params = &StepParams {
+            corrections,
+            literal_duration_ms: Some(duration_ms).filter(|&d| d > 0.0),
+            ..*params
+        };
         let report = step(
             model,
             &mut self.state,
@@ -225,7 +243,7 @@ impl Run<'_> {
         } else {
             self.next + 1
         };
-        self.depth = waypoint.depth;
+        (self.depth, self.time) = (waypoint.depth, waypoint.time);
         let shapes = prism_shapes(self.body, &self.state.positions);
         Some(Sample {
             phase: waypoint.phase,
@@ -237,7 +255,8 @@ impl Run<'_> {
             force_y_n: report.force.y,
             force_z_n: report.force.z,
             bar_force_n: -report.bar_force.dot(direction),
-            free_residual: report.free_residual,
+            literal_n_per_ms: -report.literal_force.map_or(0.0, |f| f.dot(direction)) + 0.0,
+            imbalance: report.imbalance,
             n_inverted: shapes.iter().filter(|s| !s.is_valid()).count(),
             outcome,
         })

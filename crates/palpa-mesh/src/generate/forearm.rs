@@ -85,7 +85,7 @@ fn skin_point(x: f64, angle: f64) -> Vec3 {
 }
 
 fn bone(rows: &Bone, scale: f64) -> Surface {
-    const SPACING: f64 = 0.0035;
+    const SPACING: f64 = 0.004;
     let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
     let (n_rings, n_around) = resolution(last - first, TAU * 0.008, SPACING);
     tube(n_rings, n_around, Ends::Closed, |along, angle| {

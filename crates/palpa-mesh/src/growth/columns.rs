@@ -12,6 +12,8 @@ const END_SHARE: f64 = 2e-3;
 /// A column that has gone this many times its room without meeting the core ends there.
 const MAX_DETOUR: f64 = 3.0;
 const MAX_STEPS: usize = 200;
+/// With less room than this there is none, and a column has just a direction. m
+const NO_ROOM: f64 = 1e-5;
 
 /// A line inward from a skin vertex, as points at growing arc length.
 #[derive(Debug, Clone)]
@@ -74,14 +76,14 @@ impl Confinement {
 
     /// `direction` without its part across the cut faces of vertex `v`.
     pub(super) fn project(&self, v: usize, direction: Vec3) -> Vec3 {
-        match self.normals[v][..] {
-            [] => direction,
-            [a, b] if a.cross(&b).norm() > 1e-6 => {
-                let common = a.cross(&b).normalize();
-                common * common.dot(&direction)
-            }
-            [a, ..] => direction - a * a.dot(&direction),
+        let mut taken: Vec<Vec3> = Vec::new();
+        for normal in &self.normals[v] {
+            let rest = taken
+                .iter()
+                .fold(*normal, |rest, t| rest - t * t.dot(&rest));
+            taken.extend(rest.try_normalize(1e-6));
         }
+        taken.iter().fold(direction, |d, t| d - t * t.dot(&d))
     }
 
     /// The same, as a unit vector where anything is left.
@@ -225,7 +227,9 @@ pub(super) fn column_to_core(
 ) -> Column {
     let mut column = Column::starting_at(start);
     let room = core.distance(start);
-    if room <= 0.0 {
+    if room < NO_ROOM {
+        // The skin touches the core: straight on, for the layers' floors.
+        column.push(start + direction * NO_ROOM);
         return column;
     }
     let heading = |x: Vec3, s: f64| {

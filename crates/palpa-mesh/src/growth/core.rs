@@ -2,7 +2,7 @@
 //!
 //! A limb's skin is a tube, its bones may be two. So that the tube can be shrunk onto them without tearing, bones that
 //! lie side by side are joined by a *membrane*: a thin strip between their centre lines (which is where the
-//! interosseous membrane of forearm and leg is). Columns follow the steepest descent of a smoothed distance
+//! interosseous membrane of forearm and leg is). Columns follow the steepest ascent of a potential
 //!
 //! ```text
 //! ψ(x) = Σ_j A_j / (|x − y_j|² + ε²)
@@ -26,13 +26,17 @@ use crate::{CutFace, Surface, SurfaceIndex, Vec3};
 const MEMBRANE_HALF_THICKNESS: f64 = 0.6;
 /// How much stronger than bone the membrane draws columns, so that they do not all part to the two bones.
 const MEMBRANE_WEIGHT: f64 = 4.0;
-/// Slices of this share of the body's length carry one point of each bone's centre line.
+/// Width over which the crease between bone and membrane is rounded, as a share of the half thickness. On the far side of
+/// a bone, whose centre the membrane ends in, the two distances differ by (1 − 0.6) radii: less than that, and the
+/// rounding takes no room there, where the skin is nearest.
+const FILLET: f64 = 0.6;
+/// Slices of this share of the bones' length carry one point of each bone's centre line.
 const N_SLICES: usize = 48;
 /// Bones further apart than this many times the smaller one's radius are not joined.
 const MEMBRANE_REACH: f64 = 8.0;
-/// Where a bone ends this share of the body's length before a cut face, the membrane goes on to the face.
+/// Where a bone ends this share of the bones' length before a cut face, the membrane goes on to the face.
 const MEMBRANE_OVERHANG: f64 = 0.15;
-/// Sources nearer to a cut face than this share of the body's length are mirrored at it.
+/// Sources nearer to a cut face than this share of the bones' length are mirrored at it.
 const MIRROR_REACH: f64 = 0.35;
 
 /// Bones and what joins them, as columns see it.
@@ -55,8 +59,16 @@ struct Source {
 }
 
 impl RigidCore {
-    /// Prepares bones for a body with the given cut faces and size (its longest extent).
-    pub(super) fn build(bones: &[Surface], cuts: &[CutFace], size: f64) -> Self {
+    /// Prepares bones for a body with the given cut faces. Everything is scaled by the bones, not by the body, so that a
+    /// cut-out has the core of the whole.
+    pub(super) fn build(bones: &[Surface], cuts: &[CutFace]) -> Self {
+        let size = bones.iter().map(super::extent).fold(0.0, f64::max);
+        // A slice must hold a ring of either bone.
+        let ring = bones
+            .iter()
+            .map(Surface::mean_edge_length)
+            .fold(0.0, f64::max);
+        let pitch = (size / N_SLICES as f64).max(1.2 * ring);
         let spacing = size / 70.0;
         let mut sources = Vec::new();
         for bone in bones {
@@ -69,7 +81,7 @@ impl RigidCore {
                 &bones[a],
                 &bones[b],
                 axis,
-                size / N_SLICES as f64,
+                pitch,
                 cuts,
                 MEMBRANE_OVERHANG * size,
             ) {
@@ -102,7 +114,7 @@ impl RigidCore {
                 return d;
             };
             let to_membrane = (x - closest.point).norm() - m.half_thickness;
-            smooth_min(d, to_membrane, 2.0 * m.half_thickness)
+            smooth_min(d, to_membrane, FILLET * m.half_thickness)
         })
     }
 
@@ -125,7 +137,7 @@ impl RigidCore {
             .map_or(x, |c| c.point)
     }
 
-    /// The unit direction of steepest descent of the smoothed distance; zero where there is none.
+    /// The unit direction of steepest ascent of the potential; zero where there is none.
     pub(super) fn direction(&self, x: Vec3) -> Vec3 {
         let mut sum = Vec3::zeros();
         for s in &self.sources {
@@ -137,26 +149,33 @@ impl RigidCore {
     }
 }
 
-/// Refuses bones that come through the skin (beyond the cut faces they may).
-pub(super) fn check_inside(
-    bones: &[Surface],
-    skin: &SurfaceIndex,
-    cuts: &[CutFace],
-    size: f64,
-) -> Result<(), GrowthError> {
+/// Refuses bones that come through the skin (beyond its open ends they may). `skin` is the whole skin, before anything
+/// is cut out of it.
+pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), GrowthError> {
+    let index = SurfaceIndex::build(skin);
+    let ends = super::cut::find_cut_faces(skin);
+    let near_end = 0.02 * super::extent(skin);
+    let mut is_rim = vec![false; skin.points.len()];
+    for v in skin.boundary_loops().into_iter().flatten() {
+        is_rim[v as usize] = true;
+    }
     let mut worst: Option<(f64, usize, Vec3)> = None;
     for (id, bone) in bones.iter().enumerate() {
         for &p in &bone.points {
-            // Near the cut the closest point may lie on the rim, where the side is not defined.
-            if cuts
+            // Beyond an end, and where the closest point lies at a rim, there is no side.
+            let is_beyond = |c: &CutFace| c.is_flat && (p - c.point).dot(&c.normal) > -near_end;
+            if ends.iter().any(is_beyond) {
+                continue;
+            }
+            let Some(closest) = index.closest(p) else {
+                continue;
+            };
+            if skin.triangles[closest.triangle as usize]
                 .iter()
-                .any(|c| (p - c.point).dot(&c.normal) > -0.02 * size)
+                .any(|&v| is_rim[v as usize])
             {
                 continue;
             }
-            let Some(closest) = skin.closest(p) else {
-                continue;
-            };
             if closest.signed_distance > worst.map_or(0.0, |w| w.0) {
                 worst = Some((closest.signed_distance, id, p));
             }
@@ -178,8 +197,24 @@ fn smooth_min(a: f64, b: f64, k: f64) -> f64 {
     a.min(b) - h * h * k * 0.25
 }
 
-/// A surface as points with areas, gathered in cells of the given size (deterministic: cells in order).
+/// A surface as points with areas: its triangles, gathered in cells of the given size where they are many
+/// (deterministic: cells in order).
 fn thinned_sources(surface: &Surface, cell: f64) -> Vec<Source> {
+    /// Cells make the field of a round bone a little uneven; up to so many triangles are taken one by one.
+    const FEW: usize = 2000;
+    if surface.triangles.len() <= FEW {
+        let source = |t: usize| {
+            let [a, b, c] = surface.corners(t);
+            Source {
+                point: (a + b + c) / 3.0,
+                area: surface.area_vector(t).norm(),
+            }
+        };
+        return (0..surface.triangles.len())
+            .map(source)
+            .filter(|s| s.area > 0.0)
+            .collect();
+    }
     let mut cells: BTreeMap<[i64; 3], (Vec3, f64)> = BTreeMap::new();
     for t in 0..surface.triangles.len() {
         let [a, b, c] = surface.corners(t);
@@ -271,11 +306,12 @@ struct SliceOfBone {
     radius: f64,
 }
 
-fn slices(bone: &Surface, axis: Vec3, pitch: f64) -> BTreeMap<i64, SliceOfBone> {
+/// Slices along the axis from `start` on.
+fn slices(bone: &Surface, axis: Vec3, start: f64, pitch: f64) -> BTreeMap<i64, SliceOfBone> {
     let mut members: BTreeMap<i64, Vec<Vec3>> = BTreeMap::new();
     for p in &bone.points {
         members
-            .entry((p.dot(&axis) / pitch).floor() as i64)
+            .entry(((p.dot(&axis) - start) / pitch).floor() as i64)
             .or_default()
             .push(*p);
     }
@@ -285,7 +321,7 @@ fn slices(bone: &Surface, axis: Vec3, pitch: f64) -> BTreeMap<i64, SliceOfBone> 
         .map(|(slice, points)| {
             let n = points.len() as f64;
             let mut centre = points.iter().sum::<Vec3>() / n;
-            centre += axis * ((slice as f64 + 0.5) * pitch - centre.dot(&axis));
+            centre += axis * (start + (slice as f64 + 0.5) * pitch - centre.dot(&axis));
             let off_axis = |p: &Vec3| {
                 let r = p - centre;
                 (r - axis * r.dot(&axis)).norm()
@@ -306,7 +342,13 @@ fn membrane(
     reach: f64,
 ) -> Option<(Surface, f64)> {
     const ACROSS: usize = 8;
-    let (slices_a, slices_b) = (slices(a, axis, pitch), slices(b, axis, pitch));
+    let start = a
+        .points
+        .iter()
+        .chain(&b.points)
+        .map(|p| p.dot(&axis))
+        .fold(f64::INFINITY, f64::min);
+    let (slices_a, slices_b) = (slices(a, axis, start, pitch), slices(b, axis, start, pitch));
     let mut rows: Vec<(i64, Vec3, Vec3)> = Vec::new();
     let (mut radius_sum, mut n) = (0.0, 0.0);
     for (slice, sa) in &slices_a {

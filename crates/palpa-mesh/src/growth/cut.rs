@@ -102,24 +102,31 @@ fn flood(seed: usize, neighbours: &[Vec<usize>], mark: &mut [usize]) -> Vec<usiz
     members
 }
 
-/// The surface without the triangles for which `is_dropped`, and without the vertices that only those used.
+/// The surface without the triangles for which `is_dropped`, and without the vertices that only those used. Vertices
+/// keep their order.
 pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) -> bool) -> Surface {
-    let mut index = vec![u32::MAX; surface.points.len()];
-    let mut kept = Surface::default();
-    for (t, triangle) in surface.triangles.iter().enumerate() {
-        if is_dropped(t) {
-            continue;
-        }
-        kept.triangles.push(triangle.map(|v| {
-            let new = &mut index[v as usize];
-            if *new == u32::MAX {
-                *new = kept.points.len() as u32;
-                kept.points.push(surface.points[v as usize]);
-            }
-            *new
-        }));
+    let kept: Vec<[u32; 3]> = surface
+        .triangles
+        .iter()
+        .enumerate()
+        .filter(|(t, _)| !is_dropped(*t))
+        .map(|(_, t)| *t)
+        .collect();
+    let mut is_used = vec![false; surface.points.len()];
+    for &v in kept.iter().flatten() {
+        is_used[v as usize] = true;
     }
-    kept
+    let mut index = vec![0; surface.points.len()];
+    let mut points = Vec::new();
+    for v in (0..is_used.len()).filter(|&v| is_used[v]) {
+        index[v] = points.len() as u32;
+        points.push(surface.points[v]);
+    }
+    let triangles = kept
+        .into_iter()
+        .map(|t| t.map(|v| index[v as usize]))
+        .collect();
+    Surface { points, triangles }
 }
 
 /// The part of a surface within `radius` of `centre`, connected with the vertex nearest to it; ragged teeth and
@@ -143,7 +150,7 @@ pub(super) fn cut_out(surface: &Surface, centre: Vec3, radius: f64) -> Surface {
     }
 }
 
-/// Drops triangles that hang on one edge only, and the smaller fans at vertices shared by separate fans.
+/// Drops triangles that hang on one edge only, and those at vertices at which separate fans meet.
 fn trim_teeth(surface: &Surface) -> Surface {
     let pairs = triangle_pairs(surface);
     let mut n_neighbours = vec![0; surface.triangles.len()];
@@ -273,7 +280,11 @@ fn side_face(skin: &Surface, normals: &[Vec3], side: &[u32]) -> CutFace {
         .windows(2)
         .map(|e| (p(e[1]) - p(e[0])).cross(&(normals[e[0] as usize] + normals[e[1] as usize])))
         .sum();
-    let normal = outward.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    let length: f64 = side.windows(2).map(|e| (p(e[1]) - p(e[0])).norm()).sum();
+    // All round a flat patch the parts cancel: no direction, rather than that of the rounding errors.
+    let normal = outward
+        .try_normalize(1e-6 * length)
+        .unwrap_or_else(Vec3::zeros);
     let point = side.iter().map(|&v| p(v)).sum::<Vec3>() / side.len() as f64;
     let extent = side
         .iter()

@@ -29,6 +29,9 @@ use core::RigidCore;
 /// in proportion. Without it the last layer would be squeezed to nothing before the others give way.
 const LEAST_FILL_SHARE: f64 = 0.2;
 
+/// Larger bodies are refused: their bars and factors would not fit into memory. nodes
+const MAX_NODES: usize = 2_000_000;
+
 /// What one layer asks for.
 #[derive(Debug, Clone)]
 pub struct LayerSpec {
@@ -71,7 +74,7 @@ pub struct Growth {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GrowthError {
-    /// The surface has no triangles, or none is left after cutting.
+    /// The surface has no triangles.
     #[error("{what} has no triangles; give a skin surface with faces")]
     Empty {
         /// Which surface.
@@ -117,6 +120,23 @@ pub enum GrowthError {
         /// The most room there is. m
         room: f64,
     },
+    /// More nodes than can be handled.
+    #[error(
+        "{n_vertices} skin vertices with {n_levels} levels are {} nodes, more than the {MAX_NODES} that are handled; \
+         take a coarser skin, fewer levels, or cut out a part with cutout_radius", n_vertices * n_levels
+    )]
+    TooLarge {
+        /// Skin vertices.
+        n_vertices: usize,
+        /// Nodes per column.
+        n_levels: usize,
+    },
+    /// Nothing of the skin is left in a cut-out.
+    #[error("no skin triangle lies whole within {:.1} mm of the cut-out's centre; choose a larger cutout_radius", radius * 1e3)]
+    EmptyCutOut {
+        /// The radius. m
+        radius: f64,
+    },
     /// Prisms stayed turned over whatever was tried.
     #[error(
         "{n_bad} of {n_prisms} prisms cannot be given a positive volume; the worst is in layer \"{layer}\" under \
@@ -159,20 +179,25 @@ pub fn grow(
     let mut is_cap = vec![false; surface.triangles.len()];
     caps.iter().flatten().for_each(|&t| is_cap[t] = true);
     let mut skin = cut::without_triangles(surface, |t| is_cap[t]);
+    let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
+    if reaches_bone {
+        core::check_inside(bones, &skin)?;
+    }
     if let Some((centre, radius)) = params.cut_out {
         skin = cut::cut_out(&skin, centre, radius);
         if skin.triangles.is_empty() {
-            return Err(GrowthError::Empty {
-                what: format!(
-                    "the skin within {:.1} mm of the cut-out's centre",
-                    radius * 1e3
-                ),
-            });
+            return Err(GrowthError::EmptyCutOut { radius });
         }
     }
+    let n_levels = 1 + params.layers.iter().map(|l| l.n_levels).sum::<usize>();
+    if skin.points.len().saturating_mul(n_levels) > MAX_NODES {
+        return Err(GrowthError::TooLarge {
+            n_vertices: skin.points.len(),
+            n_levels,
+        });
+    }
     let cuts = cut::find_cut_faces(&skin);
-    let (lo, hi) = skin.bounds().unwrap_or_default();
-    let size = (hi - lo).max();
+    let size = extent(&skin);
 
     let rings = columns::one_rings(&skin);
     let confinement = Confinement::new(skin.points.len(), &cuts);
@@ -186,7 +211,6 @@ pub fn grow(
             .sum()
     };
     check_thickness(&skin, &params.layers)?;
-    let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
     let mean_depth =
         (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
     let smoothing = if reaches_bone {
@@ -197,8 +221,7 @@ pub fn grow(
     let directions = columns::inward_directions(&skin, &rings, &confinement, smoothing);
 
     let (lines, core): (Vec<Column>, Option<RigidCore>) = if reaches_bone {
-        let core = RigidCore::build(bones, &cuts, size);
-        core::check_inside(bones, &skin_index, &cuts, size)?;
+        let core = RigidCore::build(bones, &cuts);
         let lines = (0..skin.points.len())
             .map(|v| columns::column_to_core(v, skin.points[v], directions[v], &core, &confinement))
             .collect();
@@ -211,7 +234,6 @@ pub fn grow(
     };
     check_room(&skin, &params.layers, &lines)?;
 
-    let n_levels = 1 + params.layers.iter().map(|l| l.n_levels).sum::<usize>();
     let mut body = LayeredBody {
         positions: vec![Vec3::zeros(); skin.points.len() * n_levels],
         skin,
@@ -247,30 +269,82 @@ fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
     layer.min_thickness.max(LEAST_FILL_SHARE * fixed)
 }
 
-/// Where the levels of one column lie: arc lengths of its nodes, and the factor by which its layers were thinned.
+/// Where the levels of one column lie: arc lengths of its nodes, and by which factor its most thinned layer was thinned.
 fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<f64>) -> f64 {
     let fixed: f64 = layers
         .iter()
         .filter_map(|l| l.thickness.as_ref())
         .map(|t| t.at(skin_point))
         .sum();
-    let nominal = |l: &LayerSpec| match &l.thickness {
-        Some(t) => t.at(skin_point),
-        None => least_fill(l, fixed).max(room - fixed),
-    };
-    let asked: f64 = layers.iter().map(nominal).sum();
-    let factor = if asked > room { room / asked } else { 1.0 };
+    let nominal: Vec<f64> = layers
+        .iter()
+        .map(|l| match &l.thickness {
+            Some(t) => t.at(skin_point),
+            None => least_fill(l, fixed).max(room - fixed),
+        })
+        .collect();
+    let floors: Vec<f64> = layers
+        .iter()
+        .zip(&nominal)
+        .map(|(l, d)| l.min_thickness.min(*d))
+        .collect();
+    let thickness = thinned(&nominal, &floors, room);
     arcs.clear();
     arcs.push(0.0);
     let mut s = 0.0;
-    for layer in layers {
-        let thickness = (nominal(layer) * factor).max(layer.min_thickness.min(nominal(layer)));
+    for (layer, d) in layers.iter().zip(&thickness) {
         for i in 1..=layer.n_levels {
-            arcs.push(s + thickness * i as f64 / layer.n_levels as f64);
+            arcs.push(s + d * i as f64 / layer.n_levels as f64);
         }
-        s += thickness;
+        s += d;
     }
-    factor
+    thickness
+        .iter()
+        .zip(&nominal)
+        .map(|(d, n)| d / n)
+        .fold(1.0, f64::min)
+}
+
+/// Thicknesses that fit into `room`: all in proportion to `nominal`, none below its floor, so that what the layers at
+/// their floors keep is taken from the others. If the floors alone are too thick, the floors.
+fn thinned(nominal: &[f64], floors: &[f64], room: f64) -> Vec<f64> {
+    let mut is_at_floor = vec![false; nominal.len()];
+    loop {
+        let kept: f64 = (0..nominal.len())
+            .filter(|&i| is_at_floor[i])
+            .map(|i| floors[i])
+            .sum();
+        let asked: f64 = (0..nominal.len())
+            .filter(|&i| !is_at_floor[i])
+            .map(|i| nominal[i])
+            .sum();
+        let factor = if asked > 0.0 {
+            ((room - kept) / asked).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let thickness = |i: usize| {
+            if is_at_floor[i] {
+                floors[i]
+            } else {
+                nominal[i] * factor
+            }
+        };
+        let Some(below) = (0..nominal.len()).find(|&i| thickness(i) < floors[i]) else {
+            return (0..nominal.len()).map(thickness).collect();
+        };
+        is_at_floor[below] = true;
+    }
+}
+
+/// Size of a surface, the same however it lies: twice the largest distance from its mean point. m
+fn extent(surface: &Surface) -> f64 {
+    let centre = surface.points.iter().sum::<Vec3>() / surface.points.len().max(1) as f64;
+    2.0 * surface
+        .points
+        .iter()
+        .map(|p| (p - centre).norm())
+        .fold(0.0, f64::max)
 }
 
 fn check_layers(layers: &[LayerSpec], bones: &[Surface]) -> Result<(), GrowthError> {
@@ -400,5 +474,30 @@ fn check_room(skin: &Surface, layers: &[LayerSpec], lines: &[Column]) -> Result<
             room: lines[v].length(),
         }),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::thinned;
+
+    #[test]
+    fn layers_thin_in_proportion_down_to_their_floors() {
+        let close = |got: Vec<f64>, want: [f64; 3]| {
+            assert!(
+                got.iter().zip(want).all(|(g, w)| (g - w).abs() < 1e-12),
+                "{got:?}, not {want:?}"
+            );
+        };
+        let (nominal, floors) = ([1.5, 4.0, 1.1], [0.3, 0.8, 0.5]);
+        close(thinned(&nominal, &floors, 9.0), nominal);
+        close(thinned(&nominal, &floors, 3.3), [0.75, 2.0, 0.55]);
+        // The last layer stays at its floor, the others share what is left: 1.7 of 5.5.
+        close(
+            thinned(&nominal, &floors, 2.2),
+            [1.5 * 1.7 / 5.5, 4.0 * 1.7 / 5.5, 0.5],
+        );
+        close(thinned(&nominal, &floors, 1.6), floors);
+        close(thinned(&nominal, &floors, 0.1), floors);
     }
 }

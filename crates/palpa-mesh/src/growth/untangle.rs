@@ -151,7 +151,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Moves the nodes of poor prisms, one by one, where that makes the worst prism around the node better; never where
-    /// it makes it worse. Skin nodes stay; base nodes stay out of the bones; nodes of flat cut faces stay in them.
+    /// it makes it worse. Skin nodes stay; nodes stay out of the bones; nodes of flat cut faces stay in them.
     fn relax(&self, body: &mut LayeredBody) {
         let mut columns = vertices_of(body, &body_shapes(body), |s| {
             s.scaled_jacobian < GOOD_ENOUGH || !s.is_valid()
@@ -201,7 +201,7 @@ impl<'a> Surroundings<'a> {
         let (mut best, mut best_worth) = (start, before);
         for candidate in candidates {
             let mut at = start + self.confinement.project(v, candidate - start);
-            if let Some(core) = self.core.filter(|_| l + 1 == body.n_levels) {
+            if let Some(core) = self.core {
                 at = start + self.confinement.project(v, core.outside_bones(at) - start);
             }
             body.positions[node] = at;

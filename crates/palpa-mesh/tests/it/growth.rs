@@ -8,6 +8,8 @@ use palpa_mesh::growth::{ScatteredThickness, Thickness};
 use palpa_mesh::quality::{prism_shapes, prism_volume};
 use palpa_mesh::{Growth, GrowthError, GrowthParams, LayerSpec, Surface, Vec3, grow};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
 
 fn layer(name: &str, thickness: Option<f64>, n_levels: usize) -> LayerSpec {
     LayerSpec {
@@ -132,9 +134,9 @@ fn a_cylinder_grows_radially_down_to_its_bone() {
             "base of {v}: {base:?}"
         );
         let sideways = base.yz().normalize().dot(&skin.yz().normalize());
-        // The core's field comes from points gathered in cells of 2 mm, which is not quite round: 4° at most.
+        // The bone is a polygon of 19 sides, and the field that of its triangles: 3° at most.
         assert!(
-            sideways > 0.9976,
+            sideways > 0.9986,
             "column {v} turns round the bone: {sideways}"
         );
         assert!(
@@ -400,27 +402,125 @@ impl Limb {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
-
-    #[test]
-    fn random_limbs_grow_soundly_or_are_refused(
-        limb in limbs(),
-        shares in prop::array::uniform2(0.005..0.12_f64),
-        n_levels in 1_usize..5,
-        to_bone in any::<bool>(),
-    ) {
+#[test]
+fn random_limbs_grow_soundly_or_are_refused_and_mostly_grow() {
+    let cases = (
+        limbs(),
+        prop::array::uniform2(0.005..0.12_f64),
+        1_usize..5,
+        any::<bool>(),
+    );
+    let mut runner = TestRunner::deterministic();
+    let (mut n_grown, mut n_tangled) = (0, 0);
+    for _ in 0..60 {
+        let (limb, shares, n_levels, to_bone) = cases.new_tree(&mut runner).unwrap().current();
         let (skin, bones) = limb.surfaces();
         let [first, second] = shares.map(|s| s * limb.radius);
         let last = if to_bone { None } else { Some(second) };
-        let layers = vec![layer("skin", Some(first), 1), layer("fat", Some(second), 1), layer("muscle", last, n_levels)];
+        let layers = vec![
+            layer("skin", Some(first), 1),
+            layer("fat", Some(second), 1),
+            layer("muscle", last, n_levels),
+        ];
         match grow(&skin, &bones, &params(layers.clone())) {
-            Ok(growth) => assert_sound(&growth, &layers),
-            // Refusals name their place; that they are rare is for the fixed shapes above to show.
-            Err(GrowthError::Tangled { n_bad, .. }) => prop_assert!(n_bad > 0),
-            Err(GrowthError::BoneOutside { depth, .. }) => prop_assert!(depth > 0.0),
-            Err(GrowthError::NoRoom { asked, room }) => prop_assert!(asked > room),
-            Err(other) => prop_assert!(false, "{other}"),
+            Ok(growth) => {
+                assert_sound(&growth, &layers);
+                n_grown += 1;
+            }
+            Err(GrowthError::Tangled { n_bad, .. }) => {
+                assert!(n_bad > 0);
+                n_tangled += 1;
+            }
+            Err(GrowthError::BoneOutside { depth, .. }) => assert!(depth > 0.0),
+            Err(GrowthError::NoRoom { asked, room }) => assert!(asked > room),
+            Err(other) => panic!("{other}"),
         }
     }
+    println!("{n_grown} grown, {n_tangled} tangled");
+    assert!(
+        n_grown >= 30 && n_tangled * 10 <= n_grown,
+        "{n_grown} grown, {n_tangled} tangled"
+    );
+}
+
+#[test]
+fn a_bone_just_under_the_skin_is_met_and_not_passed() {
+    // Two bones with a membrane; one is 1 mm under the skin.
+    let (skin, bone) = cylinder(0.16, 0.04, 0.008, 4e-3);
+    let moved = |dy: f64| {
+        let mut bone = bone.clone();
+        bone.points.iter_mut().for_each(|p| p.y += dy);
+        bone
+    };
+    let growth = grow(&skin, &[moved(0.031), moved(0.005)], &params(limb_layers())).unwrap();
+    assert_sound(&growth, &limb_layers());
+    let body = &growth.body;
+    for v in 0..body.n_vertices() {
+        let p = body.skin.points[v];
+        if p.y > 0.0397 {
+            // 0.1 mm are the polygons'.
+            assert!(
+                growth.stand_off[v].abs() < 2e-4,
+                "{} m at {p:?}",
+                growth.stand_off[v]
+            );
+        }
+    }
+}
+
+#[test]
+fn growth_does_not_depend_on_where_the_body_is_and_how_it_lies() {
+    let (skin, bones) = forearm(0.009, 1.0);
+    let here = grow(&skin, &bones, &params(limb_layers())).unwrap();
+    let turn = nalgebra::Rotation3::from_euler_angles(0.4, -1.1, 2.0);
+    let shift = Vec3::new(0.3, -0.2, 0.5);
+    let moved = |surface: &Surface| {
+        let mut surface = surface.clone();
+        surface
+            .points
+            .iter_mut()
+            .for_each(|p| *p = turn * *p + shift);
+        surface
+    };
+    let bones: Vec<Surface> = bones.iter().map(moved).collect();
+    let there = grow(&moved(&skin), &bones, &params(limb_layers())).unwrap();
+    assert_sound(&there, &limb_layers());
+    // Ties in the trees and axes of relaxation differ; the shape does not.
+    let distances: Vec<f64> = (here.body.positions.iter().zip(&there.body.positions))
+        .map(|(p, q)| (turn * *p + shift - q).norm())
+        .collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    assert!(mean < 1e-5, "{mean} m");
+}
+
+#[test]
+fn a_cut_out_has_the_core_of_the_whole() {
+    let (skin, bones) = forearm(0.005, 1.0);
+    let centre = *skin
+        .points
+        .iter()
+        .min_by(|a, b| {
+            (a.x - 0.11 - a.z)
+                .abs()
+                .total_cmp(&(b.x - 0.11 - b.z).abs())
+        })
+        .unwrap();
+    let whole = grow(&skin, &bones, &params(limb_layers())).unwrap();
+    let cut = GrowthParams {
+        layers: limb_layers(),
+        cut_out: Some((centre, 0.035)),
+    };
+    let part = grow(&skin, &bones, &cut).unwrap();
+    let base = |growth: &Growth| {
+        let v = growth
+            .body
+            .skin
+            .points
+            .iter()
+            .position(|p| *p == centre)
+            .unwrap();
+        growth.body.positions[growth.body.node(v, growth.body.n_levels - 1)]
+    };
+    let apart = (base(&whole) - base(&part)).norm();
+    assert!(apart < 1.5e-3, "{apart} m");
 }

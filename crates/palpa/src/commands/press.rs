@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_mesh::growth::GrowthReport;
-use palpa_mesh::{Surface, Vec3};
+use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_tissue::units::{Length, Time, Velocity};
 use palpa_tissue::{MaterialStatus, Scene, Status, Target, Tool};
 use serde::Serialize;
@@ -121,6 +121,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         &materials,
     )?;
 
+    remove_older(out.path())?;
     let recorded = record(args, context, out, &built, &indentation)?;
     let result = result_of(&recorded.samples, &materials);
     let report = PressReport {
@@ -172,24 +173,8 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         press.hold = hold.si();
     }
     press.retract &= !args.no_retract;
-    for (name, value) in [
-        ("--depth", press.depth),
-        ("--step", press.step),
-        ("--speed", press.speed),
-    ] {
-        if value <= 0.0 || value.is_nan() {
-            bail!("{name} must be more than zero");
-        }
-    }
-    if press.hold < 0.0 {
-        bail!("--hold must not be negative");
-    }
-    if press.step < press.depth / 5000.0 || press.step > press.depth {
-        bail!(
-            "--step {:.4} mm does not fit a depth of {:.2} mm; give between depth/5000 and depth",
-            press.step * 1e3,
-            press.depth * 1e3
-        );
+    if let Err(problem) = press.check() {
+        bail!("{problem}; see --depth, --step, --speed and --hold");
     }
     Ok(scene)
 }
@@ -210,6 +195,33 @@ fn parse_point(text: &str) -> anyhow::Result<[f64; 3]> {
             .si())
     };
     Ok([length(x)?, length(y)?, length(z)?])
+}
+
+/// Removes the files of an earlier run into the same folder, of which this one might leave some standing.
+fn remove_older(folder: &Path) -> anyhow::Result<()> {
+    let pictures = ["force_depth", "force_time", "section"];
+    let mut older: Vec<PathBuf> = ["press.csv", "press.json", "press.pvd"]
+        .map(|name| folder.join(name))
+        .into();
+    older.extend(
+        pictures
+            .iter()
+            .flat_map(|stem| ["svg", "png"].map(|end| folder.join(format!("{stem}.{end}")))),
+    );
+    if let Ok(series) = std::fs::read_dir(folder.join("series")) {
+        let is_ours = |name: &str| name.starts_with("body_") || name.starts_with("bone_");
+        older.extend(
+            series
+                .flatten()
+                .filter(|f| is_ours(&f.file_name().to_string_lossy()))
+                .map(|f| f.path()),
+        );
+    }
+    for path in older.iter().filter(|path| path.exists()) {
+        std::fs::remove_file(path)
+            .with_context(|| format!("cannot remove the older \"{}\"", path.display()))?;
+    }
+    Ok(())
 }
 
 /// What came out of a run.
@@ -253,7 +265,7 @@ fn record(
         }
     }
     table.finish()?;
-    series.finish(out)?;
+    series.finish(out, &built.bones)?;
     Ok(recorded)
 }
 
@@ -264,20 +276,22 @@ struct Series {
 }
 
 impl Series {
-    /// Picks `n` samples, evenly spread; the deepest is among them from two on.
+    /// Picks `n` samples, evenly spread; from two on the first and the deepest are among them.
     fn new(n: usize, indentation: &Indentation) -> Self {
-        let last = indentation.n_samples() - 1;
+        let (last, deepest) = (indentation.n_samples() - 1, indentation.deepest());
+        let n = n.min(last + 1);
         let mut wanted: Vec<usize> = match n {
             0 => Vec::new(),
-            1 => vec![indentation.deepest()],
+            1 => vec![deepest],
+            2 => vec![0, deepest],
             _ => (0..n).map(|i| (i * last) / (n - 1)).collect(),
         };
-        if n > 2
-            && let Some(nearest) = wanted
-                .iter_mut()
-                .min_by_key(|w| w.abs_diff(indentation.deepest()))
+        if let Some(nearest) = wanted
+            .iter_mut()
+            .skip(1)
+            .min_by_key(|w| w.abs_diff(deepest))
         {
-            *nearest = indentation.deepest();
+            *nearest = deepest;
         }
         wanted.sort_unstable();
         wanted.dedup();
@@ -316,7 +330,14 @@ impl Series {
         let mut grid = Grid::of_body(body, &run.state.positions)
             .with_point_vectors("displacement", &displacement)
             .with_point_vectors("force", &run.state.node_forces)
-            .with_point_scalars("thinning", per_column(&growth.thinning));
+            .with_point_scalars("thinning", per_column(&growth.thinning))
+            .with_point_scalars(
+                "is_base",
+                (0..body.n_nodes())
+                    .map(|n| f64::from(u8::from(body.is_base(n))))
+                    .collect(),
+            )
+            .with_point_scalars("cut_face", per_column(&cut_faces(body)));
         if !growth.stand_off.is_empty() {
             grid = grid.with_point_scalars("stand_off", per_column(&growth.stand_off));
         }
@@ -326,12 +347,28 @@ impl Series {
         Ok(())
     }
 
-    fn finish(self, out: &OutDir) -> anyhow::Result<()> {
+    fn finish(self, out: &OutDir, bones: &[Surface]) -> anyhow::Result<()> {
         if !self.frames.is_empty() {
+            for (i, bone) in bones.iter().enumerate() {
+                out.write_with(&format!("series/bone_{i}.vtu"), |w| {
+                    Grid::of_surface(bone).write(w)
+                })?;
+            }
             out.write_with("press.pvd", |w| write_series(w, &self.frames))?;
         }
         Ok(())
     }
+}
+
+/// For each skin vertex the number of its cut face, from 1; 0 on none.
+fn cut_faces(body: &LayeredBody) -> Vec<f64> {
+    let mut number = vec![0.0; body.n_vertices()];
+    for (i, face) in body.cut_faces.iter().enumerate() {
+        for &v in &face.vertices {
+            number[v as usize] = (i + 1) as f64;
+        }
+    }
+    number
 }
 
 fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {

@@ -63,6 +63,13 @@ impl Bench {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
+    /// A refusal where an earlier run has left its files.
+    fn refusal_of_part(&self, args: &[&str]) -> String {
+        let output = self.press(args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}");
+        String::from_utf8(output.stderr).unwrap()
+    }
+
     fn refusal(&self, args: &[&str]) -> String {
         let output = self.press(args);
         let text = String::from_utf8(output.stderr).unwrap();
@@ -196,6 +203,59 @@ fn cut_faces_can_be_free_fixed_or_symmetric() {
 }
 
 #[test]
+fn a_vertex_counts_in_the_file_whatever_is_mended_or_cut_away() {
+    use palpa::mesh::Vec3;
+    use palpa::mesh::generate::tube::{Ends, tube};
+    let bench = Bench::new();
+    let mut limb = tube(20, 24, Ends::Closed, |s, a| {
+        Vec3::new(0.12 * s, 0.04 * a.cos(), 0.04 * a.sin())
+    });
+    // Caps first, every point twice removed from its place in the order of the triangles.
+    limb.triangles.reverse();
+    limb.points.insert(0, Vec3::new(9.0, 9.0, 9.0));
+    limb.triangles.iter_mut().flatten().for_each(|v| *v += 1);
+    palpa::mesh::write_surface(&bench.folder.path().join("limb.obj"), &limb).unwrap();
+    let layer = "[[layer]]\ntissue = \"fat\"\nthickness = \"10 mm\"\nlevels = 2\n";
+    let press = "[press]\nvertex = 250\ndepth = \"1 mm\"\nstep = \"1 mm\"\n";
+    for cutout in ["", "cutout_radius = \"40 mm\"\n"] {
+        bench.file(
+            "limb.toml",
+            &format!("[body]\nsurface = \"limb.obj\"\n{cutout}{layer}{press}"),
+        );
+        let report = bench.report(&["limb.toml", "--json", "--frames", "0", "--no-retract"]);
+        let at: Vec<f64> = serde_json::from_value(report["press"]["at_m"].clone()).unwrap();
+        assert!(
+            (Vec3::from_column_slice(&at) - limb.points[250]).norm() < 1e-9,
+            "{at:?}"
+        );
+    }
+    // The hub of a cap is cut away with it.
+    let hub = limb.points.len() - 1;
+    let message = bench.refusal_of_part(&["limb.toml", &format!("--vertex={hub}")]);
+    assert!(message.contains("not part of the grown skin"), "{message}");
+}
+
+#[test]
+fn the_force_depends_little_on_the_step() {
+    let bench = Bench::new();
+    bench.file("block.toml", BLOCK);
+    let force = |step: &str| {
+        let args = [
+            "block.toml",
+            "--json",
+            "--frames",
+            "0",
+            "--no-retract",
+            "--step",
+            step,
+        ];
+        *forces(&bench.report(&args), "load").last().unwrap()
+    };
+    let (coarse, fine) = (force("1.5 mm"), force("0.1 mm"));
+    assert!((coarse / fine - 1.0).abs() < 0.05, "{coarse} and {fine}");
+}
+
+#[test]
 fn bad_input_is_refused_in_one_paragraph() {
     let bench = Bench::new();
     let write = |name: &str, from: &str, to: &str| {
@@ -229,6 +289,18 @@ fn bad_input_is_refused_in_one_paragraph() {
             "at = [\"0 mm\", \"9 m\", \"0 mm\"]",
         ),
         write(
+            "varying.toml",
+            "thickness = \"10 mm\"",
+            "thickness = { axis = \"x\", table = [[\"-40 mm\", \"5 mm\"], [\"40 mm\", \"8 mm\"]] }",
+        ),
+        {
+            let fine = BLOCK.replace("spacing = \"10 mm\"", "spacing = \"4 mm\"");
+            bench.file(
+                "dense.toml",
+                &format!("{fine}\n[reference]\nsolver = \"dense-inverse\"\n"),
+            )
+        },
+        write(
             "vertex.toml",
             "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
             "vertex = 812",
@@ -247,6 +319,7 @@ fn bad_input_is_refused_in_one_paragraph() {
         ["block.toml", "--at=0,0,0"],
         ["block.toml", "--depth=40 mm"],
         ["block.toml", "--step=9 mm"],
+        ["block.toml", "--speed=1e-30 m/s"],
         ["block.toml", "--out=a_file/results"],
     ] {
         messages.push(bench.refusal(&args));
