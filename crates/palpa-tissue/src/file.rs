@@ -288,7 +288,8 @@ pub(crate) struct ReferenceTable {
     /// Whose stiffness the bars in a level between two layers have. Default: "below".
     pub(crate) in_plane: InPlane,
     /// The share of a spring's change of length that the restoring correction (3.21) takes back after each step, 0 to
-    /// 1; 0 switches it off. Default: 1.
+    /// 1; 0 switches it off. It acts once per step, so with it the force depends on the step: at 4 mm on a real forearm
+    /// 0.56 N in steps of 1 mm and 0.48 N in steps of 0.1 mm, without it 0.55 N in both. Default: 0.
     pub(crate) spring_gain: f64,
     /// The share of the way to its place at rest by which the restoring correction (3.22) moves a node after each step, 0
     /// to 1; 0 switches it off. Any other makes a held body creep back under the tool. Default: 0.
@@ -301,7 +302,7 @@ impl Default for ReferenceTable {
             substeps: 4,
             solver: Solver::default(),
             in_plane: InPlane::default(),
-            spring_gain: 1.0,
+            spring_gain: 0.0,
             shape_gain: 0.0,
         }
     }

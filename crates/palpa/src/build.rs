@@ -1,18 +1,21 @@
 //! From a scene to a layered body: surfaces read, made safe, cut and grown.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
 use palpa_mesh::growth::{ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
-    Growth, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow,
+    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow,
     read_surface, repair,
 };
 use palpa_tissue::{Generator, LengthUnit, Scene, Skin, Target, Thickness, read_thickness};
 
 /// A place further from the skin than this share of the body's size is taken for a mistake in frame or unit.
 const FAR_FROM_SKIN: f64 = 0.25;
+
+/// Sizes of surfaces about which nothing is said, from a fingertip to a person. m
+const USUAL_SIZE: std::ops::Range<f64> = 0.003..4.0;
 
 /// A body ready to be pressed.
 #[derive(Debug)]
@@ -66,7 +69,8 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         layers: layer_specs(scene)?,
         cut_out,
     };
-    let growth = grow(&skin, &bones, &params)?;
+    let growth =
+        grow(&skin, &bones, &params).map_err(|error| with_bone_name(error, &scene.body.bones))?;
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);
@@ -89,7 +93,11 @@ fn point_of(skin: &Surface, target: &Target) -> anyhow::Result<Option<Vec3>> {
                 skin.points.len()
             ),
         },
-        Target::Point(p) => Ok(Some(Vec3::from(*p))),
+        Target::Point(p) => {
+            let point = Vec3::from(*p);
+            check_near(skin, point)?;
+            Ok(Some(point))
+        }
         Target::Middle => Ok(None),
     }
 }
@@ -108,15 +116,38 @@ fn vertex_at(skin: &Surface, at: Option<Vec3>, target: &Target) -> anyhow::Resul
              cut-out; press another vertex",
             in_mm(point)
         ),
-        Target::Point(_) if distance > FAR_FROM_SKIN * size => bail!(
+        _ => Ok(vertex),
+    }
+}
+
+/// Refuses a point that is far from the skin.
+fn check_near(skin: &Surface, point: Vec3) -> anyhow::Result<()> {
+    let distance = (skin.points[nearest(skin, point)] - point).norm();
+    let (lo, hi) = skin.bounds().unwrap_or_default();
+    if distance > FAR_FROM_SKIN * (hi - lo).norm() {
+        bail!(
             "the point ({}) mm is {:.1} mm away from the skin, which reaches from ({}) to ({}) mm; check the point, \
              its unit and its frame",
             in_mm(point),
             distance * 1e3,
             in_mm(lo),
             in_mm(hi),
-        ),
-        _ => Ok(vertex),
+        );
+    }
+    Ok(())
+}
+
+/// The refusal, with the files of the bones it speaks of.
+fn with_bone_name(error: GrowthError, files: &[PathBuf]) -> anyhow::Error {
+    let file = match &error {
+        GrowthError::BoneOutside { bone, .. } | GrowthError::BoneApart { bone, .. } => {
+            files.get(*bone)
+        }
+        _ => None,
+    };
+    match file {
+        Some(file) => anyhow::Error::new(error).context(file.display().to_string()),
+        None => error.into(),
     }
 }
 
@@ -168,6 +199,14 @@ fn read_in_metres(
             "{}: vertex {v} has a coordinate that is not finite; see `palpa check`",
             path.display()
         );
+    }
+    let (lo, hi) = surface.bounds().unwrap_or_default();
+    let size = (hi - lo).norm();
+    if !USUAL_SIZE.contains(&size) {
+        notes.push(format!(
+            "{} is {size:.4} m large, which no body part is; check `unit` in the scene's [body]",
+            file_name(path)
+        ));
     }
     Ok(surface)
 }

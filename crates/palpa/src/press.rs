@@ -16,6 +16,14 @@ use crate::build::{BuiltBody, in_mm};
 /// Edges within this many tool radii of the press point make the mesh size near the tool.
 const NEAR_TOOL: f64 = 2.0;
 
+/// Beyond this angle from the inward normal (60°) a press direction is worth a note.
+const OBLIQUE_COS: f64 = 0.5;
+/// Fewer skin nodes under a disc are worth a note: from 7 to 35 nodes the force on a real forearm changed by a quarter.
+const ENOUGH_NODES: usize = 20;
+/// Heights of a level over the length of its edges within which bars stand for a Young's modulus
+/// (`docs/theory/spring_stiffness.md`).
+const SOUND_ASPECT: std::ops::RangeInclusive<f64> = 0.5..=1.2;
+
 /// An indentation that is set up: what does not change while it runs.
 #[derive(Debug)]
 pub struct Indentation {
@@ -122,6 +130,24 @@ impl Indentation {
                 in_mm(at)
             );
         };
+        let inward = -body.skin.vertex_normals()[vertex];
+        let slant = direction.dot(&inward);
+        if slant <= 0.0 {
+            bail!(
+                "the press direction ({:.2}, {:.2}, {:.2}) points out of the skin at ({}) mm; turn it, or leave it out to \
+                 press along the inward normal",
+                direction.x,
+                direction.y,
+                direction.z,
+                in_mm(at)
+            );
+        }
+        if slant < OBLIQUE_COS {
+            notes.push(format!(
+                "the press direction is {:.0}° from the skin's inward normal: the bonded tool drags more than it presses",
+                slant.acos().to_degrees()
+            ));
+        }
         let tissue_depth = column_length(body, vertex);
         if scene.press.depth >= tissue_depth {
             bail!(
@@ -141,7 +167,7 @@ impl Indentation {
             Tool::Node => 0.0,
         };
         let mesh_size = mesh_size_near(body, at, radius);
-        if matches!(scene.tool, Tool::Disc { .. }) && operated.len() < 4 {
+        if matches!(scene.tool, Tool::Disc { .. }) && operated.len() < ENOUGH_NODES {
             notes.push(format!(
                 "only {} skin vertices lie under the tool of radius {:.1} mm, with edges of {:.1} mm there: the force \
                  depends on the mesh; take a finer skin or a larger tool",
@@ -150,6 +176,7 @@ impl Indentation {
                 mesh_size * 1e3,
             ));
         }
+        note_aspects(built, scene, mesh_size, &mut notes);
         if body
             .cut_faces
             .iter()
@@ -272,7 +299,8 @@ fn tidy(x: f64) -> f64 {
 fn path(scene: &Scene) -> Vec<Waypoint> {
     const HOLD_SAMPLES: usize = 5;
     let press = &scene.press;
-    let n = (press.depth / press.step).round().max(1.0) as usize;
+    // No step is larger than asked for.
+    let n = (press.depth / press.step - 1e-9).ceil().max(1.0) as usize;
     let depth_at = |i: usize| press.depth * i as f64 / n as f64;
     let down = press.depth / press.speed;
     let mut path: Vec<Waypoint> = (0..=n)
@@ -418,6 +446,27 @@ fn nodes_under_disc(
         .filter(|&v| is_in[v])
         .map(|v| body.node(v, 0))
         .collect()
+}
+
+/// Says which layers have levels too flat or too tall for bars to stand for their modulus.
+fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<String>) {
+    let unsound: Vec<String> = (built.growth.report.layers.iter().zip(&scene.layers))
+        .filter(|(_, layer)| matches!(layer.tissue.law, Law::Elastic { .. }))
+        .filter_map(|(report, _)| {
+            let height = report.thickness.median / report.n_levels as f64;
+            let aspect = height / mesh_size;
+            (!SOUND_ASPECT.contains(&aspect)).then(|| format!("{} {aspect:.2}", report.name))
+        })
+        .collect();
+    if !unsound.is_empty() {
+        notes.push(format!(
+            "levels over skin edges near the tool: {}; outside {} to {} bars are too stiff across or too soft in shear, \
+             and the force depends on the number of levels",
+            unsound.join(", "),
+            SOUND_ASPECT.start(),
+            SOUND_ASPECT.end(),
+        ));
+    }
 }
 
 fn column_length(body: &LayeredBody, v: usize) -> f64 {

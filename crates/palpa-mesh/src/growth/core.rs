@@ -161,6 +161,7 @@ pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), Grow
     }
     let mut worst: Option<(f64, usize, Vec3)> = None;
     for (id, bone) in bones.iter().enumerate() {
+        check_near(id, bone, skin)?;
         for &p in &bone.points {
             // Beyond an end, and where the closest point lies at a rim, there is no side.
             let is_beyond = |c: &CutFace| c.is_flat && (p - c.point).dot(&c.normal) > -near_end;
@@ -189,6 +190,23 @@ pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), Grow
             at: at.into(),
         }),
     }
+}
+
+/// Refuses a bone none of whose vertices lies within the box of the skin: another frame, or another unit.
+fn check_near(id: usize, bone: &Surface, skin: &Surface) -> Result<(), GrowthError> {
+    let (Some(bone_box), Some(skin_box)) = (bone.bounds(), skin.bounds()) else {
+        return Ok(());
+    };
+    let is_within = |p: &Vec3| (0..3).all(|i| skin_box.0[i] <= p[i] && p[i] <= skin_box.1[i]);
+    if bone.points.iter().any(is_within) {
+        return Ok(());
+    }
+    let both = |(lo, hi): (Vec3, Vec3)| [lo.into(), hi.into()];
+    Err(GrowthError::BoneApart {
+        bone: id,
+        bone_box: both(bone_box),
+        skin_box: both(skin_box),
+    })
 }
 
 /// Polynomial minimum that rounds the crease of `min(a, b)` over a width `k`.

@@ -96,7 +96,7 @@ pub enum GrowthError {
     },
     /// A bone comes through the skin.
     #[error(
-        "bone {bone} comes {:.1} mm out of the skin at ({:.1}, {:.1}, {:.1}) mm; check that skin and bones use the \
+        "bone {bone} comes {:.2} mm out of the skin at ({:.1}, {:.1}, {:.1}) mm; check that skin and bones use the \
          same frame and unit, or move the bone inside",
         depth * 1e3, at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
     )]
@@ -108,10 +108,25 @@ pub enum GrowthError {
         /// Where. m
         at: [f64; 3],
     },
+    /// A bone is nowhere inside the skin.
+    #[error(
+        "bone {bone} is nowhere inside the skin: it reaches from ({}) to ({}) mm, the skin from ({}) to ({}) mm; check \
+         that both use the same frame and unit",
+        millimetres(bone_box[0]), millimetres(bone_box[1]), millimetres(skin_box[0]), millimetres(skin_box[1])
+    )]
+    BoneApart {
+        /// Index of the bone in the list given.
+        bone: usize,
+        /// Smallest and largest coordinates of the bone. m
+        bone_box: [[f64; 3]; 2],
+        /// Smallest and largest coordinates of the skin. m
+        skin_box: [[f64; 3]; 2],
+    },
     /// The layers ask for more than the body has, everywhere.
     #[error(
         "the layers are thicker than the body: they ask for {:.2} mm, and the most room below any skin point is \
-         {:.2} mm; make the layers thinner, or check the unit of the surface",
+         {:.2} mm; make the layers thinner, or check the unit of the \
+         surface and where the bones lie",
         asked * 1e3, room * 1e3
     )]
     NoRoom {
@@ -155,6 +170,10 @@ pub enum GrowthError {
         /// Its position. m
         at: [f64; 3],
     },
+}
+
+fn millimetres([x, y, z]: [f64; 3]) -> String {
+    format!("{:.1}, {:.1}, {:.1}", x * 1e3, y * 1e3, z * 1e3)
 }
 
 /// Grows `surface` inward, down to `bones` where a layer asks for it.

@@ -301,6 +301,7 @@ fn what_cannot_be_grown_is_refused_with_its_place() {
     };
     let messages = [
         error(&skin, &[moved(0.034)], limb_layers()),
+        error(&skin, &[moved(5.0)], limb_layers()),
         error(&skin, &[], vec![layer("fat", Some(0.05), 2)]),
         error(
             &skin,

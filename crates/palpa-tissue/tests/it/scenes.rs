@@ -60,7 +60,7 @@ fn a_surface_and_one_layer_are_enough() {
     assert_eq!(scene.reference.in_plane, InPlane::Below);
     assert_eq!(
         (scene.reference.spring_gain, scene.reference.shape_gain),
-        (1.0, 0.0)
+        (0.0, 0.0)
     );
 }
 

@@ -25,6 +25,7 @@ pub struct Context {
     command: &'static str,
     opened: OnceLock<OutDir>,
     interrupted: Arc<AtomicBool>,
+    is_recording: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -36,6 +37,7 @@ impl Context {
             command,
             opened: OnceLock::new(),
             interrupted: Arc::default(),
+            is_recording: Arc::default(),
         }
     }
 
@@ -69,29 +71,29 @@ impl Context {
         self.opened.get().map(OutDir::path)
     }
 
-    /// Prints a line of the readable report on standard output; nothing with `--json`.
+    /// Prints a line of the readable report on standard output; nothing with `--json`. A reader that has had enough
+    /// (`palpa … | head`) does not keep the command from its work.
     ///
     /// # Errors
-    /// When standard output is closed or full.
+    /// When standard output is full.
     pub fn say(&self, line: impl Display) -> anyhow::Result<()> {
-        if !self.is_json {
-            writeln!(io::stdout().lock(), "{line}").context("cannot write to standard output")?;
+        if self.is_json {
+            return Ok(());
         }
-        Ok(())
+        unless_closed(writeln!(io::stdout().lock(), "{line}"))
     }
 
     /// Prints the result for machines, with `--json` only.
     ///
     /// # Errors
-    /// When standard output is closed or full.
+    /// When standard output is full.
     pub fn json(&self, result: &impl Serialize) -> anyhow::Result<()> {
-        if self.is_json {
-            let mut stdout = io::stdout().lock();
-            serde_json::to_writer_pretty(&mut stdout, result)
-                .context("cannot write to standard output")?;
-            writeln!(stdout).context("cannot write to standard output")?;
+        if !self.is_json {
+            return Ok(());
         }
-        Ok(())
+        let mut stdout = io::stdout().lock();
+        let written = serde_json::to_writer_pretty(&mut stdout, result).map_err(io::Error::from);
+        unless_closed(written.and_then(|()| writeln!(stdout)))
     }
 
     /// Tells people something beside the result, on standard error.
@@ -119,14 +121,32 @@ impl Context {
         bar
     }
 
-    /// The first Ctrl-C asks the command to stop; the second stops it at once.
+    /// From here on an interrupt leaves what was done: the command polls
+    /// [`is_interrupted`](Self::is_interrupted). Before, there is nothing to keep, and Ctrl-C ends the command at once.
+    pub fn begin_recording(&self) {
+        self.is_recording.store(true, Ordering::Relaxed);
+    }
+
+    /// While recording, the first Ctrl-C asks the command to stop; the second stops it at once.
     pub(super) fn watch_interrupts(&self) -> anyhow::Result<()> {
         let interrupted = Arc::clone(&self.interrupted);
+        let is_recording = Arc::clone(&self.is_recording);
         ctrlc::set_handler(move || {
-            if interrupted.swap(true, Ordering::Relaxed) {
+            if interrupted.swap(true, Ordering::Relaxed) || !is_recording.load(Ordering::Relaxed) {
                 std::process::exit(130);
             }
+            super::eprint_quietly("stopping after this step; Ctrl-C again to stop at once");
         })
         .context("cannot listen for Ctrl-C")
+    }
+}
+
+/// Success also when nobody reads standard output any more.
+fn unless_closed(written: io::Result<()>) -> anyhow::Result<()> {
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(error).context("cannot write to standard output")
+        }
+        _ => Ok(()),
     }
 }

@@ -57,10 +57,12 @@ struct Done {
 /// When a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     context.out_dir()?;
+    context.begin_recording();
     let mut done = Done::default();
     let is_whole = figures(context, &mut done)?
         && claims(context, &mut done)?
         && table(args, context, &mut done)?;
+    done.report.is_complete = is_whole;
     write(context, &done)?;
     context.json(&done.report)?;
     if !is_whole {

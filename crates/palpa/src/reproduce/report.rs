@@ -10,6 +10,8 @@ use super::{Body, fit::Knee};
 /// The evaluation. After an interruption it holds what was done until then.
 #[derive(Debug, Serialize)]
 pub struct Report {
+    /// Whether all of it was done; not after an interruption.
+    pub is_complete: bool,
     /// Figures 4.2 to 4.4.
     pub figures: Option<Figures>,
     /// Parts of a step.
@@ -27,6 +29,7 @@ pub struct Report {
 impl Default for Report {
     fn default() -> Self {
         Self {
+            is_complete: false,
             figures: None,
             convergence: Vec::new(),
             euler: Vec::new(),

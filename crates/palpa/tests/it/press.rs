@@ -111,6 +111,7 @@ fn a_block_is_pressed_and_every_file_is_there() {
     assert_eq!(forces(&report, "hold").len(), 5);
     let back = forces(&report, "retract");
     assert!(back.last().unwrap().abs() < 0.1 * loading[6], "{back:?}");
+    assert_eq!(report["result"]["is_complete"], true);
     assert_eq!(report["press"]["n_operated_nodes"], 9);
     assert!((report["press"]["mesh_size_near_tool_mm"].as_f64().unwrap() - 11.0).abs() < 2.0);
     assert!(
@@ -310,6 +311,12 @@ fn bad_input_is_refused_in_one_paragraph() {
         surface("header.toml", "lies.ply"),
         surface("finite.toml", "nan.obj"),
         surface("empty.toml", "no_faces.obj"),
+        write(
+            "outward.toml",
+            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
+            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]\ndirection = [0, 0.2, 1]",
+        ),
+        "no_faces.obj".to_owned(),
         "nowhere.toml".to_owned(),
     ];
     let mut messages: Vec<String> = scenes.iter().map(|scene| bench.refusal(&[scene])).collect();
@@ -344,6 +351,22 @@ fn the_shipped_scenes_can_be_read_and_those_without_files_pressed() {
         }
     }
     assert!(n >= 3);
+}
+
+#[test]
+fn a_reader_that_leaves_does_not_keep_the_work_from_being_done() {
+    let bench = Bench::new();
+    bench.file("block.toml", BLOCK);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpa"))
+        .current_dir(bench.folder.path())
+        .args(["press", "block.toml", "--frames", "0"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+    let table = fs::read_to_string(bench.folder.path().join("out/press/press.csv")).unwrap();
+    assert_eq!(table.lines().count(), 19);
 }
 
 #[cfg(unix)]
@@ -393,5 +416,6 @@ fn ctrl_c_leaves_a_valid_table_of_what_was_done() {
     let report: Value =
         serde_json::from_str(&fs::read_to_string(out.join("press.json")).unwrap()).unwrap();
     assert_eq!(report["samples"].as_array().unwrap().len(), rows.len() - 1);
+    assert_eq!(report["result"]["is_complete"], false);
     assert!(out.join("press.pvd").is_file() && out.join("force_depth.png").is_file());
 }

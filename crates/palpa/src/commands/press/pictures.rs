@@ -1,0 +1,141 @@
+//! The pictures of an indentation: force against depth and time, and the section through the press point.
+
+use std::path::PathBuf;
+
+use palpa_mesh::{Surface, Vec3};
+use palpa_tissue::{Scene, Tool};
+
+use super::record::Recorded;
+use super::report::{PressResult, tool_name};
+use crate::build::{BuiltBody, in_mm};
+use crate::output::OutDir;
+use crate::plot::{Axis, Chart, Guide};
+use crate::press::{Indentation, Phase, Sample};
+use crate::section::{Panel, Plane, ToolOutline, cut_body, cut_surface, draw};
+
+pub(super) fn draw_pictures(
+    out: &OutDir,
+    scene: &Scene,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    recorded: &Recorded,
+    result: &PressResult,
+) -> anyhow::Result<Vec<PathBuf>> {
+    let samples: Vec<&Sample> = recorded
+        .samples
+        .iter()
+        .filter(|s| s.outcome != "diverged")
+        .collect();
+    let of_phase = |phases: &[Phase]| -> Vec<[f64; 2]> {
+        samples
+            .iter()
+            .filter(|s| phases.contains(&s.phase))
+            .map(|s| [s.depth_mm, s.force_n])
+            .collect()
+    };
+    let subtitle = format!(
+        "{}; skin edges {:.1} mm near it; {}",
+        tool_name(scene),
+        indentation.mesh_size * 1e3,
+        result.material_status
+    );
+    let mut depth_chart = Chart::new(
+        Axis::linear("depth, mm").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against depth")
+    .subtitle(&subtitle)
+    .line("loading", of_phase(&[Phase::Load, Phase::Hold]));
+    let mut retracting = of_phase(&[Phase::Retract]);
+    if !retracting.is_empty() {
+        // The way back begins where the rest ended.
+        retracting.splice(0..0, of_phase(&[Phase::Load, Phase::Hold]).last().copied());
+        depth_chart =
+            depth_chart.series(crate::plot::Series::new("retracting", retracting).dashed());
+    }
+    if let Some(depth) = result.inverted_from_mm {
+        depth_chart = depth_chart.guide(Guide::x(depth, "prisms turned over"));
+    }
+    let time: Vec<[f64; 2]> = samples.iter().map(|s| [s.time_s, s.force_n]).collect();
+    let time_chart = Chart::new(
+        Axis::linear("time, s").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against time")
+    .subtitle(&subtitle)
+    .line("force", time);
+    let mut paths = Vec::new();
+    paths.extend(
+        depth_chart
+            .draw()
+            .save(out, "force_depth")?
+            .into_iter()
+            .rev(),
+    );
+    paths.extend(time_chart.draw().save(out, "force_time")?);
+    if let Some(picture) = section_picture(scene, built, indentation, recorded) {
+        paths.extend(picture.save(out, "section")?);
+    }
+    Ok(paths)
+}
+
+/// The body cut through the press point, at rest and at the deepest sample.
+fn section_picture(
+    scene: &Scene,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    recorded: &Recorded,
+) -> Option<crate::plot::Picture> {
+    let body = &built.growth.body;
+    let direction = indentation.direction.into_inner();
+    // Across the limb where it has an end; else along the longest way.
+    let across = body
+        .cut_faces
+        .iter()
+        .find(|f| f.is_flat && f.normal.dot(&direction).abs() < 0.9)
+        .map(|f| f.normal);
+    let other = if direction.x.abs() < 0.7 {
+        Vec3::x()
+    } else {
+        Vec3::y()
+    };
+    let plane = Plane::new(
+        indentation.at,
+        across.unwrap_or(other).cross(&direction).cross(&direction),
+        -direction,
+    )?;
+    let bones: Vec<_> = built
+        .bones
+        .iter()
+        .flat_map(|b: &Surface| cut_surface(b, &plane))
+        .collect();
+    let tool = |at: Vec3| match scene.tool {
+        Tool::Disc { radius } => ToolOutline::disc(&plane, &at, &direction, radius),
+        Tool::Node => ToolOutline::node(&plane, &at),
+    };
+    let (rest, pressed) = (
+        cut_body(body, &body.positions, &plane),
+        cut_body(body, &recorded.deepest, &plane),
+    );
+    let depth = recorded.deepest_depth;
+    let pressed_title = format!("pressed {depth:.1} mm");
+    let panels = [
+        Panel {
+            title: "at rest",
+            section: &rest,
+            bones: &bones,
+            tool: Some(tool(indentation.at)),
+        },
+        Panel {
+            title: &pressed_title,
+            section: &pressed,
+            bones: &bones,
+            tool: Some(tool(indentation.at + direction * (depth * 1e-3))),
+        },
+    ];
+    let subtitle = format!(
+        "through ({}) mm, the press direction downward",
+        in_mm(indentation.at)
+    );
+    Some(draw("Section through the press point", &subtitle, &panels))
+}
