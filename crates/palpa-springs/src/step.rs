@@ -60,7 +60,7 @@ pub enum Method {
 
 /// Gains of the corrections (3.21) and (3.22), each from 0 (off) to 1; beyond that they are held to 1.
 ///
-/// Both are scaled by the stiffness at the node, so that no gain in this range is unstable (`relax.rs` has the proof).
+/// Both are scaled by the stiffness at the node, so that no gain in this range overshoots (`relax.rs` has the proof).
 /// The pull of springs towards their lengths mends the drift of the incremental method and leaves an equilibrium in
 /// place. The pull towards the initial shape does not: it makes a held body creep back under the tool, by an amount that
 /// depends on the number of steps. So it is off unless asked for.

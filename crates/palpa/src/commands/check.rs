@@ -6,17 +6,19 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 use palpa_mesh::check::{Examination, Severity};
+use palpa_mesh::growth::GrowthReport;
 use palpa_mesh::read::FileCounts;
 use palpa_mesh::{Format, RepairOptions, SurfaceFile, Verdict, read_surface, write_surface};
 use palpa_tissue::{LengthUnit, Scene, Skin};
 use serde::Serialize;
 
+use crate::build::build;
 use crate::cli::{Context, one_paragraph};
 use crate::commands::Outcome;
 
 /// Check surfaces and scenes: what is wrong, where, and what to do
 ///
-/// Reads OBJ, STL, PLY, OFF, GLB and glTF, and scenes with the surfaces that they name. Exit code 0: usable as it is; 1:
+/// Reads OBJ, STL, PLY, OFF, GLB and glTF, and scenes with the surfaces that they name and the body that grows from them. Exit code 0: usable as it is; 1:
 /// has defects, and the report says whether repair removes them; 2: cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -65,6 +67,12 @@ struct FileResult {
     error: Option<String>,
     /// The surface itself, or those that a scene names.
     surfaces: Vec<SurfaceResult>,
+    /// The body that a scene grows, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    body: Option<GrowthReport>,
+    /// Why a scene's surfaces, sound each, make no body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refusal: Option<String>,
 }
 
 /// What is known about one surface.
@@ -133,6 +141,8 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         verdict: None,
         error: None,
         surfaces: vec![],
+        body: None,
+        refusal: None,
     };
     let surfaces = match surfaces_of(file, args.unit) {
         Ok(surfaces) => surfaces,
@@ -168,8 +178,22 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
             file: path,
         });
     }
+    if is_scene(file) && verdict < Verdict::Bad {
+        match build(&Scene::load(file)?) {
+            Ok(built) => result.body = Some(built.growth.report),
+            Err(error) => {
+                result.refusal = Some(one_paragraph(&error));
+                verdict = Verdict::Bad;
+            }
+        }
+    }
     result.verdict = Some(verdict);
     Ok(result)
+}
+
+fn is_scene(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
 /// A surface that was read, with what is needed to understand its coordinates.
@@ -188,10 +212,7 @@ fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
             unit,
         })
     };
-    if file
-        .extension()
-        .is_none_or(|e| !e.eq_ignore_ascii_case("toml"))
-    {
+    if !is_scene(file) {
         return Ok(vec![read(file, unit)?]);
     }
     let scene = Scene::load(file)?;

@@ -156,3 +156,27 @@ fn the_unit_of_a_surface_is_that_of_the_option() {
         2
     );
 }
+
+#[test]
+fn a_scene_whose_parts_do_not_fit_is_not_good() {
+    use palpa::mesh::generate::cylinder;
+    use palpa::mesh::{Vec3, write_surface};
+    let scene = "[body]\nsurface = \"skin.ply\"\nbones = [\"bone.ply\"]\n[[layer]]\ntissue = \"fat\"\nthickness = \"5 mm\"\n[[layer]]\ntissue = \"muscle\"\n[press]\ndepth = \"2 mm\"\n";
+    let folder = folder_with(&[("limb.toml", scene)]);
+    let (skin, mut bone) = cylinder(0.12, 0.04, 0.01, 8e-3);
+    write_surface(&folder.path().join("skin.ply"), &skin).unwrap();
+    write_surface(&folder.path().join("bone.ply"), &bone).unwrap();
+    let (code, stdout, _) = check(folder.path(), &["limb.toml"]);
+    assert_eq!(code, 0, "{stdout}");
+    assert!(stdout.contains("prisms, all valid"), "{stdout}");
+    bone.points
+        .iter_mut()
+        .for_each(|p| *p += Vec3::new(2.0, 0.0, 0.0));
+    write_surface(&folder.path().join("bone.ply"), &bone).unwrap();
+    let (code, stdout, _) = check(folder.path(), &["limb.toml"]);
+    assert_eq!(code, 1, "{stdout}");
+    assert!(
+        stdout.contains("bone.ply: bone 0 is nowhere inside the skin"),
+        "{stdout}"
+    );
+}

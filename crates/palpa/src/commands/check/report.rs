@@ -26,6 +26,20 @@ pub(super) fn say(result: &FileResult, context: &Context) -> anyhow::Result<()> 
         }
         say_surface(surface, context)?;
     }
+    if let Some(body) = &result.body {
+        context.say(format_args!(
+            "  grows into {} nodes and {} prisms, all valid (scaled Jacobian: smallest {:.2}, 5 % below {:.2}); layers thinned \
+             under {:.1} % of the skin's area",
+            body.n_nodes,
+            body.n_prisms,
+            body.scaled_jacobian.min,
+            body.scaled_jacobian.p05,
+            100.0 * body.thinned_share
+        ))?;
+    }
+    if let Some(refusal) = &result.refusal {
+        context.say(format_args!("  grows into no body: {refusal}"))?;
+    }
     Ok(())
 }
 
