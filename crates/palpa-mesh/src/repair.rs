@@ -248,12 +248,7 @@ pub(crate) fn duplicates(surface: &Surface) -> Vec<(u32, u32)> {
 }
 
 fn drop_unused(surface: &mut Surface) -> usize {
-    let mut is_used = vec![false; surface.points.len()];
-    surface
-        .triangles
-        .iter()
-        .flatten()
-        .for_each(|&v| is_used[v as usize] = true);
+    let is_used = crate::topology::is_used(surface);
     let mut n_kept = 0;
     let new_index: Vec<u32> = is_used
         .iter()

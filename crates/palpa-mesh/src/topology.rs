@@ -98,6 +98,15 @@ impl UnionFind {
     }
 }
 
+/// Whether each vertex belongs to a triangle. `[n_points]`
+pub(crate) fn is_used(surface: &Surface) -> Vec<bool> {
+    let mut is_used = vec![false; surface.points.len()];
+    for &v in surface.triangles.iter().flatten() {
+        is_used[v as usize] = true;
+    }
+    is_used
+}
+
 /// Whether each triangle has sides among these. `[n_triangles]`
 pub(crate) fn has_sides(surface: &Surface, sides: &[Side]) -> Vec<bool> {
     let mut has_sides = vec![false; surface.triangles.len()];

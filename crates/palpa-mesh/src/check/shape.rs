@@ -64,12 +64,7 @@ pub(super) fn check(surface: &Surface, report: &mut SurfaceReport, findings: &mu
 
 fn check_vertices(surface: &Surface, findings: &mut Findings) {
     let vertex = |&v: &u32| Spot::vertex(surface, v);
-    let mut is_used = vec![false; surface.points.len()];
-    surface
-        .triangles
-        .iter()
-        .flatten()
-        .for_each(|&v| is_used[v as usize] = true);
+    let is_used = crate::topology::is_used(surface);
     let select = |keep: &dyn Fn(usize) -> bool| -> Vec<u32> {
         (0..surface.points.len())
             .filter(|&v| keep(v))

@@ -1,7 +1,6 @@
 //! Faces at which a body part was cut from the rest: flat caps of a closed mesh, rims of an open one, cut-outs.
 
-use std::collections::BTreeMap;
-
+use crate::topology::{UnionFind, all_sides, by_edge};
 use crate::{CutFace, Surface, Vec3};
 
 /// Neighbouring triangles belong to one flat region while their normals differ less than this (0.5°).
@@ -20,45 +19,47 @@ const CORNER_COS: f64 = 0.766;
 const MAX_SIDES: usize = 8;
 
 /// The triangles that form flat caps, one list per cap.
-pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
+pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<u32>> {
     let n = surface.triangles.len();
     let areas: Vec<Vec3> = (0..n).map(|t| surface.area_vector(t)).collect();
-    let normal = |t: usize| areas[t].try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    let normal = |t: u32| {
+        areas[t as usize]
+            .try_normalize(0.0)
+            .unwrap_or_else(Vec3::zeros)
+    };
     let pairs = triangle_pairs(surface);
-    let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); n];
-    for &(a, b) in &pairs {
-        if normal(a).dot(&normal(b)) > FLAT_COS {
-            neighbours[a].push(b);
-            neighbours[b].push(a);
-        }
+    let mut flat = UnionFind::new(n);
+    for &(a, b) in pairs
+        .iter()
+        .filter(|(a, b)| normal(*a).dot(&normal(*b)) > FLAT_COS)
+    {
+        flat.join(a, b);
     }
+    let area_of = |members: &[u32]| {
+        members
+            .iter()
+            .map(|&t| areas[t as usize].norm())
+            .sum::<f64>()
+    };
     let total: f64 = areas.iter().map(nalgebra::Matrix::norm).sum();
-    let mut region = vec![usize::MAX; n];
-    let mut caps = Vec::new();
-    for seed in 0..n {
-        if region[seed] != usize::MAX {
-            continue;
-        }
-        let members = flood(seed, &neighbours, &mut region);
-        let area: f64 = members.iter().map(|&t| areas[t].norm()).sum();
+    let is_cap = |members: &Vec<u32>| {
         // Flat as a whole, too: a smooth round surface also bends little from triangle to triangle.
         let is_flat = members
             .iter()
-            .all(|&t| normal(t).dot(&normal(seed)) > FLAT_COS);
-        if area < MIN_CAP_SHARE * total || !is_flat || members.len() < 3 {
-            continue;
-        }
-        let mut crease = (0.0, 0);
-        for &(a, b) in &pairs {
-            if (region[a] == seed) != (region[b] == seed) {
-                crease = (crease.0 + normal(a).dot(&normal(b)), crease.1 + 1);
-            }
-        }
-        if crease.1 > 0 && crease.0 / f64::from(crease.1) < CREASE_COS {
-            caps.push(members);
-        }
-    }
-    let caps_area: f64 = caps.iter().flatten().map(|&t| areas[t].norm()).sum();
+            .all(|&t| normal(t).dot(&normal(members[0])) > FLAT_COS);
+        is_flat && members.len() >= 3 && area_of(members) >= MIN_CAP_SHARE * total
+    };
+    let mut caps: Vec<Vec<u32>> = flat.groups().into_iter().filter(is_cap).collect();
+    caps.retain(|cap| {
+        let is_in = |t: u32| cap.binary_search(&t).is_ok();
+        let border: Vec<f64> = pairs
+            .iter()
+            .filter(|(a, b)| is_in(*a) != is_in(*b))
+            .map(|(a, b)| normal(*a).dot(&normal(*b)))
+            .collect();
+        !border.is_empty() && border.iter().sum::<f64>() / (border.len() as f64) < CREASE_COS
+    });
+    let caps_area: f64 = caps.iter().map(|cap| area_of(cap)).sum();
     if caps_area > MAX_CAPS_SHARE * total {
         Vec::new()
     } else {
@@ -67,39 +68,13 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<usize>> {
 }
 
 /// Pairs of triangles that share an edge which no third triangle uses.
-fn triangle_pairs(surface: &Surface) -> Vec<(usize, usize)> {
-    let mut by_edge: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
-    for (t, &[a, b, c]) in surface.triangles.iter().enumerate() {
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            by_edge.entry([p.min(q), p.max(q)]).or_default().push(t);
-        }
-    }
-    by_edge
-        .into_values()
-        .filter_map(|t| {
-            if let [a, b] = t[..] {
-                Some((a, b))
-            } else {
-                None
-            }
+fn triangle_pairs(surface: &Surface) -> Vec<(u32, u32)> {
+    by_edge(&all_sides(surface))
+        .filter_map(|on_edge| match on_edge {
+            [a, b] => Some((a.triangle, b.triangle)),
+            _ => None,
         })
         .collect()
-}
-
-fn flood(seed: usize, neighbours: &[Vec<usize>], mark: &mut [usize]) -> Vec<usize> {
-    let mut members = vec![seed];
-    mark[seed] = seed;
-    let mut next = 0;
-    while next < members.len() {
-        for &other in &neighbours[members[next]] {
-            if mark[other] == usize::MAX {
-                mark[other] = seed;
-                members.push(other);
-            }
-        }
-        next += 1;
-    }
-    members
 }
 
 /// The surface without the triangles for which `is_dropped`, and without the vertices that only those used. Vertices
@@ -155,8 +130,8 @@ fn trim_teeth(surface: &Surface) -> Surface {
     let pairs = triangle_pairs(surface);
     let mut n_neighbours = vec![0; surface.triangles.len()];
     for &(a, b) in &pairs {
-        n_neighbours[a] += 1;
-        n_neighbours[b] += 1;
+        n_neighbours[a as usize] += 1;
+        n_neighbours[b as usize] += 1;
     }
     let mut loops_at = vec![0; surface.points.len()];
     for v in surface.boundary_loops().into_iter().flatten() {
@@ -171,26 +146,26 @@ fn trim_teeth(surface: &Surface) -> Surface {
 }
 
 fn connected_with(surface: &Surface, centre: Vec3) -> Surface {
-    let mut neighbours = vec![Vec::new(); surface.triangles.len()];
-    for (a, b) in triangle_pairs(surface) {
-        neighbours[a].push(b);
-        neighbours[b].push(a);
-    }
-    let distance = |t: usize| {
+    let distance = |t: &u32| {
         surface
-            .corners(t)
+            .corners(*t as usize)
             .iter()
             .map(|p| (p - centre).norm())
             .fold(f64::INFINITY, f64::min)
     };
-    let Some(seed) =
-        (0..surface.triangles.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
-    else {
+    let all = 0..surface.triangles.len() as u32;
+    let Some(seed) = all.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
         return surface.clone();
     };
-    let mut mark = vec![usize::MAX; surface.triangles.len()];
-    flood(seed, &neighbours, &mut mark);
-    without_triangles(surface, |t| mark[t] != seed)
+    let mut parts = UnionFind::new(surface.triangles.len());
+    for (a, b) in triangle_pairs(surface) {
+        parts.join(a, b);
+    }
+    let root = parts.find(seed);
+    let is_apart: Vec<bool> = (0..surface.triangles.len() as u32)
+        .map(|t| parts.find(t) != root)
+        .collect();
+    without_triangles(surface, |t| is_apart[t])
 }
 
 /// The cut faces along the rims of an open surface.

@@ -196,7 +196,9 @@ pub fn grow(
 
     let caps = cut::find_caps(surface);
     let mut is_cap = vec![false; surface.triangles.len()];
-    caps.iter().flatten().for_each(|&t| is_cap[t] = true);
+    for &t in caps.iter().flatten() {
+        is_cap[t as usize] = true;
+    }
     let mut skin = cut::without_triangles(surface, |t| is_cap[t]);
     let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
     if reaches_bone {
