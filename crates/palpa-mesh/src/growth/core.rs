@@ -33,7 +33,7 @@ const FILLET: f64 = 0.6;
 /// Slices of this share of the bones' length carry one point of each bone's centre line.
 const N_SLICES: usize = 48;
 /// Bones further apart than this many times the smaller one's radius are not joined.
-const MEMBRANE_REACH: f64 = 8.0;
+const MEMBRANE_REACH: f64 = 16.0;
 /// Where a bone ends this share of the bones' length before a cut face, the membrane goes on to the face.
 const MEMBRANE_OVERHANG: f64 = 0.15;
 /// Sources nearer to a cut face than this share of the bones' length are mirrored at it.
