@@ -71,6 +71,13 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     };
     let growth =
         grow(&skin, &bones, &params).map_err(|error| with_bone_name(error, &scene.body.bones))?;
+    let n_overlaps = growth.report.n_base_overlaps;
+    if n_overlaps > 0 {
+        notes.push(format!(
+            "the base of the body passes through itself ({n_overlaps} pairs of triangles): look at section.png or the VTU \
+             before trusting forces near there"
+        ));
+    }
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);

@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::core::RigidCore;
 use super::untangle::Placement;
 use super::{Growth, LayerSpec};
-use crate::{LayeredBody, Vec3};
+use crate::check::self_intersections;
+use crate::{LayeredBody, Surface, Vec3};
 
 /// A place at which a figure is worst.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -88,6 +89,9 @@ pub struct GrowthReport {
     pub worst_thinning: Option<Worst>,
     /// Share of the skin's area below which columns were shortened to keep prisms valid.
     pub shortened_share: f64,
+    /// Pairs of triangles of the base that pass through each other: prisms can all be valid, and the body still overlap
+    /// itself, where columns from two sides pass each other without meeting a core.
+    pub n_base_overlaps: usize,
     /// How far the ends of the columns stand off the nearest bone, negative inside it; absent without bones. m
     pub stand_off: Option<Spread>,
     /// The largest stand-off, absent without bones.
@@ -121,9 +125,14 @@ pub(super) fn finish(
         scaled_jacobian[worst_prism],
     );
 
-    let bases = (0..body.n_vertices()).map(|v| body.positions[body.node(v, body.n_levels - 1)]);
+    let base = Surface {
+        points: (0..body.n_vertices())
+            .map(|v| body.positions[body.node(v, body.n_levels - 1)])
+            .collect(),
+        triangles: body.skin.triangles.clone(),
+    };
     let stand_off: Vec<f64> = core.map_or_else(Vec::new, |core| {
-        bases.map(|p| core.bone_distance(p)).collect()
+        base.points.iter().map(|p| core.bone_distance(*p)).collect()
     });
     let extreme = |values: &[f64], sign: f64| {
         (0..values.len())
@@ -158,6 +167,7 @@ pub(super) fn finish(
         thinned_share: share(&|v| thinning[v] < 1.0 - 1e-9),
         worst_thinning: extreme(&thinning, -1.0).filter(|w| w.value < 1.0 - 1e-9),
         shortened_share: share(&|v| used_share[v] < 1.0 - 1e-9),
+        n_base_overlaps: self_intersections(&base).pairs.len(),
         stand_off: Spread::of(&stand_off),
         worst_stand_off: extreme(&stand_off, 1.0),
     };

@@ -125,6 +125,7 @@ impl Case {
             body["thinned_share"].as_f64().unwrap() <= self.thinned_share,
             "{body}"
         );
+        assert_eq!(body["n_base_overlaps"], 0, "the body overlaps itself");
         let samples = report["samples"].as_array().unwrap();
         let forces: Vec<f64> = samples
             .iter()
