@@ -223,6 +223,7 @@ fn the_forearm_grows_at_every_resolution() {
             "{:?}",
             report.stand_off
         );
+        assert_eq!(report.n_base_overlaps, 0);
         assert!(report.layers[0].thickness.median > 1.45e-3);
     }
 }
