@@ -35,6 +35,17 @@ pub(crate) struct Patch {
     pub(crate) is_one_sided: bool,
 }
 
+impl Patch {
+    /// The triangles wound against the majority.
+    pub(crate) fn odd_triangles(&self) -> impl Iterator<Item = u32> {
+        self.triangles
+            .iter()
+            .zip(&self.is_odd)
+            .filter(|(_, odd)| **odd)
+            .map(|(&t, _)| t)
+    }
+}
+
 /// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more meet, which
 /// two belong together is not known, and no winding is carried across. Triangles that have no sides among these are left out.
 pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
@@ -103,12 +114,7 @@ pub fn orient(surface: &mut Surface) -> OrientReport {
             report.n_one_sided += 1;
             continue;
         }
-        for (&t, _) in patch
-            .triangles
-            .iter()
-            .zip(&patch.is_odd)
-            .filter(|(_, odd)| **odd)
-        {
+        for t in patch.odd_triangles() {
             flip(surface, t);
         }
         let shape = Enclosed::of(surface, &patch.triangles);

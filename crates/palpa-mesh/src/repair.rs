@@ -247,7 +247,8 @@ pub(crate) fn duplicates(surface: &Surface) -> Vec<(u32, u32)> {
     doubles
 }
 
-fn drop_unused(surface: &mut Surface) -> usize {
+/// Drops the vertices that no triangle uses; the others keep their order. Returns how many.
+pub(crate) fn drop_unused(surface: &mut Surface) -> usize {
     let is_used = crate::topology::is_used(surface);
     let mut n_kept = 0;
     let new_index: Vec<u32> = is_used

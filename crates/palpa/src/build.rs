@@ -64,7 +64,8 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         Skin::File(path) => mended(&skin, path, &mut notes),
         Skin::Generated(_) => skin,
     };
-    let cut_out = cut_out.map(|(centre, radius)| (skin.points[nearest(&skin, centre)], radius));
+    let on_skin = |p: Vec3| skin.points.get(nearest(&skin, p)).copied().unwrap_or(p);
+    let cut_out = cut_out.map(|(centre, radius)| (on_skin(centre), radius));
     let params = GrowthParams {
         layers: layer_specs(scene)?,
         cut_out,

@@ -182,12 +182,7 @@ fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> 
             one_sided.push(first);
             continue;
         }
-        for (&t, _) in patch
-            .triangles
-            .iter()
-            .zip(&patch.is_odd)
-            .filter(|(_, odd)| **odd)
-        {
+        for t in patch.odd_triangles() {
             odd.push(t);
             wound.triangles[t as usize].swap(1, 2);
         }

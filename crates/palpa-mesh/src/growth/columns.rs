@@ -171,11 +171,11 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
 /// far side.
 pub(super) fn straight_columns(
     skin: &Surface,
-    index: &SurfaceIndex,
     directions: &[Vec3],
     depth: impl Fn(usize) -> f64,
 ) -> Vec<Column> {
     const SHARE_OF_THICKNESS: f64 = 0.45;
+    let index = SurfaceIndex::build(skin);
     let mut across: Vec<f64> = (0..skin.points.len())
         .map(|v| {
             index

@@ -1,5 +1,6 @@
 //! Faces at which a body part was cut from the rest: flat caps of a closed mesh, rims of an open one, cut-outs.
 
+use crate::repair::drop_unused;
 use crate::topology::{UnionFind, all_sides, by_edge};
 use crate::{CutFace, Surface, Vec3};
 
@@ -80,28 +81,18 @@ fn triangle_pairs(surface: &Surface) -> Vec<(u32, u32)> {
 /// The surface without the triangles for which `is_dropped`, and without the vertices that only those used. Vertices
 /// keep their order.
 pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) -> bool) -> Surface {
-    let kept: Vec<[u32; 3]> = surface
+    let triangles = surface
         .triangles
         .iter()
         .enumerate()
         .filter(|(t, _)| !is_dropped(*t))
-        .map(|(_, t)| *t)
-        .collect();
-    let mut is_used = vec![false; surface.points.len()];
-    for &v in kept.iter().flatten() {
-        is_used[v as usize] = true;
-    }
-    let mut index = vec![0; surface.points.len()];
-    let mut points = Vec::new();
-    for v in (0..is_used.len()).filter(|&v| is_used[v]) {
-        index[v] = points.len() as u32;
-        points.push(surface.points[v]);
-    }
-    let triangles = kept
-        .into_iter()
-        .map(|t| t.map(|v| index[v as usize]))
-        .collect();
-    Surface { points, triangles }
+        .map(|(_, t)| *t);
+    let mut kept = Surface {
+        points: surface.points.clone(),
+        triangles: triangles.collect(),
+    };
+    drop_unused(&mut kept);
+    kept
 }
 
 /// The part of a surface within `radius` of `centre`, connected with the vertex nearest to it; ragged teeth and

@@ -21,7 +21,7 @@ use thiserror::Error;
 pub use report::{GrowthReport, LayerReport, Spread, Worst};
 pub use thickness::{ScatteredThickness, Thickness};
 
-use crate::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use crate::{LayeredBody, Surface, Vec3};
 use columns::{Column, Confinement};
 use core::RigidCore;
 
@@ -66,8 +66,6 @@ pub struct Growth {
     /// How far the end of each column stands off the nearest bone, in metres, negative inside it; empty without
     /// bones. `[n_vertices]`
     pub stand_off: Vec<f64>,
-    /// Shape of each prism, triangle by triangle, intervals inside. `[n_prisms]`
-    pub scaled_jacobian: Vec<f64>,
 }
 
 /// Why a body could not be grown.
@@ -222,15 +220,7 @@ pub fn grow(
 
     let rings = columns::one_rings(&skin);
     let confinement = Confinement::new(skin.points.len(), &cuts);
-    let skin_index = SurfaceIndex::build(&skin);
-    let fixed_depth = |v: usize| -> f64 {
-        params
-            .layers
-            .iter()
-            .filter_map(|l| l.thickness.as_ref())
-            .map(|t| t.at(skin.points[v]))
-            .sum()
-    };
+    let fixed_depth = |v: usize| fixed_thickness(&params.layers, skin.points[v]);
     check_thickness(&skin, &params.layers)?;
     let mean_depth =
         (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
@@ -249,7 +239,7 @@ pub fn grow(
         (lines, Some(core))
     } else {
         (
-            columns::straight_columns(&skin, &skin_index, &directions, fixed_depth),
+            columns::straight_columns(&skin, &directions, fixed_depth),
             None,
         )
     };
@@ -285,6 +275,15 @@ pub fn grow(
     ))
 }
 
+/// What the layers of given thickness ask for together below a skin point. m
+fn fixed_thickness(layers: &[LayerSpec], skin_point: Vec3) -> f64 {
+    layers
+        .iter()
+        .filter_map(|l| l.thickness.as_ref())
+        .map(|t| t.at(skin_point))
+        .sum()
+}
+
 /// What a layer that reaches down to the bone asks for at least, given the thickness of the layers above it. m
 fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
     layer.min_thickness.max(LEAST_FILL_SHARE * fixed)
@@ -292,11 +291,7 @@ fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
 
 /// Where the levels of one column lie: arc lengths of its nodes, and by which factor its most thinned layer was thinned.
 fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<f64>) -> f64 {
-    let fixed: f64 = layers
-        .iter()
-        .filter_map(|l| l.thickness.as_ref())
-        .map(|t| t.at(skin_point))
-        .sum();
+    let fixed = fixed_thickness(layers, skin_point);
     let nominal: Vec<f64> = layers
         .iter()
         .map(|l| match &l.thickness {
@@ -475,11 +470,7 @@ fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
 /// Refuses when the layers of given thickness find room nowhere.
 fn check_room(skin: &Surface, layers: &[LayerSpec], lines: &[Column]) -> Result<(), GrowthError> {
     let asked = |v: usize| -> f64 {
-        let fixed: f64 = layers
-            .iter()
-            .filter_map(|l| l.thickness.as_ref())
-            .map(|t| t.at(skin.points[v]))
-            .sum();
+        let fixed = fixed_thickness(layers, skin.points[v]);
         fixed
             + layers
                 .iter()

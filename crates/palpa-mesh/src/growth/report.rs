@@ -119,7 +119,7 @@ pub(super) fn finish(
     };
     let worst_prism = (0..shapes.len())
         .min_by(|&a, &b| scaled_jacobian[a].total_cmp(&scaled_jacobian[b]))
-        .map_or(0, |p| p);
+        .unwrap_or(0);
     let worst_prism = worst_at(
         body.skin.triangles[worst_prism / n_intervals][0] as usize,
         scaled_jacobian[worst_prism],
@@ -176,7 +176,6 @@ pub(super) fn finish(
         report,
         thinning,
         stand_off,
-        scaled_jacobian,
     }
 }
 

@@ -317,6 +317,15 @@ fn bad_input_is_refused_in_one_paragraph() {
             "at = [\"0 mm\", \"0 mm\", \"0 mm\"]\ndirection = [0, 0.2, 1]",
         ),
         "no_faces.obj".to_owned(),
+        {
+            bench.file("flat.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nf 1 2 3\n");
+            let body = "[body]\nsurface = \"flat.obj\"\ncutout_radius = \"50 mm\"\n";
+            let layer = "[[layer]]\ntissue = \"fat\"\nthickness = \"5 mm\"\n";
+            bench.file(
+                "flat.toml",
+                &format!("{body}{layer}[press]\nvertex = 0\ndepth = \"1 mm\"\n"),
+            )
+        },
         "nowhere.toml".to_owned(),
     ];
     let mut messages: Vec<String> = scenes.iter().map(|scene| bench.refusal(&[scene])).collect();
