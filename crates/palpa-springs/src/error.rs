@@ -95,3 +95,11 @@ pub enum SpringError {
         n_dofs: usize,
     },
 }
+
+impl From<palpa_sparse::TooLarge> for SpringError {
+    fn from(error: palpa_sparse::TooLarge) -> Self {
+        Self::TooLarge {
+            n_dofs: error.n_dofs,
+        }
+    }
+}

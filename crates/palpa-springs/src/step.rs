@@ -9,6 +9,7 @@
 //! explicit Euler (`relax`); every part tries the finite elements first, so that they take over again by themselves.
 
 use palpa_mesh::Vec3;
+use palpa_sparse::Singular;
 
 use crate::constraints::Role;
 use crate::euler::{EulerParams, euler_step};
@@ -16,7 +17,6 @@ use crate::model::SpringModel;
 use crate::network::Bar;
 use crate::relax::relax;
 use crate::state::{Mode, SpringState, Workspace};
-use crate::system::Singular;
 
 /// A free node that moves further than this many times the way of the tool in one part is on a mechanism, though
 /// rounding (or its bars being very nearly in a plane) let the matrix pass as regular.

@@ -6,7 +6,9 @@
 
 use palpa_mesh::Vec3;
 
-use super::{SINGULAR_PIVOT, Singular};
+use palpa_sparse::Singular;
+
+use super::SINGULAR_PIVOT;
 use crate::constraints::Freedom;
 use crate::network::Bar;
 

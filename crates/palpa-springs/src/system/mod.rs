@@ -4,7 +4,6 @@
 //! numbers. Free directions are numbered column by column of the body, in the fill-reducing order of the columns, and
 //! only the lower triangle is kept.
 
-mod factor;
 mod inverse;
 mod ordering;
 
@@ -14,9 +13,9 @@ use crate::constraints::Freedom;
 use crate::error::SpringError;
 use crate::network::{Network, direction};
 use crate::params::Solver;
-use factor::{Factor, Pattern};
 use inverse::HistoricalInverse;
-use ordering::{NodePattern, column_order, node_pattern};
+use ordering::{column_order, node_pattern};
+use palpa_sparse::{Factor, NodePattern, Pattern, Singular};
 
 /// A pivot smaller than this, relative to the diagonal entry that it came from, is taken for zero: the node can move
 /// without stretching a bar. Rounding leaves about 1e-14 where exact arithmetic leaves 0.
@@ -24,10 +23,6 @@ const SINGULAR_PIVOT: f64 = 1e-11;
 
 /// Marks a node without unknowns.
 const NONE: usize = usize::MAX;
-
-/// The matrix turned out not to be positive definite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Singular;
 
 /// What the topology decides about the linear system.
 #[derive(Debug)]

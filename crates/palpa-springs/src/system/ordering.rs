@@ -1,15 +1,10 @@
 //! The order of elimination: columns of the body by approximate minimum degree, the nodes of a column together.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::amd;
+use palpa_sparse::{NodePattern, minimum_degree};
 
 use crate::constraints::Freedom;
 use crate::error::SpringError;
 use crate::network::Network;
-
-/// For each node that has unknowns, in the order of elimination: the node, and its neighbours later in that order.
-pub(crate) type NodePattern = Vec<(usize, Vec<usize>)>;
 
 /// Nodes with unknowns in the order of elimination. The graph that is ordered has the columns that hold such nodes
 /// for vertices, as all the structure of a layered body is in its skin.
@@ -30,7 +25,7 @@ pub(crate) fn column_order(
     for (r, &c) in taking_part.iter().enumerate() {
         rank[c] = r;
     }
-    let mut pairs: Vec<(usize, usize)> = network
+    let edges = network
         .bars
         .iter()
         .filter(|bar| {
@@ -40,33 +35,9 @@ pub(crate) fn column_order(
         })
         .map(|bar| {
             let [a, b] = [bar.a, bar.b].map(|n| rank[network.column[n as usize] as usize]);
-            (a.max(b), a.min(b))
-        })
-        .filter(|(column, row)| column != row)
-        .collect();
-    pairs.sort_unstable();
-    pairs.dedup();
-
-    let n = taking_part.len();
-    let mut col_ptr = vec![0; n + 1];
-    for &(column, _) in &pairs {
-        col_ptr[column + 1] += 1;
-    }
-    for c in 0..n {
-        col_ptr[c + 1] += col_ptr[c];
-    }
-    let row_idx: Vec<usize> = pairs.iter().map(|&(_, row)| row).collect();
-    let graph = SymbolicSparseColMatRef::new_checked(n, n, &col_ptr, None, &row_idx);
-    let (mut forward, mut inverse) = (vec![0; n], vec![0; n]);
-    let mut memory = MemBuffer::new(amd::order_scratch::<usize>(n, row_idx.len()));
-    amd::order(
-        &mut forward,
-        &mut inverse,
-        graph,
-        amd::Control::default(),
-        MemStack::new(&mut memory),
-    )
-    .map_err(|_| SpringError::TooLarge { n_dofs: n })?;
+            (a, b)
+        });
+    let forward = minimum_degree(taking_part.len(), edges)?;
     Ok(forward
         .into_iter()
         .flat_map(|r| members[taking_part[r]].iter().copied())

@@ -1,4 +1,4 @@
-//! Cholesky factors of `K_ff`, dense or by supernodes, in memory that is allocated once.
+//! Cholesky factors, dense or by supernodes, in memory that is allocated once.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt;
@@ -7,9 +7,7 @@ use faer::sparse::linalg::cholesky::{simplicial, supernodal};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, MatRef, Par};
 
-use super::Singular;
-use super::ordering::NodePattern;
-use crate::error::SpringError;
+use crate::{NodePattern, Singular, TooLarge};
 
 /// How readily supernodes are merged: up to this many columns while the share of zeros stays below. Columns of a body are
 /// small dense blocks already, and merging more of them than is usual saves 5–10 % of a step at 300–1,000 nodes.
@@ -17,7 +15,10 @@ const RELAXATION: [(usize, f64); 4] = [(8, 1.0), (32, 0.8), (64, 0.3), (usize::M
 
 /// Where the entries of the lower triangle stand.
 #[derive(Debug)]
-pub(crate) enum Pattern {
+pub struct Pattern(Kind);
+
+#[derive(Debug)]
+enum Kind {
     /// All of them, by columns of length `n`.
     Dense { n: usize },
     /// Only what bars touch, by columns.
@@ -28,16 +29,20 @@ pub(crate) enum Pattern {
 }
 
 impl Pattern {
-    pub(crate) fn dense(n: usize) -> Self {
-        Self::Dense { n }
+    /// The pattern of a full matrix of order `n`.
+    pub fn dense(n: usize) -> Self {
+        Self(Kind::Dense { n })
     }
 
-    /// The pattern of a network; `unknowns` says a node's first unknown and how many it has.
-    pub(crate) fn sparse(
+    /// The pattern of nodes in their order of elimination; `unknowns` says a node's first unknown and how many it has.
+    ///
+    /// # Errors
+    /// When the factor does not fit the address space.
+    pub fn sparse(
         nodes: &NodePattern,
         n_dofs: usize,
         unknowns: impl Fn(usize) -> (usize, usize),
-    ) -> Result<Self, SpringError> {
+    ) -> Result<Self, TooLarge> {
         let mut col_ptr = vec![0];
         let mut row_idx = Vec::new();
         for (node, later) in nodes {
@@ -50,30 +55,34 @@ impl Pattern {
                 col_ptr.push(row_idx.len());
             }
         }
-        let symbolic =
-            analyse(&col_ptr, &row_idx, n_dofs).ok_or(SpringError::TooLarge { n_dofs })?;
-        Ok(Self::Sparse {
+        let symbolic = analyse(&col_ptr, &row_idx, n_dofs).ok_or(TooLarge { n_dofs })?;
+        Ok(Self(Kind::Sparse {
             lower: SymbolicSparseColMat::new_checked(n_dofs, n_dofs, col_ptr, None, row_idx),
             symbolic: Box::new(symbolic),
-        })
+        }))
     }
 
-    pub(crate) fn n_entries(&self) -> usize {
-        match self {
-            Self::Dense { n } => n * n,
-            Self::Sparse { lower, .. } => lower.row_idx().len(),
+    /// Number of entries of the lower triangle that are kept (of the whole matrix, if it is dense).
+    pub fn n_entries(&self) -> usize {
+        match &self.0 {
+            Kind::Dense { n } => n * n,
+            Kind::Sparse { lower, .. } => lower.row_idx().len(),
         }
     }
 
-    pub(crate) fn diagonal(&self, i: usize) -> usize {
+    /// The index of the entry `(i, i)`.
+    pub fn diagonal(&self, i: usize) -> usize {
         self.entry(i, i)
     }
 
     /// The index of an entry of the pattern, `row ≥ column`.
-    pub(crate) fn entry(&self, row: usize, column: usize) -> usize {
-        match self {
-            Self::Dense { n } => column * n + row,
-            Self::Sparse { lower, .. } => {
+    ///
+    /// # Panics
+    /// When the entry is not in the pattern.
+    pub fn entry(&self, row: usize, column: usize) -> usize {
+        match &self.0 {
+            Kind::Dense { n } => column * n + row,
+            Kind::Sparse { lower, .. } => {
                 let entries = lower.col_range(column);
                 let rows = &lower.row_idx()[entries.clone()];
                 let place = rows
@@ -134,7 +143,7 @@ fn analyse(
 }
 
 /// The numbers of a factor. A dense one overwrites the matrix.
-pub(crate) struct Factor {
+pub struct Factor {
     lower: Vec<f64>,
     memory: MemBuffer,
 }
@@ -148,9 +157,10 @@ impl std::fmt::Debug for Factor {
 }
 
 impl Factor {
-    pub(crate) fn new(pattern: &Pattern) -> Self {
-        let (n_entries, scratch) = match pattern {
-            Pattern::Dense { n } => (
+    /// Memory for the factors of a pattern, before there is one.
+    pub fn new(pattern: &Pattern) -> Self {
+        let (n_entries, scratch) = match &pattern.0 {
+            Kind::Dense { n } => (
                 0,
                 StackReq::any_of(&[
                     llt::factor::cholesky_in_place_scratch::<f64>(
@@ -161,7 +171,7 @@ impl Factor {
                     llt::solve::solve_in_place_scratch::<f64>(*n, 1, Par::Seq),
                 ]),
             ),
-            Pattern::Sparse { symbolic, .. } => (
+            Kind::Sparse { symbolic, .. } => (
                 symbolic.len_val(),
                 StackReq::any_of(&[
                     supernodal::factorize_supernodal_numeric_llt_scratch::<usize, f64>(
@@ -180,7 +190,10 @@ impl Factor {
     }
 
     /// Factors the matrix in `values`; pivots are judged by `scale`, the matrix's diagonal.
-    pub(crate) fn refactor(
+    ///
+    /// # Errors
+    /// When a pivot is not positive, or is smaller than `least_pivot` of the diagonal entry that it came from.
+    pub fn refactor(
         &mut self,
         pattern: &Pattern,
         values: &mut [f64],
@@ -189,8 +202,8 @@ impl Factor {
     ) -> Result<(), Singular> {
         let stack = MemStack::new(&mut self.memory);
         let is_regular = |pivot: f64, i: usize| pivot * pivot > least_pivot * scale[i];
-        match pattern {
-            Pattern::Dense { n } => {
+        match &pattern.0 {
+            Kind::Dense { n } => {
                 let mut matrix = MatMut::from_column_major_slice_mut(values, *n, *n);
                 llt::factor::cholesky_in_place(
                     matrix.as_mut(),
@@ -203,7 +216,7 @@ impl Factor {
                 let diagonal = (0..*n).all(|i| is_regular(matrix[(i, i)], i));
                 diagonal.then_some(()).ok_or(Singular)
             }
-            Pattern::Sparse { lower, symbolic } => {
+            Kind::Sparse { lower, symbolic } => {
                 supernodal::factorize_supernodal_numeric_llt(
                     &mut self.lower,
                     SparseColMatRef::new(lower.as_ref(), values),
@@ -226,18 +239,18 @@ impl Factor {
     }
 
     /// Solves in place; `values` holds the factor if it is dense.
-    pub(crate) fn solve(&mut self, pattern: &Pattern, values: &[f64], right_side: &mut [f64]) {
+    pub fn solve(&mut self, pattern: &Pattern, values: &[f64], right_side: &mut [f64]) {
         let n = right_side.len();
         let stack = MemStack::new(&mut self.memory);
         let right_side = MatMut::from_column_major_slice_mut(right_side, n, 1);
-        match pattern {
-            Pattern::Dense { n } => llt::solve::solve_in_place(
+        match &pattern.0 {
+            Kind::Dense { n } => llt::solve::solve_in_place(
                 MatRef::from_column_major_slice(values, *n, *n),
                 right_side,
                 Par::Seq,
                 stack,
             ),
-            Pattern::Sparse { symbolic, .. } => {
+            Kind::Sparse { symbolic, .. } => {
                 supernodal::SupernodalLltRef::new(symbolic, &self.lower).solve_in_place_with_conj(
                     Conj::No,
                     right_side,
