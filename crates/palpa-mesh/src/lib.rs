@@ -11,6 +11,7 @@ pub mod growth;
 pub mod orient;
 pub mod quality;
 pub mod read;
+pub mod refine;
 pub mod repair;
 pub mod surface;
 mod topology;

@@ -2,102 +2,11 @@
 
 use std::sync::LazyLock;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use crate::units::{Density, Pressure};
-
-/// A tissue: its elasticity and, where known, its density.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Tissue {
-    /// Its name.
-    pub name: String,
-    /// How it resists deformation.
-    pub law: Law,
-    /// Density in kg/m³, where known.
-    pub density: Option<Sourced>,
-}
-
-/// How a tissue resists deformation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Law {
-    /// Isotropic elasticity.
-    Elastic {
-        /// Young's modulus in pascals.
-        young: Sourced,
-        /// Poisson's ratio.
-        poisson: Sourced,
-    },
-    /// Every bar is a spring of one stiffness, as in the reference method.
-    Spring {
-        /// Stiffness of a bar in N/m.
-        constant: Sourced,
-    },
-}
-
-/// A number with its source.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sourced {
-    /// The value in SI.
-    pub value: f64,
-    /// How far it is to be trusted.
-    pub status: Status,
-    /// Where it is from, in words; may be empty when the scene gives it.
-    pub source: String,
-}
-
-/// How far a number is to be trusted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Read in the work that measured it, or measured on the body at hand.
-    Measured,
-    /// From an abstract or a secondary source.
-    Literature,
-    /// From memory, an order of magnitude or a choice.
-    Assumed,
-    /// Given by the scene, which answers for it.
-    Given,
-}
-
-impl Tissue {
-    /// Young's modulus in pascals, unless the tissue is given by a spring stiffness.
-    pub fn young(&self) -> Option<f64> {
-        match &self.law {
-            Law::Elastic { young, .. } => Some(young.value),
-            Law::Spring { .. } => None,
-        }
-    }
-
-    /// Poisson's ratio, unless the tissue is given by a spring stiffness.
-    pub fn poisson(&self) -> Option<f64> {
-        match &self.law {
-            Law::Elastic { poisson, .. } => Some(poisson.value),
-            Law::Spring { .. } => None,
-        }
-    }
-
-    /// Stiffness of every bar in N/m, if the tissue is given by it.
-    pub fn spring(&self) -> Option<f64> {
-        match &self.law {
-            Law::Spring { constant } => Some(constant.value),
-            Law::Elastic { .. } => None,
-        }
-    }
-
-    /// How far the stiffness (Young's modulus or spring constant) is to be trusted.
-    pub fn status(&self) -> Status {
-        match &self.law {
-            Law::Elastic {
-                young: stiffness, ..
-            }
-            | Law::Spring {
-                constant: stiffness,
-            } => stiffness.status,
-        }
-    }
-}
+use crate::law::{LawName, Parts};
+use crate::units::{Density, Pressure, Time};
+use crate::{Moduli, Prony, PronyTerm, Sourced, Status, Tissue};
 
 /// Every tissue that a scene can name.
 pub fn catalogue() -> &'static [Tissue] {
@@ -108,51 +17,102 @@ pub fn catalogue() -> &'static [Tissue] {
     &CATALOGUE
 }
 
-fn read(text: &str) -> Result<Vec<Tissue>, toml::de::Error> {
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct File {
-        tissue: Vec<Entry>,
-    }
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    tissue: Vec<Entry>,
+}
 
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Entry {
-        name: String,
-        young: Written<Pressure>,
-        poisson: Written<f64>,
-        density: Option<Written<Density>>,
-    }
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    law: LawName,
+    young: Option<Written<Pressure>>,
+    c10: Option<Written<Pressure>>,
+    b: Option<Written<f64>>,
+    poisson: Option<Written<f64>>,
+    bulk: Option<Written<Pressure>>,
+    prony: Option<WrittenProny>,
+    density: Option<Written<Density>>,
+}
 
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Written<T> {
-        value: T,
-        status: Status,
-        source: String,
-    }
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written<T> {
+    value: T,
+    status: Status,
+    source: String,
+}
 
-    impl<T> Written<T> {
-        fn sourced(self, to_si: fn(T) -> f64) -> Sourced {
-            Sourced {
-                value: to_si(self.value),
-                status: self.status,
-                source: self.source,
-            }
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenProny {
+    terms: Vec<WrittenTerm>,
+    status: Status,
+    source: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenTerm {
+    g: f64,
+    tau: Time,
+}
+
+fn read(text: &str) -> Result<Vec<Tissue>, String> {
+    let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+    file.tissue.into_iter().map(Entry::tissue).collect()
+}
+
+impl Entry {
+    fn tissue(self) -> Result<Tissue, String> {
+        let pressure =
+            |written: Option<Written<Pressure>>| written.map(|w| w.sourced(Pressure::si));
+        let number = |written: Option<Written<f64>>| written.map(|w| w.sourced(|number| number));
+        let parts = Parts {
+            law: self.law,
+            young: pressure(self.young),
+            c10: pressure(self.c10),
+            b: number(self.b),
+            poisson: number(self.poisson),
+            bulk: pressure(self.bulk),
+            ..Parts::default()
+        };
+        Ok(Tissue {
+            law: parts
+                .law()
+                .map_err(|fault| format!("{}: {}", self.name, fault.message))?,
+            name: self.name,
+            prony: self.prony.map(WrittenProny::prony),
+            density: self.density.map(|density| density.sourced(Density::si)),
+        })
+    }
+}
+
+impl<T> Written<T> {
+    fn sourced(self, to_si: fn(T) -> f64) -> Sourced {
+        Sourced {
+            value: to_si(self.value),
+            status: self.status,
+            source: self.source,
         }
     }
+}
 
-    let file: File = toml::from_str(text)?;
-    Ok(file
-        .tissue
-        .into_iter()
-        .map(|entry| Tissue {
-            name: entry.name,
-            law: Law::Elastic {
-                young: entry.young.sourced(Pressure::si),
-                poisson: entry.poisson.sourced(|ratio| ratio),
-            },
-            density: entry.density.map(|density| density.sourced(Density::si)),
-        })
-        .collect())
+impl WrittenProny {
+    /// The moduli of the catalogue are those at rest.
+    fn prony(self) -> Prony {
+        let term = |term: &WrittenTerm| PronyTerm {
+            g: term.g,
+            tau: term.tau.si(),
+        };
+        Prony {
+            terms: self.terms.iter().map(term).collect(),
+            moduli: Moduli::LongTerm,
+            relaxes_volume: false,
+            status: self.status,
+            source: self.source,
+        }
+    }
 }

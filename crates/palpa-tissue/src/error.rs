@@ -186,9 +186,10 @@ impl<'a> Document<'a> {
             .ok()
             .and_then(|root| key_at(&DeValue::Table(root.into_inner()), &span))
             .unwrap_or_default();
-        if key == "layer" && message.contains("expected a sequence") {
-            "a single table; write every layer under its own [[layer]], in two brackets"
-                .clone_into(&mut message);
+        if ["layer", "lump"].contains(&key.as_str()) && message.contains("expected a sequence") {
+            message = format!(
+                "a single table; write every {key} under its own [[{key}]], in two brackets"
+            );
         }
         let place = self.place(span.start, key);
         // serde tells what it did not know only in the words of its message: unknown field `a`, expected `b` or `c`

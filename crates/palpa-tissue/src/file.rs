@@ -9,17 +9,22 @@
     reason = "these comments become the descriptions of the schema, which are plain text"
 )]
 
-use std::fmt;
+mod either;
+mod tissue;
+mod tool;
+
 use std::path::PathBuf;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{self, DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+pub(crate) use self::either::{AxisName, AxisSpec, ThicknessSpec, TissueSpec};
+pub(crate) use self::tissue::{OgdenTable, PronyTable, PronyTermTable, TissueTable};
+pub(crate) use self::tool::{LumpShapeName, LumpTable, ToolShape, ToolTable};
 use crate::Status;
+use crate::model::ModelKind;
 use crate::scene::{CutFaces, InPlane, LengthUnit, Solver};
-use crate::units::{Density, Length, Pressure, Stiffness, Time, Velocity};
+use crate::units::{Kind, Length, Pressure, Quantity, Rate, Time, Velocity};
 
 /// A scene of Palpa: the body that is pressed, its layers, the tool and the press.
 ///
@@ -33,12 +38,21 @@ pub(crate) struct SceneFile {
     /// The layers, from the skin inward: 1 to 32 of them, with 256 levels at most together.
     #[serde(default)]
     pub(crate) layer: Vec<LayerTable>,
-    /// What presses. Default: a disc of radius 8 mm.
+    /// Lumps in the layers, 64 at most; where two overlap, the later one counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) lump: Vec<LumpTable>,
+    /// What presses. Default: a disc of radius 8 mm, bonded to the skin.
     #[serde(default)]
     pub(crate) tool: ToolTable,
     /// Where, how deep and how fast it presses.
     #[serde(default)]
     pub(crate) press: PressTable,
+    /// How the body answers.
+    #[serde(default)]
+    pub(crate) model: ModelTable,
+    /// How fine the body is made where it matters.
+    #[serde(default)]
+    pub(crate) mesh: MeshTable,
     /// Parameters of the reference method (a network of bars).
     #[serde(default)]
     pub(crate) reference: ReferenceTable,
@@ -134,46 +148,10 @@ pub(crate) struct LayerTable {
     /// Default: a fifth of the (smallest) thickness, or "0.5 mm" when that is not known beforehand.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) min_thickness: Option<Length>,
-}
-
-/// The tissue of a layer: a name of the catalogue, or values given here.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub(crate) enum TissueSpec {
-    Name(String),
-    Inline(TissueTable),
-}
-
-/// A tissue by its values: either `young` (with `poisson`) or `spring`.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct TissueTable {
-    /// What the tissue is called in reports. Default: "given in the scene".
-    #[serde(default = "default_tissue_name")]
-    pub(crate) name: String,
-    /// Young's modulus, 10 Pa to 1 GPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) young: Option<Pressure>,
-    /// Poisson's ratio, 0 to 0.4999. Default: 0.45, customary in limb indentation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) poisson: Option<f64>,
-    /// The stiffness of every bar of the layer, as the reference method has it, 1 µN/m to 1 MN/m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) spring: Option<Stiffness>,
-    /// Density, 100 kg/m³ to 20000 kg/m³. Default: not known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) density: Option<Density>,
-    /// Where the values are from, in words. Default: nothing said.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub(crate) source: String,
-}
-
-/// The thickness of a layer.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub(crate) enum ThicknessSpec {
-    Uniform(Length),
-    Varying(ThicknessTable),
+    /// The tension in every direction of the layer's plane before anything presses, 0 Pa to 1 MPa. Skin on a living
+    /// forearm is under 28-92 kPa or 6.2-11.4 N/m (Flynn et al., abstracts). Default: "0 Pa".
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub(crate) prestress: Pressure,
 }
 
 /// A thickness that varies: either `axis` with `table`, or `file`.
@@ -190,48 +168,6 @@ pub(crate) struct ThicknessTable {
     /// A CSV file with the columns x, y, z and thickness, in the unit of the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) file: Option<PathBuf>,
-}
-
-/// A direction: a name of an axis or three numbers.
-#[derive(Debug)]
-pub(crate) enum AxisSpec {
-    Name(AxisName),
-    Vector([f64; 3]),
-}
-
-/// An axis of the body's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum AxisName {
-    /// (1, 0, 0)
-    X,
-    /// (0, 1, 0)
-    Y,
-    /// (0, 0, 1)
-    Z,
-}
-
-/// What presses.
-#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct ToolTable {
-    /// Its shape. Default: "disc".
-    #[serde(default)]
-    pub(crate) shape: ToolShape,
-    /// Disc only: its radius, 0.1 mm to 200 mm. Default: "8 mm".
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) radius: Option<Length>,
-}
-
-/// The shapes of tools.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum ToolShape {
-    /// A patch of skin bonded to a rigid disc.
-    #[default]
-    Disc,
-    /// The single operated node of the reference method.
-    Node,
 }
 
 /// Where, how deep and how fast the tool presses. Either `at` or `vertex` is given, or none of them.
@@ -251,11 +187,18 @@ pub(crate) struct PressTable {
     /// How deep the tool goes, 1 µm to 500 mm. Default: "8 mm".
     pub(crate) depth: Length,
     /// How fast the tool goes down and up, 0.01 mm/s to 1 m/s. Default: "10 mm/s".
-    pub(crate) speed: Velocity,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) speed: Option<Velocity>,
+    /// Speeds to compare, in place of `speed`: the whole press is run at each; 16 at most, each 0.01 mm/s to 1 m/s.
+    /// Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) speeds: Vec<Velocity>,
     /// How long the tool rests at its depth, 0 s to 600 s. Default: "0.5 s".
     pub(crate) hold: Time,
     /// Whether the tool comes back up. Default: true.
     pub(crate) retract: bool,
+    /// How often the tool goes down, rests and comes back, 1 to 100; more than once only with `retract`. Default: 1.
+    pub(crate) cycles: u32,
     /// By how much the depth grows from one result to the next: no more than the depth and no less than a 5000th of it.
     /// Default: a 32nd of the depth.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -269,10 +212,99 @@ impl Default for PressTable {
             vertex: None,
             direction: None,
             depth: Length::from_si(8e-3),
-            speed: Velocity::from_si(10e-3),
+            speed: None,
+            speeds: Vec::new(),
             hold: Time::from_si(0.5),
             retract: true,
+            cycles: 1,
             step: None,
+        }
+    }
+}
+
+/// How the body answers.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct ModelTable {
+    /// Which model answers. Default: "tissue".
+    pub(crate) kind: ModelKind,
+    /// The share of the strain that two paired prisms take as their mean, 0 to 0.95. More is softer and nearer to the
+    /// truth on a coarse mesh, but lets a node that is pressed alone move against its neighbours. Default: 0.8.
+    pub(crate) alpha: f64,
+    /// Whether mass and damping count. Default: "quasi-static".
+    pub(crate) dynamics: DynamicsName,
+    /// Damping beside that of relaxation; only with dynamics = "implicit". Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) damping: Option<DampingTable>,
+    /// The largest force left over at a free node in equilibrium, relative to the forces in the body, 0.000000000001 to
+    /// 0.001. Default: 0.00000001.
+    pub(crate) tolerance: f64,
+}
+
+impl Default for ModelTable {
+    fn default() -> Self {
+        Self {
+            kind: ModelKind::default(),
+            alpha: 0.8,
+            dynamics: DynamicsName::default(),
+            damping: None,
+            tolerance: 1e-8,
+        }
+    }
+}
+
+/// Whether mass and damping count.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum DynamicsName {
+    /// Equilibrium at every moment; time acts through relaxation only.
+    #[default]
+    QuasiStatic,
+    /// Mass and damping, stepped implicitly. Tissues of unknown density count as 1000 kg/m³.
+    Implicit,
+}
+
+/// Rayleigh damping: the damping matrix is `mass` times the mass matrix and `stiffness` times the stiffness matrix.
+#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DampingTable {
+    /// The factor of the mass, 0 1/s to 100000 1/s: damps slow motion. Default: "0 1/s".
+    #[serde(default)]
+    pub(crate) mass: Rate,
+    /// The factor of the stiffness, 0 s to 10 s: damps fast motion. Default: "0 s".
+    #[serde(default)]
+    pub(crate) stiffness: Time,
+}
+
+/// How fine the body is made where it matters. Nothing is made coarser than it was.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct MeshTable {
+    /// Whether the body is refined near the tool and lumps; else it is taken as it was grown. Default: true.
+    pub(crate) refine: bool,
+    /// The wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the
+    /// radius that the tool presses on, 0.5 mm to 10 mm; nothing under a node.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) near_tool: Option<Length>,
+    /// The wanted length of edges and height of levels in and round lumps, 0.1 mm to 100 mm. Default: half of a lump's
+    /// smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) near_lumps: Option<Length>,
+    /// By which share of the distance from tool or lump the wanted length grows, 0.02 to 5. Default: 0.3.
+    pub(crate) growth: f64,
+    /// Most skin vertices that refinement may lead to, 100 to 500000; then the body stays as fine as they allow.
+    /// Default: 20000.
+    pub(crate) max_vertices: u32,
+}
+
+impl Default for MeshTable {
+    fn default() -> Self {
+        Self {
+            refine: true,
+            near_tool: None,
+            near_lumps: None,
+            growth: 0.3,
+            max_vertices: 20_000,
         }
     }
 }
@@ -316,6 +348,14 @@ fn default_levels() -> u32 {
     1
 }
 
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands over a reference"
+)]
+fn is_none<K: Kind>(quantity: &Quantity<K>) -> bool {
+    quantity.si() == 0.0
+}
+
 fn default_thickness_status() -> Status {
     Status::Given
 }
@@ -327,145 +367,3 @@ fn default_thickness_status() -> Status {
 fn is_given(status: &Status) -> bool {
     *status == Status::Given
 }
-
-fn default_tissue_name() -> String {
-    "given in the scene".to_owned()
-}
-
-/// A value that is written as a text or as a table.
-///
-/// serde's untagged enums would do the same, but lose the place and the reason of an error inside the table.
-trait TextOrTable: Sized {
-    const EXPECTING: &'static str;
-    type Table: DeserializeOwned;
-
-    fn from_text(text: &str) -> Result<Self, String>;
-    fn from_table(table: Self::Table) -> Self;
-}
-
-fn text_or_table<'de, T: TextOrTable, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<T, D::Error> {
-    struct Either<T>(std::marker::PhantomData<T>);
-
-    impl<'de, T: TextOrTable> Visitor<'de> for Either<T> {
-        type Value = T;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str(T::EXPECTING)
-        }
-
-        fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
-            T::from_text(text).map_err(E::custom)
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
-            T::Table::deserialize(MapAccessDeserializer::new(map)).map(T::from_table)
-        }
-    }
-
-    deserializer.deserialize_any(Either(std::marker::PhantomData))
-}
-
-impl TextOrTable for TissueSpec {
-    const EXPECTING: &'static str = "the name of a tissue such as \"skin\", or a table such as { young = \"12 kPa\", poisson = 0.45 }";
-    type Table = TissueTable;
-
-    fn from_text(text: &str) -> Result<Self, String> {
-        Ok(Self::Name(text.to_owned()))
-    }
-
-    fn from_table(table: TissueTable) -> Self {
-        Self::Inline(table)
-    }
-}
-
-impl TextOrTable for ThicknessSpec {
-    const EXPECTING: &'static str = "a length with its unit such as \"1.5 mm\", or a table such as { axis = \"x\", \
-         table = [[\"50 mm\", \"1.2 mm\"], [\"200 mm\", \"1.5 mm\"]] } or { file = \"thickness.csv\" }";
-    type Table = ThicknessTable;
-
-    fn from_text(text: &str) -> Result<Self, String> {
-        text.parse()
-            .map(Self::Uniform)
-            .map_err(|e: crate::units::QuantityError| e.to_string())
-    }
-
-    fn from_table(table: ThicknessTable) -> Self {
-        Self::Varying(table)
-    }
-}
-
-impl<'de> Deserialize<'de> for TissueSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        text_or_table(deserializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for ThicknessSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        text_or_table(deserializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for AxisSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Axis;
-
-        impl<'de> Visitor<'de> for Axis {
-            type Value = AxisSpec;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"x\", \"y\", \"z\" or three numbers such as [0, 0, 1]")
-            }
-
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<AxisSpec, E> {
-                match text {
-                    "x" => Ok(AxisSpec::Name(AxisName::X)),
-                    "y" => Ok(AxisSpec::Name(AxisName::Y)),
-                    "z" => Ok(AxisSpec::Name(AxisName::Z)),
-                    _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
-                }
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<AxisSpec, A::Error> {
-                <[f64; 3]>::deserialize(SeqAccessDeserializer::new(seq)).map(AxisSpec::Vector)
-            }
-        }
-
-        deserializer.deserialize_any(Axis)
-    }
-}
-
-impl Serialize for AxisSpec {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Name(name) => name.serialize(serializer),
-            Self::Vector(vector) => vector.serialize(serializer),
-        }
-    }
-}
-
-macro_rules! either_schema {
-    ($spec:ty, $text:ty, $other:ty) => {
-        impl JsonSchema for $spec {
-            fn inline_schema() -> bool {
-                true
-            }
-
-            fn schema_name() -> std::borrow::Cow<'static, str> {
-                stringify!($spec).into()
-            }
-
-            fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-                json_schema!({
-                    "anyOf": [generator.subschema_for::<$text>(), generator.subschema_for::<$other>()],
-                })
-            }
-        }
-    };
-}
-
-either_schema!(TissueSpec, String, TissueTable);
-either_schema!(ThicknessSpec, Length, ThicknessTable);
-either_schema!(AxisSpec, AxisName, [f64; 3]);

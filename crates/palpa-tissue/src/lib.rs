@@ -11,12 +11,12 @@
 //!     [body]
 //!     surface = "skin.ply"
 //!     [[layer]]
-//!     tissue = "fat"
+//!     tissue = "muscle"
 //!     thickness = "20 mm"
 //!     "#,
 //!     "bodies".as_ref(),
 //! )?;
-//! assert_eq!(scene.layers[0].tissue.young(), Some(2500.0)); // Pa
+//! assert_eq!(scene.layers[0].tissue.young(), Some(22e3)); // Pa
 //! # Ok::<(), palpa_tissue::SceneError>(())
 //! ```
 
@@ -25,18 +25,33 @@ pub mod units;
 mod catalogue;
 mod error;
 mod file;
+mod frame;
+mod law;
 mod limits;
+mod lump;
+mod model;
 mod resolve;
 mod scene;
 mod schema;
+mod status;
 mod thickness;
+mod tissue;
+mod tool;
 mod write;
 
-pub use catalogue::{Law, Sourced, Status, Tissue, catalogue};
+pub use catalogue::catalogue;
 pub use error::{Place, SceneError};
+pub use lump::{Lump, LumpPlace, LumpShape};
+pub use model::{Damping, Dynamics, Mesh, Model, ModelKind};
 pub use scene::{
-    Body, CutFaces, Cutout, Generator, InPlane, Layer, LengthUnit, MaterialStatus, Press,
-    Reference, Scene, Skin, Solver, Target, Tool,
+    Body, CutFaces, Cutout, Generator, InPlane, Layer, LengthUnit, Press, Reference, Scene, Skin,
+    Solver, Target,
 };
 pub use schema::scene_schema;
+pub use status::{MaterialStatus, Parameter};
 pub use thickness::{Thickness, ThicknessError, ThicknessSample, read_thickness};
+pub use tissue::{
+    Elastic, Energy, Law, Moduli, OgdenTerm, Prony, PronyTerm, Resistance, Sourced, Status,
+    Stiffness, Tissue, Volume,
+};
+pub use tool::{ContactShape, ContactTool, Tool};

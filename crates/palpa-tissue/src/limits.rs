@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::units::{Density, Kind, Length, Pressure, Quantity, Stiffness, Time, Velocity};
+use crate::units::{Density, Kind, Length, Pressure, Quantity, Rate, Stiffness, Time, Velocity};
 
 /// Larger scene files are refused unread. bytes
 pub(crate) const MAX_FILE: u64 = 1 << 20;
@@ -12,6 +12,14 @@ pub(crate) const MAX_LAYERS: usize = 32;
 pub(crate) const MAX_LEVELS: usize = 256;
 /// Most bones.
 pub(crate) const MAX_BONES: usize = 64;
+/// Most lumps.
+pub(crate) const MAX_LUMPS: usize = 64;
+/// Most terms of Ogden's energy.
+pub(crate) const MAX_OGDEN_TERMS: usize = 6;
+/// Most terms of a Prony series.
+pub(crate) const MAX_PRONY_TERMS: usize = 12;
+/// Most speeds of a sweep.
+pub(crate) const MAX_SPEEDS: usize = 16;
 /// Most rows of a thickness table.
 pub(crate) const MAX_ROWS: usize = 1000;
 /// Most results of a press on the way down: `depth / step`.
@@ -64,9 +72,41 @@ pub(crate) const LEVELS: Limits<u32> = numbers(1, 64);
 pub(crate) const YOUNG: Limits<Pressure> = between(10.0, 1e9);
 /// At 0.5 the volume is constant and the stiffness infinite.
 pub(crate) const POISSON: Limits<f64> = numbers(0.0, 0.4999);
+/// Shear moduli and the constants that make them.
+pub(crate) const SHEAR: Limits<Pressure> = between(1.0, 1e9);
+pub(crate) const C01: Limits<Pressure> = between(0.0, 1e9);
+pub(crate) const C20: Limits<Pressure> = between(-1e9, 1e9);
+pub(crate) const C30: Limits<Pressure> = between(0.0, 1e9);
+/// Up to a thousand times that of water.
+pub(crate) const BULK: Limits<Pressure> = between(1.0, 1e12);
+/// Of either sign. Smaller exponents cancel, larger ones overflow, and neither fits a tissue.
+pub(crate) const OGDEN_ALPHA: Limits<f64> = numbers(0.001, 100.0);
+pub(crate) const FUNG_B: Limits<f64> = numbers(0.001, 1000.0);
+/// What is left in the end is at least a hundredth, as in `PRONY_SUM`.
+pub(crate) const PRONY_G: Limits<f64> = numbers(0.001, 0.99);
+pub(crate) const PRONY_SUM: f64 = 0.99;
+pub(crate) const PRONY_TAU: Limits<Time> = between(1e-4, 1e5);
+pub(crate) const PRESTRESS: Limits<Pressure> = between(0.0, 1e6);
 pub(crate) const SPRING: Limits<Stiffness> = between(1e-6, 1e6);
 pub(crate) const DENSITY: Limits<Density> = between(100.0, 20000.0);
 pub(crate) const TOOL_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
+pub(crate) const TOOL_SIZE: Limits<Length> = between(0.2e-3, 0.4);
+pub(crate) const TOOL_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
+pub(crate) const EDGE_RADIUS: Limits<Length> = between(1e-6, 0.2);
+pub(crate) const FRICTION: Limits<f64> = numbers(0.0, 5.0);
+pub(crate) const LUMP_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
+pub(crate) const LUMP_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
+pub(crate) const LUMP_DEPTH: Limits<Length> = between(0.1e-3, 0.5);
+pub(crate) const TRANSITION: Limits<Length> = between(0.0, 0.05);
+/// At 1 the element has modes without energy.
+pub(crate) const ALPHA: Limits<f64> = numbers(0.0, 0.95);
+pub(crate) const TOLERANCE: Limits<f64> = numbers(1e-12, 1e-3);
+pub(crate) const DAMPING_MASS: Limits<Rate> = between(0.0, 1e5);
+pub(crate) const DAMPING_STIFFNESS: Limits<Time> = between(0.0, 10.0);
+pub(crate) const EDGE_LENGTH: Limits<Length> = between(0.1e-3, 0.1);
+pub(crate) const GROWTH: Limits<f64> = numbers(0.02, 5.0);
+pub(crate) const MESH_VERTICES: Limits<u32> = numbers(100, 500_000);
+pub(crate) const CYCLES: Limits<u32> = numbers(1, 100);
 pub(crate) const DEPTH: Limits<Length> = between(1e-6, 0.5);
 pub(crate) const SPEED: Limits<Velocity> = between(1e-5, 1.0);
 pub(crate) const HOLD: Limits<Time> = between(0.0, 600.0);
@@ -75,23 +115,28 @@ pub(crate) const GAIN: Limits<f64> = numbers(0.0, 1.0);
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
     use super::*;
 
     /// What the schema says of a key must be what is checked.
-    #[test]
-    fn the_schema_names_every_range() {
-        let schema = crate::scene_schema();
-        let says = |table: &str, key: &str, limits: &dyn fmt::Display| {
-            let description = &schema["$defs"][table]["properties"][key]["description"];
-            let description = description
-                .as_str()
-                .unwrap_or_else(|| panic!("{table}.{key} is not described"));
-            let description = description.replace('\n', " ");
-            assert!(
-                description.contains(&limits.to_string()),
-                "{table}.{key} is limited to {limits}, and described as: {description}"
-            );
+    fn says(table: &str, key: &str, limits: &dyn fmt::Display) {
+        static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(crate::scene_schema);
+        let keys = match table {
+            "" => &SCHEMA["properties"],
+            table => &SCHEMA["$defs"][table]["properties"],
         };
+        let description = keys[key]["description"]
+            .as_str()
+            .unwrap_or_else(|| panic!("{table}.{key} is not described"));
+        assert!(
+            description.contains(&limits.to_string()),
+            "{table}.{key} is limited to {limits}, and described as: {description}"
+        );
+    }
+
+    #[test]
+    fn the_schema_names_every_range_of_the_body() {
         says("BodyTable", "cutout_radius", &CUTOUT_RADIUS);
         says(
             "BodyTable",
@@ -108,7 +153,30 @@ mod tests {
         says("LayerTable", "thickness", &THICKNESS);
         says("LayerTable", "levels", &LEVELS);
         says("LayerTable", "min_thickness", &MIN_THICKNESS);
+        says("LayerTable", "prestress", &PRESTRESS);
+        says("", "layer", &format!("1 to {MAX_LAYERS}"));
+        says("", "layer", &format!("{MAX_LEVELS} levels at most"));
+    }
+
+    #[test]
+    fn the_schema_names_every_range_of_a_tissue() {
         says("TissueTable", "young", &YOUNG);
+        says("TissueTable", "shear", &SHEAR);
+        says("TissueTable", "c10", &SHEAR);
+        says("TissueTable", "c01", &C01);
+        says("TissueTable", "c20", &C20);
+        says("TissueTable", "c30", &C30);
+        says("TissueTable", "terms", &format!("1 to {MAX_OGDEN_TERMS}"));
+        says("TissueTable", "alpha", &OGDEN_ALPHA);
+        says("TissueTable", "b", &FUNG_B);
+        says("TissueTable", "bulk", &BULK);
+        says("TissueTable", "bulk", &POISSON);
+        says("OgdenTable", "mu", &SHEAR);
+        says("OgdenTable", "alpha", &OGDEN_ALPHA);
+        says("PronyTable", "terms", &format!("1 to {MAX_PRONY_TERMS}"));
+        says("PronyTable", "terms", &format!("{PRONY_SUM} at most"));
+        says("PronyTermTable", "g", &PRONY_G);
+        says("PronyTermTable", "tau", &PRONY_TAU);
         says("TissueTable", "poisson", &POISSON);
         says("TissueTable", "spring", &SPRING);
         says("TissueTable", "density", &DENSITY);
@@ -123,22 +191,46 @@ mod tests {
             "table",
             &format!("{MAX_ROWS} pairs at most"),
         );
+    }
+
+    #[test]
+    fn the_schema_names_every_range_of_tools_and_lumps() {
         says("ToolTable", "radius", &TOOL_RADIUS);
+        says("ToolTable", "radii", &TOOL_RADIUS);
+        says("ToolTable", "length", &TOOL_LENGTH);
+        says("ToolTable", "size", &TOOL_SIZE);
+        says("ToolTable", "edge_radius", &EDGE_RADIUS);
+        says("ToolTable", "friction", &FRICTION);
+        says("LumpTable", "radius", &LUMP_RADIUS);
+        says("LumpTable", "radii", &LUMP_RADIUS);
+        says("LumpTable", "length", &LUMP_LENGTH);
+        says("LumpTable", "depth", &LUMP_DEPTH);
+        says("LumpTable", "at", &format!("within {}", COORDINATE.max));
+        says("LumpTable", "below", &format!("within {}", COORDINATE.max));
+        says("LumpTable", "transition", &TRANSITION);
+        says("", "lump", &format!("{MAX_LUMPS} at most"));
+    }
+
+    #[test]
+    fn the_schema_names_every_range_of_press_and_models() {
+        says("ModelTable", "alpha", &ALPHA);
+        says("ModelTable", "tolerance", &TOLERANCE);
+        says("DampingTable", "mass", &DAMPING_MASS);
+        says("DampingTable", "stiffness", &DAMPING_STIFFNESS);
+        says("MeshTable", "near_tool", &EDGE_LENGTH);
+        says("MeshTable", "near_lumps", &EDGE_LENGTH);
+        says("MeshTable", "growth", &GROWTH);
+        says("MeshTable", "max_vertices", &MESH_VERTICES);
         says("PressTable", "at", &format!("within {}", COORDINATE.max));
         says("PressTable", "depth", &DEPTH);
         says("PressTable", "speed", &SPEED);
+        says("PressTable", "speeds", &SPEED);
+        says("PressTable", "speeds", &format!("{MAX_SPEEDS} at most"));
+        says("PressTable", "cycles", &CYCLES);
         says("PressTable", "hold", &HOLD);
         says("PressTable", "step", &format!("a {MAX_STEPS}th of it"));
         says("ReferenceTable", "substeps", &SUBSTEPS);
         says("ReferenceTable", "spring_gain", &GAIN);
         says("ReferenceTable", "shape_gain", &GAIN);
-        let layers = schema["properties"]["layer"]["description"]
-            .as_str()
-            .unwrap_or_default();
-        assert!(layers.contains(&format!("1 to {MAX_LAYERS}")), "{layers}");
-        assert!(
-            layers.contains(&format!("{MAX_LEVELS} levels at most")),
-            "{layers}"
-        );
     }
 }

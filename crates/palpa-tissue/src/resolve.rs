@@ -2,20 +2,26 @@
 
 mod body;
 mod layers;
+mod lumps;
+mod model;
+mod tissue;
+mod tool;
 
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Document, Site};
-use crate::file::{PressTable, ReferenceTable, SceneFile, ToolShape, ToolTable};
+use crate::file::{AxisName, AxisSpec, PressTable, SceneFile};
 use crate::limits::{self, Limits};
-use crate::scene::{Generator, Press, Reference, Scene, Skin, Target, Tool};
-use crate::units::{Kind, Length, Quantity};
+use crate::scene::{Generator, Press, Scene, Skin, Target};
+use crate::units::{Kind, Length, Quantity, Velocity};
 use crate::{SceneError, Thickness};
 
 /// Results on the way down, unless the scene says otherwise.
 const DEFAULT_STEPS: f64 = 32.0;
+/// Speed of the tool, unless the scene says otherwise. m/s
+const DEFAULT_SPEED: f64 = 10e-3;
 
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let mut bytes = Vec::new();
@@ -59,8 +65,11 @@ pub(crate) fn parse(text: &str, base_dir: &Path, file: Option<&Path>) -> Result<
         base_dir: base_dir.to_owned(),
         body: reader.body(written.body, press.target)?,
         layers,
+        lumps: reader.lumps(written.lump, press.target)?,
         tool: reader.tool(&written.tool)?,
         press,
+        model: reader.model(&written.model)?,
+        mesh: reader.mesh(&written.mesh)?,
         reference: reader.reference(&written.reference)?,
     };
     reader.depths(&scene)?;
@@ -84,21 +93,6 @@ impl<'a> Reader<'a> {
         Ok(self.base_dir.join(path))
     }
 
-    fn tool(&self, tool: &ToolTable) -> Result<Tool, SceneError> {
-        let at = self.site("tool").key("radius");
-        match (tool.shape, tool.radius) {
-            (ToolShape::Disc, radius) => {
-                let radius = radius.unwrap_or(Length::from_si(8e-3));
-                let radius = at.within(radius, &limits::TOOL_RADIUS)?.si();
-                Ok(Tool::Disc { radius })
-            }
-            (ToolShape::Node, None) => Ok(Tool::Node),
-            (ToolShape::Node, Some(_)) => {
-                Err(at.invalid("a node has no radius; remove it, or use shape = \"disc\""))
-            }
-        }
-    }
-
     fn press(&self, press: &PressTable) -> Result<Press, SceneError> {
         let at = self.site("press");
         let target = match (press.at, press.vertex) {
@@ -115,6 +109,13 @@ impl<'a> Reader<'a> {
             None => None,
             Some(vector) => Some(unit_vector(&at.key("direction"), vector)?),
         };
+        let speeds = speeds(&at, press)?;
+        let cycles = at.key("cycles").within(press.cycles, &limits::CYCLES)?;
+        if cycles > 1 && !press.retract {
+            return Err(at.key("cycles").invalid(
+                "more than one cycle needs the way back; remove `retract = false` or `cycles`",
+            ));
+        }
         let depth = at.key("depth").within(press.depth, &limits::DEPTH)?;
         let step = match press.step {
             None => depth.si() / DEFAULT_STEPS,
@@ -134,24 +135,16 @@ impl<'a> Reader<'a> {
             target,
             direction,
             depth: depth.si(),
-            speed: at.key("speed").within(press.speed, &limits::SPEED)?.si(),
+            speed: speeds[0],
+            speeds: if press.speeds.is_empty() {
+                Vec::new()
+            } else {
+                speeds
+            },
             hold: at.key("hold").within(press.hold, &limits::HOLD)?.si(),
             retract: press.retract,
+            cycles,
             step,
-        })
-    }
-
-    fn reference(&self, reference: &ReferenceTable) -> Result<Reference, SceneError> {
-        let at = self.site("reference");
-        let gain = |key, gain| at.key(key).within(gain, &limits::GAIN);
-        Ok(Reference {
-            substeps: at
-                .key("substeps")
-                .within(reference.substeps, &limits::SUBSTEPS)?,
-            solver: reference.solver,
-            in_plane: reference.in_plane,
-            spring_gain: gain("spring_gain", reference.spring_gain)?,
-            shape_gain: gain("shape_gain", reference.shape_gain)?,
         })
     }
 
@@ -213,6 +206,28 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The speed, or those of a sweep, in m/s; at least one.
+fn speeds(at: &Site<'_>, press: &PressTable) -> Result<Vec<f64>, SceneError> {
+    let within = |at: Site<'_>, speed| Ok(at.within(speed, &limits::SPEED)?.si());
+    let (n, most) = (press.speeds.len(), limits::MAX_SPEEDS);
+    let sweep_at = at.key("speeds");
+    match press.speed {
+        Some(_) if n > 0 => {
+            Err(sweep_at.invalid("the speed is given twice; remove `speed` or `speeds`"))
+        }
+        None if n > most => Err(sweep_at.invalid(format!(
+            "{n} speeds are more than the {most} allowed; take fewer"
+        ))),
+        None if n > 0 => (press.speeds.iter().enumerate())
+            .map(|(i, &speed)| within(sweep_at.index(i), speed))
+            .collect(),
+        speed => {
+            let speed = speed.unwrap_or(Velocity::from_si(DEFAULT_SPEED));
+            Ok(vec![within(at.key("speed"), speed)?])
+        }
+    }
+}
+
 fn coordinates(at: &Site<'_>, point: [Length; 3]) -> Result<[f64; 3], SceneError> {
     each(at, point, &limits::COORDINATE)
 }
@@ -227,6 +242,16 @@ fn each<K: Kind>(
         si[i] = at.index(i).within(value, limits)?.si();
     }
     Ok(si)
+}
+
+/// The unit vector that an axis or three numbers name.
+fn direction(at: &Site<'_>, axis: AxisSpec) -> Result<[f64; 3], SceneError> {
+    match axis {
+        AxisSpec::Name(AxisName::X) => Ok([1.0, 0.0, 0.0]),
+        AxisSpec::Name(AxisName::Y) => Ok([0.0, 1.0, 0.0]),
+        AxisSpec::Name(AxisName::Z) => Ok([0.0, 0.0, 1.0]),
+        AxisSpec::Vector(vector) => unit_vector(at, vector),
+    }
 }
 
 fn unit_vector(at: &Site<'_>, vector: [f64; 3]) -> Result<[f64; 3], SceneError> {

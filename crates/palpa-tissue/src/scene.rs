@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Law, SceneError, Status, Thickness, Tissue, resolve, write};
+use crate::{
+    Lump, MaterialStatus, Mesh, Model, SceneError, Status, Thickness, Tissue, Tool, resolve, write,
+};
 
 /// The forearm that is pressed when no scene is named.
 const EMBEDDED: &str = include_str!("../scenes/forearm.toml");
@@ -22,10 +24,16 @@ pub struct Scene {
     pub body: Body,
     /// The layers, from the skin inward, at least one.
     pub layers: Vec<Layer>,
+    /// The lumps in them; where two overlap, the later one counts.
+    pub lumps: Vec<Lump>,
     /// What presses.
     pub tool: Tool,
     /// Where, how deep and how fast it presses.
     pub press: Press,
+    /// How the body answers.
+    pub model: Model,
+    /// How fine the body is made where it matters.
+    pub mesh: Mesh,
     /// Parameters of the reference method.
     pub reference: Reference,
 }
@@ -159,18 +167,8 @@ pub struct Layer {
     pub levels: usize,
     /// How thin it may become where there is no room, in metres; no more than its thickness.
     pub min_thickness: f64,
-}
-
-/// What presses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Tool {
-    /// A patch of skin bonded to a rigid disc of this radius, in metres.
-    Disc {
-        /// Radius in metres.
-        radius: f64,
-    },
-    /// The single operated node of the reference method.
-    Node,
+    /// Tension in every direction of its plane before anything presses, in pascals.
+    pub prestress: f64,
 }
 
 /// Where, how deep and how fast the tool presses.
@@ -184,10 +182,14 @@ pub struct Press {
     pub depth: f64,
     /// Speed down and up, in m/s.
     pub speed: f64,
+    /// Speeds of a sweep, in m/s: the whole press is run at each. Empty without a sweep; else `speed` is the first.
+    pub speeds: Vec<f64>,
     /// Rest at the depth, in seconds.
     pub hold: f64,
     /// Whether the tool comes back up.
     pub retract: bool,
+    /// How often it goes down and comes back, at least 1; more than once only with `retract`.
+    pub cycles: u32,
     /// Growth of the depth from one result to the next, in metres; no more than `depth`.
     pub step: f64,
 }
@@ -233,29 +235,6 @@ pub enum InPlane {
     Mean,
 }
 
-/// What a layer's stiffness is and how far it is to be trusted; shown beside every force.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MaterialStatus {
-    /// Name of the tissue.
-    pub tissue: String,
-    /// Young's modulus in pascals; `None` for a layer given by a spring stiffness.
-    pub young: Option<f64>,
-    /// Poisson's ratio; `None` for a layer given by a spring stiffness.
-    pub poisson: Option<f64>,
-    /// Stiffness of every bar in N/m, for a layer given by it.
-    pub spring: Option<f64>,
-    /// How far the stiffness (`young` or `spring`) is to be trusted.
-    pub status: Status,
-    /// Where it is from; may be empty when the scene gives it.
-    pub source: String,
-    /// How far Poisson's ratio is to be trusted; `None` without one.
-    pub poisson_status: Option<Status>,
-    /// How far the thickness is to be trusted; `None` for a layer that reaches to the bone.
-    pub thickness_status: Option<Status>,
-    /// Where the thickness is from; may be empty.
-    pub thickness_source: String,
-}
-
 impl Scene {
     /// Reads and checks a scene file; its paths are relative to the file's folder.
     ///
@@ -298,9 +277,14 @@ impl Scene {
         self.layers.iter().map(|layer| layer.levels).sum()
     }
 
-    /// For each layer, what its stiffness is and how far it is to be trusted. `[n_layers]`
+    /// For each layer, what its material is and how far it is to be trusted. `[n_layers]`
     pub fn material_status(&self) -> Vec<MaterialStatus> {
         self.layers.iter().map(Layer::material_status).collect()
+    }
+
+    /// For each lump, what its material is and how far it is to be trusted. `[n_lumps]`
+    pub fn lump_status(&self) -> Vec<MaterialStatus> {
+        self.lumps.iter().map(Lump::material_status).collect()
     }
 }
 
@@ -310,16 +294,18 @@ impl Press {
     /// # Errors
     /// What is out of range, and the range.
     pub fn check(&self) -> Result<(), String> {
-        use crate::limits::{DEPTH, HOLD, SPEED};
+        use crate::limits::{CYCLES, DEPTH, HOLD, SPEED};
         use crate::units::{Length, Time, Velocity};
         let [depth, step] = [self.depth, self.step].map(Length::from_si);
-        let (speed, hold) = (Velocity::from_si(self.speed), Time::from_si(self.hold));
+        let hold = Time::from_si(self.hold);
         if !DEPTH.contains(&depth) {
             return Err(format!(
                 "a depth of {depth} is outside the allowed range {DEPTH}"
             ));
         }
-        if !SPEED.contains(&speed) {
+        let mut speeds = self.speeds.iter().chain([&self.speed]).copied();
+        if let Some(speed) = speeds.find(|&speed| !SPEED.contains(&Velocity::from_si(speed))) {
+            let speed = Velocity::from_si(speed);
             return Err(format!(
                 "a speed of {speed} is outside the allowed range {SPEED}"
             ));
@@ -328,6 +314,15 @@ impl Press {
             return Err(format!(
                 "a hold of {hold} is outside the allowed range {HOLD}"
             ));
+        }
+        if !CYCLES.contains(&self.cycles) {
+            let cycles = self.cycles;
+            return Err(format!(
+                "{cycles} cycles are outside the allowed range {CYCLES}"
+            ));
+        }
+        if self.cycles > 1 && !self.retract {
+            return Err("cycles need the way back; let the tool come back up".to_owned());
         }
         let least = self.depth / crate::limits::MAX_STEPS;
         if !(least..=self.depth).contains(&self.step) {
@@ -344,25 +339,5 @@ impl Press {
 impl Default for Scene {
     fn default() -> Self {
         Self::embedded()
-    }
-}
-
-impl Layer {
-    fn material_status(&self) -> MaterialStatus {
-        let (young, poisson, spring, stiffness) = match &self.tissue.law {
-            Law::Elastic { young, poisson } => (Some(young.value), Some(poisson), None, young),
-            Law::Spring { constant } => (None, None, Some(constant.value), constant),
-        };
-        MaterialStatus {
-            tissue: self.tissue.name.clone(),
-            young,
-            poisson: poisson.map(|p| p.value),
-            spring,
-            status: stiffness.status,
-            source: stiffness.source.clone(),
-            poisson_status: poisson.map(|p| p.status),
-            thickness_status: self.thickness.as_ref().map(|_| self.thickness_status),
-            thickness_source: self.thickness_source.clone(),
-        }
     }
 }

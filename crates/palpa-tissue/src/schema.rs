@@ -11,8 +11,10 @@ use crate::file::SceneFile;
 pub fn scene_schema() -> Value {
     let mut schema = schemars::schema_for!(SceneFile).to_value();
     tidy(&mut schema);
-    let tissues = catalogue().iter().map(|tissue| tissue.name.as_str());
-    schema["$defs"]["LayerTable"]["properties"]["tissue"]["examples"] = tissues.collect();
+    for table in ["LayerTable", "LumpTable"] {
+        let tissues = catalogue().iter().map(|tissue| tissue.name.as_str());
+        schema["$defs"][table]["properties"]["tissue"]["examples"] = tissues.collect();
+    }
     schema
 }
 

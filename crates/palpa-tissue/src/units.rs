@@ -80,6 +80,15 @@ kind!(
     |number, unit| Some(parse::<si::Time>(number, unit)?.value)
 );
 kind!(
+    /// A rate, per second: one by any time, as `5 1/s`, or a frequency, as `5 Hz`.
+    Rate, RateKind, "a rate", "5 1/s", "1/s",
+    &[("1/s", 1.0, 1.0)],
+    |number, unit| match unit.split_once('/') {
+        Some(("1", time)) => Some(number / parse::<si::Time>(1.0, time)?.value),
+        _ => Some(parse::<si::Frequency>(number, unit)?.value),
+    }
+);
+kind!(
     /// An angle, in radians.
     Angle, AngleKind, "an angle", "30 deg", "rad",
     &[("rad", 1.0, 1.0)],
@@ -126,6 +135,13 @@ impl<K> Quantity<K> {
     /// The value in SI base units.
     pub const fn si(self) -> f64 {
         self.si
+    }
+}
+
+/// Zero.
+impl<K> Default for Quantity<K> {
+    fn default() -> Self {
+        Self::from_si(0.0)
     }
 }
 

@@ -1,56 +1,109 @@
 //! From the scene back to the text of a scene file.
 
+mod tissue;
+mod tool;
+
 use std::path::{Path, PathBuf};
 
+use self::tissue::tissue;
+use crate::Thickness;
 use crate::file::{
-    AxisName, AxisSpec, BodyTable, GeneratorKind, GeneratorTable, LayerTable, PressTable,
-    ReferenceTable, SceneFile, ThicknessSpec, ThicknessTable, TissueSpec, TissueTable, ToolShape,
-    ToolTable,
+    AxisName, AxisSpec, BodyTable, DampingTable, DynamicsName, GeneratorKind, GeneratorTable,
+    LayerTable, MeshTable, ModelTable, PressTable, ReferenceTable, SceneFile, ThicknessSpec,
+    ThicknessTable,
 };
-use crate::scene::{Body, Generator, Layer, Scene, Skin, Target, Tool};
-use crate::units::{Density, Length, Pressure, Stiffness, Time, Velocity};
-use crate::{Law, Thickness, Tissue, catalogue};
+use crate::model::{Dynamics, Mesh, Model};
+use crate::scene::{Body, Generator, Layer, Press, Reference, Scene, Skin, Target};
+use crate::units::{Length, Pressure, Rate, Time, Velocity};
 
 pub(crate) fn to_toml(scene: &Scene) -> String {
-    let at = |target| match target {
-        Target::Point(point) => Some(point.map(Length::from_si)),
-        Target::Vertex(_) | Target::Middle => None,
-    };
     let file = SceneFile {
         body: body(scene, &scene.body),
         layer: scene.layers.iter().map(|l| layer(scene, l)).collect(),
-        tool: match scene.tool {
-            Tool::Disc { radius } => ToolTable {
-                shape: ToolShape::Disc,
-                radius: Some(Length::from_si(radius)),
-            },
-            Tool::Node => ToolTable {
-                shape: ToolShape::Node,
-                radius: None,
-            },
-        },
-        press: PressTable {
-            at: at(scene.press.target),
-            vertex: match scene.press.target {
-                Target::Vertex(vertex) => Some(vertex),
-                Target::Point(_) | Target::Middle => None,
-            },
-            direction: scene.press.direction,
-            depth: Length::from_si(scene.press.depth),
-            speed: Velocity::from_si(scene.press.speed),
-            hold: Time::from_si(scene.press.hold),
-            retract: scene.press.retract,
-            step: Some(Length::from_si(scene.press.step)),
-        },
-        reference: ReferenceTable {
-            substeps: scene.reference.substeps,
-            solver: scene.reference.solver,
-            in_plane: scene.reference.in_plane,
-            spring_gain: scene.reference.spring_gain,
-            shape_gain: scene.reference.shape_gain,
-        },
+        lump: scene.lumps.iter().map(|l| tool::lump(scene, l)).collect(),
+        tool: tool::tool(&scene.tool),
+        press: press(&scene.press),
+        model: model(&scene.model),
+        mesh: mesh(&scene.mesh),
+        reference: reference(&scene.reference),
     };
     toml::to_string(&file).expect("a scene consists of texts, numbers and tables only")
+}
+
+/// The point of a target given by one, as a scene writes it.
+fn point(target: Target) -> Option<[Length; 3]> {
+    match target {
+        Target::Point(point) => Some(point.map(Length::from_si)),
+        Target::Vertex(_) | Target::Middle => None,
+    }
+}
+
+/// The vertex of a target given by one.
+fn vertex(target: Target) -> Option<u32> {
+    match target {
+        Target::Vertex(vertex) => Some(vertex),
+        Target::Point(_) | Target::Middle => None,
+    }
+}
+
+fn press(press: &Press) -> PressTable {
+    PressTable {
+        at: point(press.target),
+        vertex: vertex(press.target),
+        direction: press.direction,
+        depth: Length::from_si(press.depth),
+        speed: (press.speeds.is_empty()).then_some(Velocity::from_si(press.speed)),
+        speeds: press
+            .speeds
+            .iter()
+            .copied()
+            .map(Velocity::from_si)
+            .collect(),
+        hold: Time::from_si(press.hold),
+        retract: press.retract,
+        cycles: press.cycles,
+        step: Some(Length::from_si(press.step)),
+    }
+}
+
+fn model(model: &Model) -> ModelTable {
+    let (dynamics, damping) = match model.dynamics {
+        Dynamics::QuasiStatic => (DynamicsName::QuasiStatic, None),
+        Dynamics::Implicit(damping) => (
+            DynamicsName::Implicit,
+            Some(DampingTable {
+                mass: Rate::from_si(damping.mass),
+                stiffness: Time::from_si(damping.stiffness),
+            }),
+        ),
+    };
+    ModelTable {
+        kind: model.kind,
+        alpha: model.alpha,
+        dynamics,
+        damping,
+        tolerance: model.tolerance,
+    }
+}
+
+fn mesh(mesh: &Mesh) -> MeshTable {
+    MeshTable {
+        refine: mesh.refine,
+        near_tool: mesh.near_tool.map(Length::from_si),
+        near_lumps: mesh.near_lumps.map(Length::from_si),
+        growth: mesh.growth,
+        max_vertices: u32::try_from(mesh.max_vertices).unwrap_or(u32::MAX),
+    }
+}
+
+fn reference(reference: &Reference) -> ReferenceTable {
+    ReferenceTable {
+        substeps: reference.substeps,
+        solver: reference.solver,
+        in_plane: reference.in_plane,
+        spring_gain: reference.spring_gain,
+        shape_gain: reference.shape_gain,
+    }
 }
 
 /// The path as a scene in `base_dir` writes it; one that is not Unicode, which no scene file gives, loses characters.
@@ -77,11 +130,8 @@ fn body(scene: &Scene, body: &Body) -> BodyTable {
             .collect(),
         unit: body.unit,
         cutout_radius: cutout.map(|cutout| Length::from_si(cutout.radius)),
-        cutout_at: cutout.and_then(|cutout| match cutout.at {
-            Target::Point(point) => Some(point.map(Length::from_si)),
-            // The place that is pressed, which needs no second mention.
-            Target::Vertex(_) | Target::Middle => None,
-        }),
+        // A vertex is the place that is pressed, which needs no second mention.
+        cutout_at: cutout.and_then(|cutout| point(cutout.at)),
         cut_faces: body.cut_faces,
     }
 }
@@ -130,12 +180,7 @@ fn layer(scene: &Scene, layer: &Layer) -> LayerTable {
         thickness: layer.thickness.as_ref().map(|thickness| match thickness {
             Thickness::Uniform(length) => ThicknessSpec::Uniform(Length::from_si(*length)),
             Thickness::Along { axis, table } => ThicknessSpec::Varying(ThicknessTable {
-                axis: Some(match axis {
-                    [1.0, 0.0, 0.0] => AxisSpec::Name(AxisName::X),
-                    [0.0, 1.0, 0.0] => AxisSpec::Name(AxisName::Y),
-                    [0.0, 0.0, 1.0] => AxisSpec::Name(AxisName::Z),
-                    vector => AxisSpec::Vector(*vector),
-                }),
+                axis: Some(direction(*axis)),
                 table: Some(table.iter().map(|row| row.map(Length::from_si)).collect()),
                 file: None,
             }),
@@ -149,32 +194,16 @@ fn layer(scene: &Scene, layer: &Layer) -> LayerTable {
         thickness_source: layer.thickness_source.clone(),
         levels: u32::try_from(layer.levels).unwrap_or(u32::MAX),
         min_thickness: Some(Length::from_si(layer.min_thickness)),
+        prestress: Pressure::from_si(layer.prestress),
     }
 }
 
-fn tissue(tissue: &Tissue) -> TissueSpec {
-    if catalogue().contains(tissue) {
-        return TissueSpec::Name(tissue.name.clone());
+/// An axis of the body by its name.
+fn direction(vector: [f64; 3]) -> AxisSpec {
+    match vector {
+        [1.0, 0.0, 0.0] => AxisSpec::Name(AxisName::X),
+        [0.0, 1.0, 0.0] => AxisSpec::Name(AxisName::Y),
+        [0.0, 0.0, 1.0] => AxisSpec::Name(AxisName::Z),
+        vector => AxisSpec::Vector(vector),
     }
-    let mut table = TissueTable {
-        name: tissue.name.clone(),
-        young: None,
-        poisson: None,
-        spring: None,
-        density: tissue.density.as_ref().map(|d| Density::from_si(d.value)),
-        source: String::new(),
-    };
-    match &tissue.law {
-        Law::Elastic { young, poisson } => {
-            table.young = Some(Pressure::from_si(young.value));
-            // A ratio that is not the scene's own is the default, and stays so.
-            table.poisson = (poisson.status == young.status).then_some(poisson.value);
-            table.source.clone_from(&young.source);
-        }
-        Law::Spring { constant } => {
-            table.spring = Some(Stiffness::from_si(constant.value));
-            table.source.clone_from(&constant.source);
-        }
-    }
-    TissueSpec::Inline(table)
 }

@@ -9,7 +9,9 @@ use palpa_mesh::{
     Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow,
     read_surface, repair,
 };
-use palpa_tissue::{Generator, LengthUnit, Scene, Skin, Target, Thickness, read_thickness};
+use palpa_tissue::{
+    Generator, LengthUnit, LumpPlace, Scene, Skin, Target, Thickness, read_thickness,
+};
 
 /// A place further from the skin than this share of the body's size is taken for a mistake in frame or unit.
 const FAR_FROM_SKIN: f64 = 0.25;
@@ -26,6 +28,8 @@ pub struct BuiltBody {
     pub bones: Vec<Surface>,
     /// The skin vertex of the body that the scene presses on.
     pub press_vertex: usize,
+    /// For each lump of the scene the place on the skin that it lies under, if it is placed so. m
+    pub lump_places: Vec<Option<Vec3>>,
     /// What was done to the surfaces on the way and a user should know.
     pub notes: Vec<String>,
 }
@@ -56,6 +60,16 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     // Numbers of vertices count in the surface as it was read, before anything is mended or cut away: from here on
     // places go by position.
     let press_at = point_of(&skin, &scene.press.target)?;
+    let lumps_at = scene
+        .lumps
+        .iter()
+        .map(|lump| match &lump.place {
+            LumpPlace::Below { target, .. } if *target != scene.press.target => {
+                point_of(&skin, target).with_context(|| format!("lump \"{}\"", lump.name))
+            }
+            _ => Ok(None),
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let cut_out = match &scene.body.cutout {
         Some(cutout) => point_of(&skin, &cutout.at)?.map(|centre| (centre, cutout.radius)),
         None => None,
@@ -80,6 +94,18 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         ));
     }
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
+    let on_body = &growth.body.skin;
+    let lump_places = (scene.lumps.iter().zip(lumps_at))
+        .map(|(lump, at)| match &lump.place {
+            LumpPlace::Below { target, .. } if *target == scene.press.target => {
+                Some(on_body.points[press_vertex])
+            }
+            LumpPlace::Below { .. } => {
+                Some(at.unwrap_or_else(|| on_body.points[nearest(on_body, area_centroid(on_body))]))
+            }
+            LumpPlace::At(_) | LumpPlace::AsRead => None,
+        })
+        .collect();
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);
     }
@@ -87,6 +113,7 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         growth,
         bones,
         press_vertex,
+        lump_places,
         notes,
     })
 }
@@ -183,7 +210,7 @@ fn area_centroid(surface: &Surface) -> Vec3 {
 }
 
 /// Reads a surface; refuses one with a coordinate that is no number.
-fn read_in_metres(
+pub(crate) fn read_in_metres(
     path: &Path,
     unit: LengthUnit,
     notes: &mut Vec<String>,
@@ -220,7 +247,7 @@ fn read_in_metres(
 }
 
 /// The surface with what is safe to repair repaired.
-fn mended(surface: &Surface, path: &Path, notes: &mut Vec<String>) -> Surface {
+pub(crate) fn mended(surface: &Surface, path: &Path, notes: &mut Vec<String>) -> Surface {
     let (mended, report) = repair(surface, &RepairOptions::default());
     if report.is_changed() {
         notes.push(format!(
@@ -335,10 +362,7 @@ fn thickness_field(thickness: &Thickness, unit: LengthUnit) -> anyhow::Result<Th
 /// Says so when a cut-out's rim is so near that it would be felt.
 fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<String>) {
     const ENOUGH: f64 = 2.0;
-    let tool = match scene.tool {
-        palpa_tissue::Tool::Disc { radius } => radius,
-        palpa_tissue::Tool::Node => 0.0,
-    };
+    let tool = scene.tool.contact_radius();
     let depth: f64 = growth
         .report
         .layers

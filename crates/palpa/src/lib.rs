@@ -9,7 +9,8 @@
 pub mod build;
 pub mod cli;
 pub mod commands;
-
+pub mod continuum;
+pub mod export;
 pub mod output;
 pub mod plot;
 pub mod press;
@@ -18,6 +19,7 @@ pub mod section;
 pub mod table;
 pub mod vtu;
 
+pub use palpa_fem as fem;
 pub use palpa_mesh as mesh;
 pub use palpa_springs as springs;
 pub use palpa_tissue as tissue;

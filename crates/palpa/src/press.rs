@@ -116,6 +116,7 @@ impl Indentation {
     /// # Errors
     /// When the place, the depth or the constraints do not fit the body.
     pub fn build(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
+        check_reference(scene)?;
         let body = &built.growth.body;
         let mut notes = Vec::new();
         let vertex = built.press_vertex;
@@ -158,13 +159,10 @@ impl Indentation {
                 tissue_depth * 1e3,
             );
         }
+        let radius = scene.tool.contact_radius();
         let operated = match scene.tool {
-            Tool::Node => vec![body.node(vertex, 0)],
-            Tool::Disc { radius } => nodes_under_disc(body, vertex, at, &direction, radius),
-        };
-        let radius = match scene.tool {
-            Tool::Disc { radius } => radius,
-            Tool::Node => 0.0,
+            Tool::Disc { .. } => nodes_under_disc(body, vertex, at, &direction, radius),
+            Tool::Node | Tool::Contact(_) => vec![body.node(vertex, 0)],
         };
         let mesh_size = mesh_size_near(body, at, radius);
         if matches!(scene.tool, Tool::Disc { .. }) && operated.len() < ENOUGH_NODES {
@@ -177,6 +175,15 @@ impl Indentation {
             ));
         }
         note_aspects(built, scene, mesh_size, &mut notes);
+        if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
+            notes.push("bars are without tension at rest; `prestress` was left out".into());
+        }
+        if scene.press.speeds.len() > 1 {
+            notes.push(
+                "bars have no time, so every speed gives the same force; only the first of `speeds` was run"
+                    .into(),
+            );
+        }
         if body
             .cut_faces
             .iter()
@@ -295,7 +302,7 @@ fn tidy(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
 }
 
-/// Down in equal steps, a rest of a few samples, and back.
+/// Down in equal steps, a rest of a few samples, and back; and again.
 fn path(scene: &Scene) -> Vec<Waypoint> {
     const HOLD_SAMPLES: usize = 5;
     let press = &scene.press;
@@ -303,28 +310,50 @@ fn path(scene: &Scene) -> Vec<Waypoint> {
     let n = (press.depth / press.step - 1e-9).ceil().max(1.0) as usize;
     let depth_at = |i: usize| press.depth * i as f64 / n as f64;
     let down = press.depth / press.speed;
-    let mut path: Vec<Waypoint> = (0..=n)
-        .map(|i| Waypoint {
+    let mut path = Vec::new();
+    for cycle in 0..press.cycles {
+        let start = f64::from(cycle) * (2.0 * down + press.hold);
+        // Where a cycle ends, the next one begins.
+        let first = usize::from(cycle > 0);
+        path.extend((first..=n).map(|i| Waypoint {
             phase: Phase::Load,
-            time: depth_at(i) / press.speed,
-            depth: depth_at(i),
-        })
-        .collect();
-    if press.hold > 0.0 {
-        path.extend((1..=HOLD_SAMPLES).map(|i| Waypoint {
-            phase: Phase::Hold,
-            time: down + press.hold * i as f64 / HOLD_SAMPLES as f64,
-            depth: press.depth,
-        }));
-    }
-    if press.retract {
-        path.extend((0..n).rev().map(|i| Waypoint {
-            phase: Phase::Retract,
-            time: down + press.hold + (press.depth - depth_at(i)) / press.speed,
+            time: start + depth_at(i) / press.speed,
             depth: depth_at(i),
         }));
+        if press.hold > 0.0 {
+            path.extend((1..=HOLD_SAMPLES).map(|i| Waypoint {
+                phase: Phase::Hold,
+                time: start + down + press.hold * i as f64 / HOLD_SAMPLES as f64,
+                depth: press.depth,
+            }));
+        }
+        if press.retract {
+            path.extend((0..n).rev().map(|i| Waypoint {
+                phase: Phase::Retract,
+                time: start + down + press.hold + (press.depth - depth_at(i)) / press.speed,
+                depth: depth_at(i),
+            }));
+        }
     }
     path
+}
+
+/// Refuses what bars between nodes cannot do.
+fn check_reference(scene: &Scene) -> anyhow::Result<()> {
+    if !scene.tool.is_bonded() {
+        bail!(
+            "the reference method moves nodes that are bonded to the tool, and a {} presses by contact; give the scene's \
+             [tool] shape = \"disc\" or \"node\"",
+            scene.tool
+        );
+    }
+    if let Some(lump) = scene.lumps.first() {
+        bail!(
+            "the reference method has bars between nodes and no place for the lump \"{}\"; remove [[lump]]",
+            lump.name
+        );
+    }
+    Ok(())
 }
 
 fn spring_params(scene: &Scene) -> SpringParams {
@@ -332,8 +361,8 @@ fn spring_params(scene: &Scene) -> SpringParams {
         .layers
         .iter()
         .map(|layer| match &layer.tissue.law {
-            Law::Elastic { young, .. } => LayerStiffness::Young {
-                modulus: young.value,
+            Law::Elastic(elastic) => LayerStiffness::Young {
+                modulus: elastic.young(),
             },
             Law::Spring { constant } => LayerStiffness::Spring {
                 stiffness: constant.value,
@@ -413,7 +442,7 @@ fn constraints(
 }
 
 /// Skin nodes of the side pressed on within `radius` of the tool's axis, and connected with the vertex in the middle.
-fn nodes_under_disc(
+pub(crate) fn nodes_under_disc(
     body: &LayeredBody,
     vertex: usize,
     at: Vec3,
@@ -451,7 +480,7 @@ fn nodes_under_disc(
 /// Says which layers have levels too flat or too tall for bars to stand for their modulus.
 fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<String>) {
     let unsound: Vec<String> = (built.growth.report.layers.iter().zip(&scene.layers))
-        .filter(|(_, layer)| matches!(layer.tissue.law, Law::Elastic { .. }))
+        .filter(|(_, layer)| layer.tissue.elastic().is_some())
         .filter_map(|(report, _)| {
             let height = report.thickness.median / report.n_levels as f64;
             let aspect = height / mesh_size;
@@ -469,7 +498,7 @@ fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Ve
     }
 }
 
-fn column_length(body: &LayeredBody, v: usize) -> f64 {
+pub(crate) fn column_length(body: &LayeredBody, v: usize) -> f64 {
     let p = |l: usize| body.positions[body.node(v, l)];
     (1..body.n_levels).map(|l| (p(l) - p(l - 1)).norm()).sum()
 }

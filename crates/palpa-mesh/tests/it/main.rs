@@ -3,8 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod check;
+mod generate;
 mod growth;
+mod imprint;
 mod read;
+mod refine;
 mod repair;
 mod shapes;
+mod sound;
 mod write;

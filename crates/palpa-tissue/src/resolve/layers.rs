@@ -1,17 +1,17 @@
 //! The layers: their tissues and thicknesses.
 
-use super::{Reader, unit_vector};
+use super::tissue::tissue;
+use super::{Reader, direction};
 use crate::error::Site;
-use crate::file::{
-    AxisName, AxisSpec, LayerTable, ThicknessSpec, ThicknessTable, TissueSpec, TissueTable,
-};
+use crate::file::{LayerTable, ThicknessSpec, ThicknessTable};
 use crate::limits;
 use crate::scene::Layer;
 use crate::units::Length;
-use crate::{Law, SceneError, Sourced, Status, Thickness, Tissue, catalogue};
+use crate::{SceneError, Thickness};
 
 /// How thin a layer may become whose thickness is not known beforehand. m
 const MIN_THICKNESS: f64 = 0.5e-3;
+
 impl Reader<'_> {
     pub(super) fn layers(&self, tables: Vec<LayerTable>) -> Result<Vec<Layer>, SceneError> {
         let at = self.site("layer");
@@ -82,6 +82,10 @@ impl Reader<'_> {
             thickness_source: table.thickness_source,
             levels: at.key("levels").within(table.levels, &limits::LEVELS)? as usize,
             min_thickness,
+            prestress: at
+                .key("prestress")
+                .within(table.prestress, &limits::PRESTRESS)?
+                .si(),
         })
     }
 
@@ -97,12 +101,7 @@ impl Reader<'_> {
                 ));
             }
         };
-        let axis = match axis {
-            AxisSpec::Name(AxisName::X) => [1.0, 0.0, 0.0],
-            AxisSpec::Name(AxisName::Y) => [0.0, 1.0, 0.0],
-            AxisSpec::Name(AxisName::Z) => [0.0, 0.0, 1.0],
-            AxisSpec::Vector(vector) => unit_vector(&at.key("axis"), vector)?,
-        };
+        let axis = direction(&at.key("axis"), axis)?;
         let at = at.key("table");
         if rows.is_empty() || rows.len() > limits::MAX_ROWS {
             let (n, most) = (rows.len(), limits::MAX_ROWS);
@@ -122,74 +121,4 @@ impl Reader<'_> {
         }
         Ok(Thickness::Along { axis, table })
     }
-}
-
-fn tissue(at: &Site<'_>, spec: TissueSpec) -> Result<Tissue, SceneError> {
-    let name = match spec {
-        TissueSpec::Name(name) => name,
-        TissueSpec::Inline(table) => return inline_tissue(at, table),
-    };
-    let mut tissues = catalogue().iter();
-    tissues
-        .find(|tissue| tissue.name == name)
-        .cloned()
-        .ok_or_else(|| {
-            let names = catalogue().iter().map(|tissue| tissue.name.clone());
-            at.unknown("tissue", &name, names.collect())
-        })
-}
-
-fn inline_tissue(at: &Site<'_>, table: TissueTable) -> Result<Tissue, SceneError> {
-    let given = |value: f64| Sourced {
-        value,
-        status: Status::Given,
-        source: table.source.clone(),
-    };
-    let law = match (table.young, table.spring) {
-        (Some(young), None) => {
-            let young = at.key("young").within(young, &limits::YOUNG)?.si();
-            let poisson = match table.poisson {
-                Some(poisson) => given(at.key("poisson").within(poisson, &limits::POISSON)?),
-                None => Sourced {
-                    value: 0.45,
-                    status: Status::Assumed,
-                    source: "default, customary in limb indentation".to_owned(),
-                },
-            };
-            Law::Elastic {
-                young: given(young),
-                poisson,
-            }
-        }
-        (None, Some(spring)) if table.poisson.is_none() => Law::Spring {
-            constant: given(at.key("spring").within(spring, &limits::SPRING)?.si()),
-        },
-        (None, Some(_)) => {
-            return Err(at.key("poisson").invalid(
-                "bars of one spring stiffness have no Poisson's ratio to choose; remove `poisson`, or \
-                 give `young` instead of `spring`",
-            ));
-        }
-        (Some(_), Some(_)) => {
-            return Err(at
-                .key("spring")
-                .invalid("the stiffness is given twice; remove `young` or `spring`"));
-        }
-        (None, None) => {
-            return Err(at.invalid(
-                "the tissue has no stiffness; give `young = \"12 kPa\"` or `spring = \"90 dyn/cm\"`",
-            ));
-        }
-    };
-    let density = match table.density {
-        Some(density) => Some(given(
-            at.key("density").within(density, &limits::DENSITY)?.si(),
-        )),
-        None => None,
-    };
-    Ok(Tissue {
-        name: table.name,
-        law,
-        density,
-    })
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use palpa_tissue::{Scene, SceneError};
+use palpa_tissue::{Press, Scene, SceneError};
 
 /// A valid scene; each case below replaces one piece of it.
 const SCENE: &str = r#"[body]
@@ -215,6 +215,260 @@ fn what_does_not_go_together() {
         ("step = \"0.25 mm\"", "step = \"1 um\""),
     ]);
     insta::assert_snapshot!(said);
+}
+
+/// The messages for a scene of one layer with each of these in place of its tissue's table.
+fn tissue_refusals(tables: &[&str]) -> String {
+    let mut said = String::new();
+    for table in tables {
+        let text = format!(
+            "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = {{ {table} }}"
+        );
+        writeln!(said, "{table}\n    {}", refusal(&text)).unwrap();
+    }
+    said
+}
+
+#[test]
+fn every_range_of_a_law() {
+    let said = tissue_refusals(&[
+        "shear = \"0 kPa\"",
+        "c10 = \"2 GPa\"",
+        "law = \"mooney-rivlin\", c10 = \"1 kPa\", c01 = \"-1 kPa\"",
+        "law = \"yeoh\", c10 = \"1 kPa\", c20 = \"-2 GPa\"",
+        "law = \"yeoh\", c10 = \"1 kPa\", c30 = \"-1 kPa\"",
+        "law = \"ogden\", terms = []",
+        "law = \"ogden\", terms = [{ mu = \"0 Pa\", alpha = 2 }]",
+        "law = \"ogden\", terms = [{ mu = \"1 kPa\", alpha = 2 }, { mu = \"1 kPa\", alpha = 0 }]",
+        "law = \"ogden\", terms = [{ mu = \"1 kPa\", alpha = nan }]",
+        "law = \"ogden\", young = \"1 kPa\", alpha = -101",
+        "law = \"fung\", young = \"1 kPa\", b = 0",
+        "law = \"fung\", young = \"1 kPa\", b = -inf",
+        "young = \"1 kPa\", bulk = \"0 Pa\"",
+        "shear = \"1 Pa\", poisson = 0.499",
+        "young = \"1 kPa\", bulk = \"2.2 GPa\"",
+        "young = \"1 kPa\", bulk = \"100 Pa\"",
+        "c10 = \"1 kPa\", bulk = \"1 kPa\"",
+        "c10 = \"1 kPa\", bulk = \"2.2 GPa\"",
+        "law = \"ogden\", terms = [{ mu = \"1 GPa\", alpha = 2 }], poisson = 0.3",
+        "law = \"ogden\", young = \"1 kPa\", alpha = 2, bulk = \"10 Pa\"",
+        "young = \"1 kPa\", prony = { terms = [] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0, tau = \"1 s\" }] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 1, tau = \"1 s\" }] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0.5, tau = \"0 s\" }] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0.5, tau = \"1 s\" }, { g = 0.5, tau = \"2 s\" }] }",
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn what_a_law_does_not_take() {
+    let said = tissue_refusals(&[
+        "law = \"neo-hookian\", young = \"1 kPa\"",
+        "law = \"neo-hookean\"",
+        "young = \"1 kPa\", shear = \"1 kPa\"",
+        "young = \"1 kPa\", c10 = \"1 kPa\"",
+        "shear = \"1 kPa\", c10 = \"1 kPa\"",
+        "young = \"1 kPa\", c01 = \"1 kPa\"",
+        "law = \"linear\", c10 = \"1 kPa\"",
+        "law = \"fung\", young = \"1 kPa\"",
+        "law = \"fung\", b = 10",
+        "law = \"mooney-rivlin\", c10 = \"1 kPa\"",
+        "law = \"mooney-rivlin\", young = \"1 kPa\", c01 = \"1 kPa\"",
+        "law = \"yeoh\", c10 = \"1 kPa\", c20 = \"-1 Pa\"",
+        "law = \"yeoh\", c10 = \"1 kPa\", c20 = \"-2 kPa\", c30 = \"1 kPa\"",
+        "law = \"ogden\", young = \"1 kPa\"",
+        "law = \"ogden\", alpha = 10",
+        "law = \"ogden\", terms = [{ mu = \"1 kPa\", alpha = 2 }], alpha = 3",
+        "law = \"ogden\", terms = [{ mu = \"1 kPa\", alpha = 2 }], young = \"1 kPa\"",
+        "law = \"ogden\", terms = [{ mu = \"1 kPa\", exponent = 2 }]",
+        "young = \"1 kPa\", poisson = 0.45, bulk = \"1 MPa\"",
+        "law = \"linear\", young = \"1 kPa\", volume = \"logarithmic\"",
+        "young = \"1 kPa\", volume = \"log\"",
+        "young = \"1 kPa\", prony = { g = 0.4, tau = \"1 s\" }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0.4 }] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0.4, tau = 1 }] }",
+        "young = \"1 kPa\", prony = { terms = [{ g = 0.4, tau = \"1 s\" }], moduli = \"long\" }",
+        "spring = \"1 N/m\", law = \"linear\"",
+        "spring = \"1 N/m\", prony = { terms = [{ g = 0.4, tau = \"1 s\" }] }",
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn wrong_lumps_and_tools() {
+    let tissue = "tissue = \"fibrous lump\"";
+    let good = format!("{tissue}\nradius = \"6 mm\"\ndepth = \"9 mm\"");
+    let mut said = String::new();
+    for (table, keys) in [
+        ("[[lump]]", "radius = \"6 mm\"\ndepth = \"9 mm\"".to_owned()),
+        ("[[lump]]", tissue.to_owned()),
+        ("[[lump]]", format!("{tissue}\nradius = \"6 mm\"")),
+        ("[[lump]]", format!("{tissue}\ndepth = \"9 mm\"")),
+        ("[lump]", good.clone()),
+        ("[[lump]]", good.replace("6 mm", "0 mm")),
+        ("[[lump]]", good.replace("9 mm", "-9 mm")),
+        ("[[lump]]", good.replace("fibrous lump", "fibrous lumps")),
+        (
+            "[[lump]]",
+            good.replace("\"fibrous lump\"", "{ spring = \"1 N/m\" }"),
+        ),
+        (
+            "[[lump]]",
+            good.replace("\"fibrous lump\"", "{ young = \"1 Pa\" }"),
+        ),
+        (
+            "[[lump]]",
+            format!("{good}\nat = [\"0 m\", \"0 m\", \"0 m\"]"),
+        ),
+        (
+            "[[lump]]",
+            format!("{good}\nbelow_vertex = 3\nbelow = [\"0 m\", \"0 m\", \"0 m\"]"),
+        ),
+        (
+            "[[lump]]",
+            format!("{tissue}\nradius = \"6 mm\"\nbelow_vertex = 3"),
+        ),
+        (
+            "[[lump]]",
+            format!("{good}\nbelow = [\"0 m\", \"11 m\", \"0 m\"]"),
+        ),
+        ("[[lump]]", format!("{good}\nlength = \"6 mm\"")),
+        ("[[lump]]", format!("{good}\naxis = \"x\"")),
+        ("[[lump]]", format!("{good}\nshape = \"capsule\"")),
+        ("[[lump]]", format!("{good}\nshape = \"ellipsoid\"")),
+        ("[[lump]]", format!("{good}\nshape = \"cube\"")),
+        (
+            "[[lump]]",
+            format!("{tissue}\nshape = \"ellipsoid\"\ndepth = \"9 mm\""),
+        ),
+        ("[[lump]]", format!("{tissue}\nshape = \"mesh\"")),
+        (
+            "[[lump]]",
+            format!("{tissue}\nshape = \"mesh\"\nfile = \"\""),
+        ),
+        ("[[lump]]", format!("{good}\ntransition = \"13 mm\"")),
+        ("[[lump]]", format!("{good}\ntransition = \"-1 mm\"")),
+        ("[tool]", "shape = \"needle\"".to_owned()),
+        ("[tool]", "friction = 0.3".to_owned()),
+        ("[tool]", "shape = \"sphere\"\nfriction = -0.3".to_owned()),
+        ("[tool]", "shape = \"sphere\"\nfriction = 6".to_owned()),
+        ("[tool]", "shape = \"sphere\"\nlength = \"6 mm\"".to_owned()),
+        ("[tool]", "shape = \"sphere\"\naxis = \"x\"".to_owned()),
+        (
+            "[tool]",
+            "shape = \"flat-punch\"\nedge_radius = \"9 mm\"".to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"flat-punch\"\nedge_radius = \"0 mm\"".to_owned(),
+        ),
+        ("[tool]", "shape = \"capsule\"\nlength = \"1 m\"".to_owned()),
+        ("[tool]", "shape = \"capsule\"\naxis = [0, 0, 0]".to_owned()),
+        ("[tool]", "shape = \"box\"\nradius = \"6 mm\"".to_owned()),
+        (
+            "[tool]",
+            "shape = \"box\"\nsize = [\"9 mm\", \"0 mm\", \"9 mm\"]".to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"box\"\nsize = [\"9 mm\", \"2 mm\", \"9 mm\"]\nedge_radius = \"1.5 mm\""
+                .to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 mm\"]".to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 m\", \"9 mm\"]".to_owned(),
+        ),
+    ] {
+        let text = format!(
+            "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{table}\n{keys}"
+        );
+        let keys = keys.replace('\n', "; ");
+        writeln!(said, "{table} {keys}\n    {}", refusal(&text)).unwrap();
+    }
+    let many = format!(
+        "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{}",
+        format!("[[lump]]\n{good}\n").repeat(65)
+    );
+    writeln!(said, "65 lumps\n    {}", refusal(&many)).unwrap();
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn wrong_programmes_models_and_meshes() {
+    let said = refusals(&[
+        ("min_thickness = \"0.3 mm\"", "prestress = \"-1 kPa\""),
+        ("min_thickness = \"0.3 mm\"", "prestress = \"6.2 N/m\""),
+        ("hold = \"0.5 s\"", "cycles = 0"),
+        ("hold = \"0.5 s\"", "cycles = 101"),
+        ("hold = \"0.5 s\"", "cycles = 2\nretract = false"),
+        ("hold = \"0.5 s\"", "speeds = [\"1 mm/s\"]"),
+        ("speed = \"10 mm/s\"", "speeds = [\"1 mm/s\", \"2 m/s\"]"),
+        (
+            "speed = \"10 mm/s\"",
+            &format!("speeds = [{}]", "\"1 mm/s\", ".repeat(17)),
+        ),
+        ("[reference]", "[model]\nkind = \"springs\"\n[reference]"),
+        ("[reference]", "[model]\nalpha = 1\n[reference]"),
+        ("[reference]", "[model]\ntolerance = 0\n[reference]"),
+        (
+            "[reference]",
+            "[model]\ndamping = { mass = \"5 1/s\" }\n[reference]",
+        ),
+        (
+            "[reference]",
+            "[model]\ndynamics = \"implicit\"\ndamping = { mass = \"5 s\" }\n[reference]",
+        ),
+        (
+            "[reference]",
+            "[model]\ndynamics = \"implicit\"\ndamping = { mass = \"-5 Hz\" }\n[reference]",
+        ),
+        (
+            "[reference]",
+            "[model]\ndynamics = \"implicit\"\ndamping = { stiffness = \"1 h\" }\n[reference]",
+        ),
+        (
+            "[reference]",
+            "[model]\ndynamics = \"explicit\"\n[reference]",
+        ),
+        ("[reference]", "[mesh]\nrefine = 1\n[reference]"),
+        ("[reference]", "[mesh]\nnear_tool = \"0 mm\"\n[reference]"),
+        ("[reference]", "[mesh]\nnear_lumps = \"1 m\"\n[reference]"),
+        ("[reference]", "[mesh]\ngrowth = 0\n[reference]"),
+        ("[reference]", "[mesh]\nmax_vertices = 10\n[reference]"),
+        ("[reference]", "[mesh]\nnear_lump = \"1 mm\"\n[reference]"),
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+/// A program that sets its own numbers is held to the same ranges.
+#[test]
+fn a_press_of_a_program_is_checked() {
+    let press = Scene::parse(SCENE, Path::new("")).unwrap().press;
+    assert_eq!(press.check(), Ok(()));
+    let said: Vec<String> = [
+        Press {
+            speeds: vec![1e-3, 2.0],
+            ..press.clone()
+        },
+        Press {
+            cycles: 0,
+            ..press.clone()
+        },
+        Press {
+            cycles: 2,
+            retract: false,
+            ..press.clone()
+        },
+    ]
+    .iter()
+    .map(|press| press.check().unwrap_err())
+    .collect();
+    insta::assert_snapshot!(said.join("\n"));
 }
 
 #[test]

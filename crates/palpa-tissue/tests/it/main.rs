@@ -8,6 +8,7 @@
 )]
 
 mod catalogue;
+mod continuum;
 mod errors;
 mod robust;
 mod scenes;

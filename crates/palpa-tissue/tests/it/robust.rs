@@ -16,6 +16,10 @@ fn near_scenes() -> impl Strategy<Value = String> {
         "[[layer]]\n",
         "[layer]\n",
         "[tool]\n",
+        "[[lump]]\n",
+        "[model]\n",
+        "[mesh]\n",
+        "[layer.tissue.prony]\n",
         "[press]\n",
         "[reference]\n",
         "surface = ",
@@ -35,10 +39,21 @@ fn near_scenes() -> impl Strategy<Value = String> {
         "shape = ",
         "radius = ",
         "young = ",
+        "law = ",
+        "terms = ",
+        "prony = ",
+        "bulk = ",
+        "depth = ",
+        "speeds = ",
+        "dynamics = ",
         "spring = ",
         "solver = ",
         "\"block\"",
         "\"fat\"",
+        "\"ogden\"",
+        "{ mu = \"4 kPa\", alpha = 10 }",
+        "{ g = 0.4, tau = \"1 s\" }",
+        "\"implicit\"",
         "\"1 mm\"",
         "\"12 kPa\"",
         "\"x\"",
@@ -69,6 +84,7 @@ fn damaged_scenes() -> impl Strategy<Value = String> {
     let texts = prop::sample::select(vec![
         include_str!("scenes/limb.toml"),
         include_str!("scenes/thesis.toml"),
+        include_str!("scenes/everything.toml"),
         Scene::embedded_toml(),
     ]);
     (texts, any::<prop::sample::Index>(), 0usize..12, ".{0,8}").prop_map(|(text, at, n, new)| {
@@ -168,5 +184,5 @@ fn what_a_message_repeats_cannot_break_its_line() {
     let SceneError::Unknown { found, allowed, .. } = error else {
         panic!("{error}")
     };
-    assert_eq!((found.as_str(), allowed.len()), ("a`b", 5));
+    assert_eq!((found.as_str(), allowed.len()), ("a`b", 8));
 }

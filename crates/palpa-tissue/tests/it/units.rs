@@ -158,3 +158,24 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn rates_are_one_by_a_time_or_frequencies() {
+    for (text, si) in [
+        ("5 1/s", 5.0),
+        ("5 Hz", 5.0),
+        ("3/s", f64::NAN),
+        ("30 1/min", 0.5),
+        ("2 kHz", 2e3),
+        ("2 1/ms", 2e3),
+    ] {
+        let rate = text.parse::<palpa_tissue::units::Rate>();
+        if si.is_nan() {
+            assert!(rate.is_err(), "{text} became {rate:?}");
+            continue;
+        }
+        let rate = rate.unwrap();
+        assert!((rate.si() / si - 1.0).abs() < 1e-15, "{text} became {rate}");
+        assert_eq!(rate.to_string().parse(), Ok(rate));
+    }
+}

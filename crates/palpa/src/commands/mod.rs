@@ -7,6 +7,7 @@
 use clap::Subcommand;
 
 pub mod check;
+pub mod export;
 pub mod press;
 pub mod reproduce;
 pub mod schema;
@@ -29,6 +30,7 @@ pub enum Outcome {
 #[expect(missing_docs, reason = "a command's help text stands at its `Args`")]
 pub enum Command {
     Check(check::Args),
+    Export(export::Args),
     Press(press::Args),
     Reproduce(reproduce::Args),
     Schema(schema::Args),
@@ -39,6 +41,7 @@ impl Command {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Check(_) => "check",
+            Self::Export(_) => "export",
             Self::Press(_) => "press",
             Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
@@ -52,6 +55,7 @@ impl Command {
     pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
         match self {
             Self::Check(args) => check::run(args, context),
+            Self::Export(args) => export::run(args, context),
             Self::Press(args) => press::run(args, context),
             Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),

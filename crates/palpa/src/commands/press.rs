@@ -140,6 +140,7 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
     }
     if let Some(speed) = args.speed {
         press.speed = speed.si();
+        press.speeds.clear();
     }
     if let Some(hold) = args.hold {
         press.hold = hold.si();

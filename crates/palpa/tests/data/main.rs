@@ -1,10 +1,11 @@
-//! Tests on measured and awkward data, which are not part of this repository.
+//! Tests on measured and awkward data, which are not part of this repository, and with CalculiX.
 //!
 //! `PALPA_SHARED` names the folder that holds them as `data/…`; without it, these tests say that they are skipped.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod awkward;
+mod ccx;
 mod manifest;
 mod real;
 

@@ -111,7 +111,7 @@ fn section_picture(
         .collect();
     let tool = |at: Vec3| match scene.tool {
         Tool::Disc { radius } => ToolOutline::disc(&plane, &at, &direction, radius),
-        Tool::Node => ToolOutline::node(&plane, &at),
+        Tool::Node | Tool::Contact(_) => ToolOutline::node(&plane, &at),
     };
     let (rest, pressed) = (
         cut_body(body, &body.positions, &plane),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use palpa_mesh::growth::GrowthReport;
-use palpa_tissue::{MaterialStatus, Scene, Status, Tool};
+use palpa_tissue::{MaterialStatus, Scene, Status};
 use serde::Serialize;
 
 use super::record::Recorded;
@@ -65,10 +65,7 @@ pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
 }
 
 pub(super) fn tool_name(scene: &Scene) -> String {
-    match scene.tool {
-        Tool::Disc { radius } => format!("bonded disc, radius {:.1} mm", radius * 1e3),
-        Tool::Node => "single operated node".to_owned(),
-    }
+    scene.tool.to_string()
 }
 
 pub(super) fn result_of(

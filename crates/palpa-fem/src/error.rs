@@ -1,0 +1,95 @@
+//! Why a model is refused.
+
+use palpa_sparse::TooLarge;
+
+/// Why a model cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FemError {
+    /// A prism is inverted or has no volume at rest.
+    #[error(
+        "the prism under triangle {triangle} in interval {interval} is inverted or flat at rest, near ({:.2}, {:.2}, {:.2}) mm; \
+         grow the body again or mend its skin there",
+        at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+    )]
+    InvertedPrism {
+        /// Skin triangle.
+        triangle: u32,
+        /// Interval between levels, from the skin.
+        interval: usize,
+        /// Its middle, m.
+        at: [f64; 3],
+    },
+    /// There is not one material for every layer.
+    #[error(
+        "the body has {n_layers} layers, and {n_materials} of them have a material; give one for each"
+    )]
+    Layers {
+        /// Layers of the body.
+        n_layers: usize,
+        /// Materials given for them.
+        n_materials: usize,
+    },
+    /// A layer or lump names a material that there is not.
+    #[error("material {material} is asked for, but there are only {n_materials}")]
+    NoSuchMaterial {
+        /// The index.
+        material: usize,
+        /// Number of materials.
+        n_materials: usize,
+    },
+    /// A small-strain material beside others.
+    #[error(
+        "material \"{linear}\" is linear (small strain) and \"{finite}\" is not; one body is either linear throughout or \
+         not at all: give both the same kind of law"
+    )]
+    MixedKinematics {
+        /// A linear one.
+        linear: String,
+        /// One that is not.
+        finite: String,
+    },
+    /// A lump whose law measures volume in another way than the layer round it.
+    #[error(
+        "lump material \"{lump}\" and layer material \"{layer}\" measure the change of volume differently; do not mix \
+         St. Venant–Kirchhoff with other laws in one place"
+    )]
+    MixedVolume {
+        /// The lump's.
+        lump: String,
+        /// The layer's.
+        layer: String,
+    },
+    /// A material with impossible values.
+    #[error("material \"{name}\": {source}")]
+    Material {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        source: crate::law::LawError,
+    },
+    /// The stabiliser is off or beyond all.
+    #[error(
+        "alpha is {alpha}, outside 0 to below 1; 0.8 is a good value, and 1 leaves hourglass modes"
+    )]
+    Alpha {
+        /// The value given.
+        alpha: f64,
+    },
+    /// No memory or index range for the factor.
+    #[error(
+        "a system of {n_dofs} unknowns is too large to factorise here; make the mesh coarser or cut out a part"
+    )]
+    TooLarge {
+        /// Unknowns.
+        n_dofs: usize,
+    },
+}
+
+impl From<TooLarge> for FemError {
+    fn from(error: TooLarge) -> Self {
+        Self::TooLarge {
+            n_dofs: error.n_dofs,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! What is looked at inside a pressed body: stress, stretch, energy, and the forces that layers hand on.
+
+use palpa_mesh::Vec3;
+
+use crate::Mat3;
+use crate::assembly::phases_at;
+use crate::element::{GroupResponse, element_fields, evaluate};
+use crate::model::Model;
+use crate::state::State;
+use crate::statics::Workspace;
+
+/// The state of one prism: means over its volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PrismField {
+    /// Cauchy stress, Pa.
+    pub cauchy: Mat3,
+    /// Stretches along the principal directions, ascending.
+    pub stretches: [f64; 3],
+    /// Volume as a multiple of that at rest.
+    pub volume_ratio: f64,
+    /// Strain energy over volume at rest, J/m³; for a viscous material the elastic part of its present law.
+    pub energy: f64,
+}
+
+impl PrismField {
+    /// Von Mises stress, Pa: 0 under pressure alone.
+    pub fn von_mises(&self) -> f64 {
+        let deviator = self.cauchy - Mat3::identity() * (self.cauchy.trace() / 3.0);
+        (1.5 * deviator.norm_squared()).sqrt()
+    }
+
+    /// Pressure, Pa, positive in compression: minus the mean normal stress.
+    pub fn pressure(&self) -> f64 {
+        -self.cauchy.trace() / 3.0
+    }
+}
+
+/// The state of every prism, prism (t, i) at `t (n_levels − 1) + i`. `[n_prisms]`
+///
+/// `ws` is the one that solved the state last.
+pub fn prism_fields(model: &Model, state: &State, ws: &Workspace) -> Vec<PrismField> {
+    let n_intervals = model.body.n_levels - 1;
+    let none = PrismField {
+        cauchy: Mat3::zeros(),
+        stretches: [1.0; 3],
+        volume_ratio: 1.0,
+        energy: 0.0,
+    };
+    let mut fields = vec![none; model.body.n_prisms()];
+    let mut phases = Vec::with_capacity(4);
+    for i in 0..n_intervals {
+        for (g, group) in model.structure.groups.iter().enumerate() {
+            let index = i * model.n_groups() + g;
+            phases_at(model, &ws.memory, index, &mut phases);
+            let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
+            let geometry = &model.geometries[index];
+            let wedges =
+                element_fields(&group.shape, geometry, &local, &phases, model.params.alpha);
+            for (w, &(cauchy, f, volume_ratio, energy)) in wedges
+                .iter()
+                .enumerate()
+                .take(usize::from(group.shape.n_wedges))
+            {
+                let mut stretches: [f64; 3] = (f.transpose() * f)
+                    .symmetric_eigenvalues()
+                    .map(|x| x.max(0.0).sqrt())
+                    .into();
+                stretches.sort_by(f64::total_cmp);
+                fields[group.triangles[w] as usize * n_intervals + i] = PrismField {
+                    cauchy,
+                    stretches,
+                    volume_ratio,
+                    energy,
+                };
+            }
+        }
+    }
+    fields
+}
+
+/// For each level the force on it of the tissue below, N; at the deepest level that of the bone. `[n_levels]`
+///
+/// In a body without cut faces that are held, all of them are the force of the tool: it is handed on from layer to layer.
+pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
+    let mut forces = vec![Vec3::zeros(); model.body.n_levels];
+    let mut phases = Vec::with_capacity(4);
+    let mut response = GroupResponse::new();
+    for (i, level) in forces.iter_mut().enumerate().take(model.body.n_levels - 1) {
+        for (g, group) in model.structure.groups.iter().enumerate() {
+            let index = i * model.n_groups() + g;
+            phases_at(model, &ws.memory, index, &mut phases);
+            let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
+            evaluate(
+                &group.shape,
+                &model.geometries[index],
+                &local,
+                &phases,
+                model.params.alpha,
+                false,
+                &mut response,
+            );
+            for node in (0..group.n_nodes()).step_by(2) {
+                *level -= response.forces[node];
+            }
+        }
+    }
+    let base = model.body.n_levels - 1;
+    for v in 0..model.body.n_vertices() {
+        forces[base] += ws.reactions()[model.body.node(v, base)];
+    }
+    forces
+}

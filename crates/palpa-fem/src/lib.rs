@@ -1,0 +1,33 @@
+//! The continuum model: tissue as a nonlinear, nearly incompressible, viscoelastic solid on layered prisms.
+
+mod assembly;
+mod columns;
+mod contact;
+mod dynamics;
+mod element;
+mod error;
+mod fields;
+pub mod law;
+pub mod lump;
+mod materials;
+mod model;
+pub mod pairing;
+pub mod shape;
+mod state;
+mod statics;
+mod system;
+
+pub use contact::{ContactResiduals, PosedTool};
+pub use dynamics::Dynamics;
+pub use error::FemError;
+pub use fields::{PrismField, level_forces, prism_fields};
+pub use law::{Kinematics, Law, Material, Response, VolumeMeasure};
+pub use materials::{Materials, StiffnessField};
+pub use model::{Model, ModelParams, Supports};
+pub use state::{State, Touch};
+pub use statics::{Load, Outcome, SolveParams, StepReport, Workspace, advance, equilibrate};
+
+/// A 3 × 3 matrix, such as a deformation gradient.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// Derivative of one 3 × 3 matrix by another; entry `(i, j)` of a matrix is the index `i + 3 j`.
+pub type Mat9 = nalgebra::SMatrix<f64, 9, 9>;

@@ -1,0 +1,222 @@
+//! A body ready to be pressed: what never changes while it is.
+
+use palpa_mesh::{LayeredBody, Vec3};
+
+use crate::Material;
+use crate::columns::Structure;
+use crate::element::{GroupGeometry, Phase};
+use crate::error::FemError;
+use crate::materials::{Materials, assign};
+use crate::pairing::pair_triangles;
+use crate::system::Hold;
+
+/// Nodes that cannot move freely, whatever presses.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Supports {
+    /// Nodes that stay where they are.
+    pub fixed: Vec<usize>,
+    /// Nodes that stay in a plane, given by its normal. A node may lie in several.
+    pub planes: Vec<(usize, Vec3)>,
+}
+
+impl Supports {
+    /// The base of a body is fixed: the tissue hangs on its bone.
+    pub fn on_base(body: &LayeredBody) -> Self {
+        Self {
+            fixed: (0..body.n_nodes()).filter(|&n| body.is_base(n)).collect(),
+            planes: Vec::new(),
+        }
+    }
+}
+
+/// Parameters of the element and of its surroundings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelParams {
+    /// Share of the pair's mean deviator, 0 to below 1; the rest is each wedge's own. Near 1 single nodes hourglass.
+    pub alpha: f64,
+}
+
+impl Default for ModelParams {
+    fn default() -> Self {
+        Self { alpha: 0.8 }
+    }
+}
+
+/// A layered body with its materials and supports, and everything that can be computed beforehand.
+#[derive(Debug)]
+pub struct Model {
+    pub(crate) body: LayeredBody,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) structure: Structure,
+    /// `[interval × n_groups]`
+    pub(crate) geometries: Vec<GroupGeometry>,
+    pub(crate) phases: Vec<Phase>,
+    /// First phase of each group, and one past the last. `[interval × n_groups + 1]`
+    pub(crate) first_phase: Vec<u32>,
+    pub(crate) supports: Vec<Hold>,
+    /// Lumped mass of every node, kg.
+    pub(crate) masses: Vec<f64>,
+    /// Area of skin that every skin vertex stands for, m².
+    pub(crate) skin_areas: Vec<f64>,
+    pub(crate) params: ModelParams,
+    n_singles: usize,
+    /// Whether any material relaxes or is under tension at rest.
+    pub(crate) has_memory: bool,
+}
+
+impl Model {
+    /// Builds a model. Cost: the symbolic factor, which grows a little faster than the number of nodes.
+    ///
+    /// # Errors
+    /// When a prism is not valid, materials do not fit the body or each other, or the body is too large.
+    pub fn build(
+        body: &LayeredBody,
+        materials: &Materials,
+        supports: &Supports,
+        params: ModelParams,
+    ) -> Result<Self, FemError> {
+        if !(0.0..1.0).contains(&params.alpha) {
+            return Err(FemError::Alpha {
+                alpha: params.alpha,
+            });
+        }
+        materials.check(body)?;
+        let mut holds = vec![Hold::free(); body.n_nodes()];
+        for &(node, normal) in &supports.planes {
+            holds[node] = holds[node].and(&normal);
+        }
+        for &node in &supports.fixed {
+            holds[node] = Hold::all();
+        }
+        let base_is_fixed = (0..body.n_nodes()).all(|n| !body.is_base(n) || holds[n].n == 3);
+        let n_free_levels = body.n_levels - usize::from(base_is_fixed);
+        let pairing = pair_triangles(&body.skin);
+        let structure = Structure::build(&body.skin, &pairing, body.n_levels, n_free_levels)?;
+        let geometries = geometries(body, &structure)?;
+        let (phases, first_phase) = assign(body, &structure, &geometries, materials);
+        let masses = masses(body, &structure, &geometries, materials);
+        Ok(Self {
+            skin_areas: skin_areas(body),
+            has_memory: materials
+                .materials
+                .iter()
+                .any(|m| m.prony.is_some() || m.prestress != 0.0),
+            body: body.clone(),
+            materials: materials.materials.clone(),
+            n_singles: pairing.singles.len(),
+            structure,
+            geometries,
+            phases,
+            first_phase,
+            supports: holds,
+            masses,
+            params,
+        })
+    }
+
+    /// The body at rest.
+    pub fn body(&self) -> &LayeredBody {
+        &self.body
+    }
+
+    /// Its materials.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Number of nodes, held ones included.
+    pub fn n_nodes(&self) -> usize {
+        self.body.n_nodes()
+    }
+
+    /// Number of nodes that can move.
+    pub fn n_free_nodes(&self) -> usize {
+        self.supports.iter().filter(|hold| hold.n < 3).count()
+    }
+
+    /// Number of skin triangles without a partner; prisms under them are too stiff where tissue keeps its volume.
+    pub fn n_single_triangles(&self) -> usize {
+        self.n_singles
+    }
+
+    /// Area of skin that every skin vertex stands for at rest, m². `[n_vertices]`
+    pub fn skin_areas(&self) -> &[f64] {
+        &self.skin_areas
+    }
+
+    /// Number of groups in an interval.
+    pub(crate) fn n_groups(&self) -> usize {
+        self.structure.groups.len()
+    }
+
+    /// The nodes of a group in interval `i`, as the element counts them.
+    pub(crate) fn group_nodes(&self, group: usize, i: usize) -> [usize; 8] {
+        let vertices = &self.structure.groups[group].vertices;
+        std::array::from_fn(|n| self.body.node(vertices[n / 2] as usize, i + n % 2))
+    }
+}
+
+/// Corners of the wedges of a group.
+fn corners(body: &LayeredBody, triangles: &[u32], i: usize) -> Vec<[Vec3; 6]> {
+    triangles
+        .iter()
+        .map(|&t| body.prism(t as usize, i).map(|node| body.positions[node]))
+        .collect()
+}
+
+fn geometries(body: &LayeredBody, structure: &Structure) -> Result<Vec<GroupGeometry>, FemError> {
+    let mut geometries = Vec::with_capacity((body.n_levels - 1) * structure.groups.len());
+    for i in 0..body.n_levels - 1 {
+        for group in &structure.groups {
+            let triangles = &group.triangles[..usize::from(group.shape.n_wedges)];
+            let corners = corners(body, triangles, i);
+            let geometry = GroupGeometry::new(&corners);
+            for (w, corners) in corners.iter().enumerate() {
+                if !geometry.wedges[w].volumes.iter().all(|&v| v > 0.0) {
+                    let middle = corners.iter().sum::<Vec3>() / 6.0;
+                    return Err(FemError::InvertedPrism {
+                        triangle: triangles[w],
+                        interval: i,
+                        at: middle.into(),
+                    });
+                }
+            }
+            geometries.push(geometry);
+        }
+    }
+    Ok(geometries)
+}
+
+fn masses(
+    body: &LayeredBody,
+    structure: &Structure,
+    geometries: &[GroupGeometry],
+    materials: &Materials,
+) -> Vec<f64> {
+    let mut masses = vec![0.0; body.n_nodes()];
+    for (g, geometry) in geometries.iter().enumerate() {
+        let (i, group) = (g / structure.groups.len(), g % structure.groups.len());
+        let group = &structure.groups[group];
+        let material = materials.layers[body.interval_layer[i]];
+        let density = materials.materials[material].density;
+        for w in 0..usize::from(group.shape.n_wedges) {
+            let share = density * geometry.wedges[w].volume() / 6.0;
+            for node in body.prism(group.triangles[w] as usize, i) {
+                masses[node] += share;
+            }
+        }
+    }
+    masses
+}
+
+fn skin_areas(body: &LayeredBody) -> Vec<f64> {
+    let mut areas = vec![0.0; body.n_vertices()];
+    for triangle in &body.skin.triangles {
+        let [a, b, c] = triangle.map(|v| body.skin.points[v as usize]);
+        let area = 0.5 * (b - a).cross(&(c - a)).norm();
+        for &v in triangle {
+            areas[v as usize] += area / 3.0;
+        }
+    }
+    areas
+}

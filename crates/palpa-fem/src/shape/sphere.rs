@@ -1,0 +1,50 @@
+//! A ball.
+
+use palpa_mesh::Vec3;
+
+use super::{Distance, ShapeError, across, checked, offset_radius};
+
+pub(super) const NAME: &str = "sphere";
+
+/// A ball that rests on its tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sphere {
+    radius: f64,
+}
+
+impl Sphere {
+    /// A ball of this radius, in metres.
+    ///
+    /// # Errors
+    /// When the radius is not between 1 µm and 10 m.
+    pub fn new(radius: f64) -> Result<Self, ShapeError> {
+        Ok(Self {
+            radius: checked(NAME, "radius", radius)?,
+        })
+    }
+
+    /// Its radius. m
+    pub fn radius(self) -> f64 {
+        self.radius
+    }
+
+    pub(super) fn distance(self, p: &Vec3) -> Distance {
+        self.distance_centred(&(p - Vec3::z() * self.radius))
+    }
+
+    pub(super) fn support(self, u: &Vec3) -> Vec3 {
+        (u + Vec3::z()) * self.radius
+    }
+
+    /// The distance of a point given from the ball's middle.
+    pub(crate) fn distance_centred(self, p: &Vec3) -> Distance {
+        let from_middle = p.norm();
+        let normal = p.try_normalize(0.0).unwrap_or_else(|| -Vec3::z());
+        let distance = from_middle - self.radius;
+        Distance {
+            distance,
+            normal,
+            curvature: across(&normal) / offset_radius(self.radius, distance, self.radius),
+        }
+    }
+}

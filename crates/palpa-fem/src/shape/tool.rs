@@ -1,0 +1,55 @@
+//! A tool: a shape with a surface that grips, moved rigidly.
+
+use palpa_mesh::Vec3;
+
+use super::{Distance, Shape, ShapeError};
+
+/// Where a rigid thing stands: turns and shifts points of its own frame into the world's.
+pub type Pose = nalgebra::Isometry3<f64>;
+
+/// What presses on the skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tool {
+    shape: Shape,
+    friction: f64,
+}
+
+impl Tool {
+    /// A tool of this shape whose surface has this Coulomb coefficient of friction against skin.
+    ///
+    /// # Errors
+    /// When the coefficient is negative or not finite.
+    pub fn new(shape: impl Into<Shape>, friction: f64) -> Result<Self, ShapeError> {
+        if !(friction >= 0.0 && friction.is_finite()) {
+            return Err(ShapeError::Friction { value: friction });
+        }
+        Ok(Self {
+            shape: shape.into(),
+            friction,
+        })
+    }
+
+    /// Its shape.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Its coefficient of friction, 0 or more.
+    pub fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    /// The distance of the point `p_world` from the tool at `pose`; normal and curvature are in world axes, too.
+    pub fn distance_at(&self, pose: &Pose, p_world: &Vec3) -> Distance {
+        let p_local = pose
+            .rotation
+            .inverse_transform_vector(&(p_world - pose.translation.vector));
+        let local = self.shape.distance(&p_local);
+        let r = pose.rotation.to_rotation_matrix();
+        Distance {
+            distance: local.distance,
+            normal: r * local.normal,
+            curvature: r.matrix() * local.curvature * r.matrix().transpose(),
+        }
+    }
+}

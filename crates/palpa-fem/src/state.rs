@@ -1,0 +1,232 @@
+//! What evolves while a body is pressed.
+
+use palpa_mesh::Vec3;
+
+use crate::Mat3;
+use crate::element::{N_POINTS, Overstress, elastic_stresses};
+use crate::law::PronyStep;
+use crate::model::Model;
+
+/// How a skin vertex touches a tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touch {
+    /// Not at all.
+    Open,
+    /// It slides, or may slide freely.
+    Slip {
+        /// Which tool.
+        tool: u32,
+        /// Where in the tool's frame it was at the end of the last step, m.
+        anchor: Vec3,
+    },
+    /// Friction holds it.
+    Stick {
+        /// Which tool.
+        tool: u32,
+        /// Where in the tool's frame it is held, m.
+        anchor: Vec3,
+    },
+}
+
+impl Touch {
+    /// The tool that is touched.
+    pub fn tool(&self) -> Option<usize> {
+        match *self {
+            Self::Open => None,
+            Self::Slip { tool, .. } | Self::Stick { tool, .. } => Some(tool as usize),
+        }
+    }
+}
+
+/// The state of a body; cheap to copy back and forth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// Displacement of every node from rest, in m. `[n_nodes]`
+    pub displacements: Vec<Vec3>,
+    /// Velocity of every node, in m/s; zero unless dynamics is on. `[n_nodes]`
+    pub velocities: Vec<Vec3>,
+    /// Acceleration of every node, in m/s². `[n_nodes]`
+    pub accelerations: Vec<Vec3>,
+    /// How every skin vertex touches. `[n_vertices]`
+    pub touches: Vec<Touch>,
+    /// Time, in s.
+    pub time: f64,
+    /// For each phase of a viscous material the last elastic stress and the memories, point by point.
+    pub(crate) history: Vec<PhaseHistory>,
+}
+
+/// Memory of one phase of one group.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct PhaseHistory {
+    /// `[point][row]`, rows as in [`crate::law::Prony`]; empty for an elastic material.
+    points: Vec<[f64; 6]>,
+    volume: Vec<[f64; 1]>,
+}
+
+impl State {
+    /// A body at rest.
+    pub fn new(model: &Model) -> Self {
+        let n = model.n_nodes();
+        let history = if model.has_memory {
+            model
+                .phases
+                .iter()
+                .map(|phase| {
+                    let prony = &model.materials[phase.material as usize].prony;
+                    prony
+                        .as_ref()
+                        .map_or_else(PhaseHistory::default, |prony| PhaseHistory {
+                            points: vec![[0.0; 6]; N_POINTS * prony.n_rows()],
+                            volume: vec![[0.0]; prony.n_rows()],
+                        })
+                })
+                .collect()
+        } else {
+            Vec::new()
+        };
+        Self {
+            displacements: vec![Vec3::zeros(); n],
+            velocities: vec![Vec3::zeros(); n],
+            accelerations: vec![Vec3::zeros(); n],
+            touches: vec![Touch::Open; model.body.n_vertices()],
+            time: 0.0,
+            history,
+        }
+    }
+
+    /// Positions of all nodes, in m. `[n_nodes]`
+    pub fn positions(&self, model: &Model) -> Vec<Vec3> {
+        model
+            .body
+            .positions
+            .iter()
+            .zip(&self.displacements)
+            .map(|(x, u)| x + u)
+            .collect()
+    }
+}
+
+/// What a step of a given duration makes of every material: factors and constant stresses.
+#[derive(Debug)]
+pub(crate) struct Memory {
+    /// For each material the factors of its deviatoric and volumetric part.
+    pub(crate) scales: Vec<[f64; 2]>,
+    /// For each phase; empty when no material has any.
+    pub(crate) overstress: Vec<Overstress>,
+    steps: Vec<Option<PronyStep>>,
+}
+
+impl Memory {
+    pub(crate) fn new(model: &Model) -> Self {
+        let none = Overstress {
+            points: [Mat3::zeros(); N_POINTS],
+            volume: 0.0,
+        };
+        let n = if model.has_memory {
+            model.phases.len()
+        } else {
+            0
+        };
+        Self {
+            scales: vec![[1.0; 2]; model.materials.len()],
+            overstress: vec![none; n],
+            steps: vec![None; model.materials.len()],
+        }
+    }
+
+    /// Prepares a step that lasts `dt`.
+    pub(crate) fn begin(&mut self, model: &Model, state: &State, dt: f64) {
+        if !model.has_memory {
+            return;
+        }
+        for ((material, scale), step) in model
+            .materials
+            .iter()
+            .zip(&mut self.scales)
+            .zip(&mut self.steps)
+        {
+            *step = material.prony.as_ref().map(|prony| prony.step(dt));
+            *scale = match (&step, &material.prony) {
+                (Some(step), Some(prony)) => {
+                    let volume = if prony.relaxes_volume() {
+                        step.scale()
+                    } else {
+                        1.0
+                    };
+                    [step.scale(), volume]
+                }
+                _ => [1.0; 2],
+            };
+        }
+        let n_groups = model.n_groups();
+        for g in 0..model.geometries.len() {
+            let normal = model.geometries[g].thickness_gradient.normalize();
+            let in_plane = Mat3::identity() - normal * normal.transpose();
+            let _interval = g / n_groups;
+            for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
+                let index = model.phases[p].material as usize;
+                let material = &model.materials[index];
+                let overstress = &mut self.overstress[p];
+                overstress.points = [in_plane * material.prestress; N_POINTS];
+                overstress.volume = 0.0;
+                if let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) {
+                    let history = &state.history[p];
+                    for (point, rows) in history.points.chunks(prony.n_rows()).enumerate() {
+                        overstress.points[point] += symmetric(&step.memory(rows));
+                    }
+                    if prony.relaxes_volume() {
+                        overstress.volume = step.memory(&history.volume)[0];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Ends the step: every point remembers.
+    pub(crate) fn commit(&self, model: &Model, state: &mut State) {
+        if self.steps.iter().all(Option::is_none) {
+            return;
+        }
+        let n_groups = model.n_groups();
+        for g in 0..model.geometries.len() {
+            let (i, group) = (g / n_groups, g % n_groups);
+            let nodes = model.group_nodes(group, i);
+            let displacements = nodes.map(|n| state.displacements[n]);
+            for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
+                let index = model.phases[p].material as usize;
+                let material = &model.materials[index];
+                let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) else {
+                    continue;
+                };
+                let stresses = elastic_stresses(
+                    &model.structure.groups[group].shape,
+                    &model.geometries[g],
+                    &displacements,
+                    &material.law,
+                );
+                // A step that was accepted has no inverted point.
+                let Some(stresses) = stresses else { continue };
+                let history = &mut state.history[p];
+                for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {
+                    step.advance(rows, &components(&stresses.points[point]));
+                }
+                step.advance(&mut history.volume, &[stresses.volume]);
+            }
+        }
+    }
+}
+
+fn components(s: &Mat3) -> [f64; 6] {
+    [
+        s[(0, 0)],
+        s[(1, 1)],
+        s[(2, 2)],
+        f64::midpoint(s[(0, 1)], s[(1, 0)]),
+        f64::midpoint(s[(1, 2)], s[(2, 1)]),
+        f64::midpoint(s[(2, 0)], s[(0, 2)]),
+    ]
+}
+
+fn symmetric(c: &[f64; 6]) -> Mat3 {
+    Mat3::new(c[0], c[3], c[5], c[3], c[1], c[4], c[5], c[4], c[2])
+}

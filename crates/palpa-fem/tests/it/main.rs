@@ -1,0 +1,9 @@
+//! Tests of the continuum model, as its users see it.
+
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+#![expect(clippy::float_cmp, reason = "what is exact is compared exactly")]
+
+mod law;
+mod lump;
+mod pairing;
+mod shape;

@@ -1,0 +1,260 @@
+//! The red forest: triangles divided into four, with vertices hanging on the edges of their larger neighbours.
+
+use std::collections::{HashMap, VecDeque};
+
+use super::RefineParams;
+use super::origin::Origins;
+use crate::{Surface, Vec3};
+
+/// A triangle of the forest.
+#[derive(Debug, Clone, Copy)]
+struct Tree {
+    corners: [u32; 3],
+    /// The triangle of the old skin.
+    root: u32,
+    depth: u32,
+    /// Whether it was divided; if not, it is a leaf.
+    is_split: bool,
+    /// Whether it is larger than wanted.
+    is_too_large: bool,
+}
+
+/// Divided triangles over a skin. Its leaves keep two rules that make the green closure possible and good:
+/// no edge of a leaf is divided more than once, and at most one of its three is divided.
+#[derive(Debug)]
+pub(super) struct Forest {
+    points: Vec<Vec3>,
+    n_old: usize,
+    /// The ends of the edge in whose middle a new vertex stands. `[n_new]`
+    ends: Vec<[u32; 2]>,
+    trees: Vec<Tree>,
+    /// The vertex in the middle of an edge (smaller end first).
+    middles: HashMap<[u32; 2], u32>,
+    /// The leaf that walks an edge in this direction.
+    leaf_of: HashMap<[u32; 2], u32>,
+    /// Leaves that break a rule.
+    forced: Vec<u32>,
+    /// Leaves that are larger than wanted, level by level, so that a limit cuts off the finest first.
+    wanted: VecDeque<u32>,
+}
+
+impl Forest {
+    pub(super) fn new(skin: &Surface) -> Self {
+        let mut forest = Self {
+            points: skin.points.clone(),
+            n_old: skin.points.len(),
+            ends: Vec::new(),
+            trees: Vec::new(),
+            middles: HashMap::new(),
+            leaf_of: HashMap::with_capacity(3 * skin.triangles.len()),
+            forced: Vec::new(),
+            wanted: VecDeque::new(),
+        };
+        for (t, &corners) in skin.triangles.iter().enumerate() {
+            forest.plant(corners, t as u32, 0);
+        }
+        forest
+    }
+
+    /// Divides leaves until all are as small as wanted, or a limit is reached.
+    pub(super) fn refine(
+        &mut self,
+        params: &RefineParams,
+        wanted: impl Fn(u32, &[Vec3; 3]) -> f64,
+    ) {
+        for leaf in 0..self.trees.len() as u32 {
+            self.measure(leaf, &wanted);
+        }
+        loop {
+            let next = self.forced.pop().or_else(|| {
+                let is_full = self.points.len() >= params.max_vertices;
+                if is_full {
+                    None
+                } else {
+                    self.wanted.pop_front()
+                }
+            });
+            let Some(leaf) = next else { break };
+            let tree = self.trees[leaf as usize];
+            if tree.is_split {
+                continue;
+            }
+            // The rules come before the limit of depth: a leaf forced beyond it has neighbours at the limit.
+            let breaks_rule = self.breaks_rule(tree.corners);
+            if breaks_rule || (tree.is_too_large && tree.depth < params.max_depth) {
+                for child in self.split(leaf) {
+                    self.measure(child, &wanted);
+                }
+            }
+        }
+    }
+
+    /// The conforming triangles, in the order of the old ones, and the old triangle of each.
+    pub(super) fn triangles(&self) -> (Vec<[u32; 3]>, Vec<u32>) {
+        let mut found = Vec::with_capacity(self.trees.len() + self.trees.len() / 4);
+        for tree in self.trees.iter().filter(|tree| !tree.is_split) {
+            let halved = (0..3).find_map(|k| Some((k, self.middle(tree.corners, k)?)));
+            match halved {
+                None => found.push((tree.root, tree.corners)),
+                Some((k, m)) => {
+                    let [a, b, c] = [0, 1, 2].map(|s| tree.corners[(k + s) % 3]);
+                    found.push((tree.root, [a, m, c]));
+                    found.push((tree.root, [m, b, c]));
+                }
+            }
+        }
+        // Stable: the parts of one triangle stay in the order in which they came about.
+        found.sort_by_key(|(root, _)| *root);
+        found.into_iter().map(|(root, t)| (t, root)).unzip()
+    }
+
+    /// Where each vertex comes from: the old ones first.
+    pub(super) fn origins(&self) -> Origins {
+        let mut origins = Origins::identity(self.n_old);
+        for &ends in &self.ends {
+            origins.push_between(ends, 0.5);
+        }
+        origins
+    }
+
+    /// A run of rim vertices with those that were set between them, and for a closed one between its last and its first.
+    pub(super) fn along_rim(&self, run: &[u32], is_closed: bool) -> Vec<u32> {
+        let mut filled = Vec::with_capacity(2 * run.len());
+        for (k, &v) in run.iter().enumerate() {
+            filled.push(v);
+            if let Some(&next) = run.get(k + 1) {
+                self.fill(v, next, &mut filled);
+            } else if is_closed {
+                self.fill(v, run[0], &mut filled);
+            }
+        }
+        filled
+    }
+
+    pub(super) fn n_too_large(&self) -> usize {
+        let is_left = |tree: &&Tree| !tree.is_split && tree.is_too_large;
+        self.trees.iter().filter(is_left).count()
+    }
+
+    fn fill(&self, a: u32, b: u32, run: &mut Vec<u32>) {
+        if let Some(&m) = self.middles.get(&[a.min(b), a.max(b)]) {
+            self.fill(a, m, run);
+            run.push(m);
+            self.fill(m, b, run);
+        }
+    }
+
+    fn plant(&mut self, corners: [u32; 3], root: u32, depth: u32) -> u32 {
+        let id = self.trees.len() as u32;
+        self.trees.push(Tree {
+            corners,
+            root,
+            depth,
+            is_split: false,
+            is_too_large: false,
+        });
+        for k in 0..3 {
+            let edge = [corners[k], corners[(k + 1) % 3]];
+            let before = self.leaf_of.insert(edge, id);
+            assert!(
+                before.is_none(),
+                "two triangles walk the edge {edge:?} alike"
+            );
+        }
+        id
+    }
+
+    /// Puts a leaf on the list if it is larger than wanted.
+    fn measure(&mut self, leaf: u32, wanted: &impl Fn(u32, &[Vec3; 3]) -> f64) {
+        let tree = &mut self.trees[leaf as usize];
+        let corners = tree.corners.map(|v| self.points[v as usize]);
+        let longest = (0..3)
+            .map(|k| (corners[(k + 1) % 3] - corners[k]).norm())
+            .fold(0.0, f64::max);
+        tree.is_too_large = longest > wanted(tree.root, &corners);
+        if tree.is_too_large {
+            self.wanted.push_back(leaf);
+        }
+    }
+
+    /// The vertex in the middle of side `k` of a triangle, if its edge is divided.
+    fn middle(&self, corners: [u32; 3], k: usize) -> Option<u32> {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        self.middles.get(&[a.min(b), a.max(b)]).copied()
+    }
+
+    /// Whether a leaf with these corners has two divided edges, or one that is divided twice.
+    fn breaks_rule(&self, corners: [u32; 3]) -> bool {
+        let is_split = |a: u32, b: u32| self.middles.contains_key(&[a.min(b), a.max(b)]);
+        let mut n_split = 0;
+        for k in 0..3 {
+            if let Some(m) = self.middle(corners, k) {
+                n_split += 1;
+                if n_split > 1 || is_split(corners[k], m) || is_split(m, corners[(k + 1) % 3]) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Divides a leaf into four and lists the leaves that now break a rule.
+    fn split(&mut self, leaf: u32) -> [u32; 4] {
+        let Tree {
+            corners: [a, b, c],
+            root,
+            depth,
+            ..
+        } = self.trees[leaf as usize];
+        self.trees[leaf as usize].is_split = true;
+        let middles = [[a, b], [b, c], [c, a]].map(|[from, to]| {
+            self.leaf_of.remove(&[from, to]);
+            self.halve(from, to)
+        });
+        let [ma, mb, mc] = middles;
+        let children = [[a, ma, mc], [ma, b, mb], [mc, mb, c], [ma, mb, mc]]
+            .map(|corners| self.plant(corners, root, depth + 1));
+        for (k, child) in children.into_iter().enumerate() {
+            // An edge of the leaf may have been divided twice before it; the inner child has none of its edges.
+            if k < 3 && self.breaks_rule(self.trees[child as usize].corners) {
+                self.forced.push(child);
+            }
+        }
+        children
+    }
+
+    /// The vertex in the middle of an edge. If it is new, the leaf beyond the edge is looked at: the one that walks it, or the one
+    /// that walks the edge of which it is a half.
+    fn halve(&mut self, from: u32, to: u32) -> u32 {
+        let edge = [from.min(to), from.max(to)];
+        if let Some(&m) = self.middles.get(&edge) {
+            return m;
+        }
+        let m = self.points.len() as u32;
+        let middle = (self.points[from as usize] + self.points[to as usize]) * 0.5;
+        self.points.push(middle);
+        self.ends.push(edge);
+        self.middles.insert(edge, m);
+        let beyond = self.leaf_of.get(&[to, from]).copied().or_else(|| {
+            let [whole_from, whole_to] = self.whole(from, to)?;
+            self.leaf_of.get(&[whole_to, whole_from]).copied()
+        });
+        if let Some(leaf) = beyond
+            && self.breaks_rule(self.trees[leaf as usize].corners)
+        {
+            self.forced.push(leaf);
+        }
+        m
+    }
+
+    /// The edge of which `from`–`to` is a half, in the same direction.
+    fn whole(&self, from: u32, to: u32) -> Option<[u32; 2]> {
+        let ends_of = |v: u32| self.ends.get((v as usize).checked_sub(self.n_old)?);
+        let other = |[a, b]: [u32; 2], v: u32| if a == v { b } else { a };
+        if let Some(&ends) = ends_of(to).filter(|ends| ends.contains(&from)) {
+            return Some([from, other(ends, from)]);
+        }
+        let ends = ends_of(from).filter(|ends| ends.contains(&to))?;
+        Some([other(*ends, to), to])
+    }
+}

@@ -1,0 +1,75 @@
+//! The models of response and the mesh.
+
+use super::Reader;
+use crate::SceneError;
+use crate::file::{DynamicsName, MeshTable, ModelTable, ReferenceTable};
+use crate::limits;
+use crate::model::{Damping, Dynamics, Mesh, Model};
+use crate::scene::Reference;
+use crate::units::Length;
+
+impl Reader<'_> {
+    pub(super) fn model(&self, model: &ModelTable) -> Result<Model, SceneError> {
+        let at = self.site("model");
+        let dynamics = match (model.dynamics, &model.damping) {
+            (DynamicsName::QuasiStatic, None) => Dynamics::QuasiStatic,
+            (DynamicsName::QuasiStatic, Some(_)) => {
+                return Err(at.key("damping").invalid(
+                    "nothing is damped in equilibrium; add `dynamics = \"implicit\"` or remove `damping`",
+                ));
+            }
+            (DynamicsName::Implicit, None) => Dynamics::Implicit(Damping::default()),
+            (DynamicsName::Implicit, Some(damping)) => {
+                let at = at.key("damping");
+                let mass = at.key("mass").within(damping.mass, &limits::DAMPING_MASS)?;
+                let stiffness = at
+                    .key("stiffness")
+                    .within(damping.stiffness, &limits::DAMPING_STIFFNESS)?;
+                Dynamics::Implicit(Damping {
+                    mass: mass.si(),
+                    stiffness: stiffness.si(),
+                })
+            }
+        };
+        Ok(Model {
+            kind: model.kind,
+            alpha: at.key("alpha").within(model.alpha, &limits::ALPHA)?,
+            dynamics,
+            tolerance: at
+                .key("tolerance")
+                .within(model.tolerance, &limits::TOLERANCE)?,
+        })
+    }
+
+    pub(super) fn mesh(&self, mesh: &MeshTable) -> Result<Mesh, SceneError> {
+        let at = self.site("mesh");
+        let edge = |key, length: Option<Length>| match length {
+            None => Ok(None),
+            Some(length) => Ok(Some(at.key(key).within(length, &limits::EDGE_LENGTH)?.si())),
+        };
+        Ok(Mesh {
+            refine: mesh.refine,
+            near_tool: edge("near_tool", mesh.near_tool)?,
+            near_lumps: edge("near_lumps", mesh.near_lumps)?,
+            growth: at.key("growth").within(mesh.growth, &limits::GROWTH)?,
+            max_vertices: at
+                .key("max_vertices")
+                .within(mesh.max_vertices, &limits::MESH_VERTICES)?
+                as usize,
+        })
+    }
+
+    pub(super) fn reference(&self, reference: &ReferenceTable) -> Result<Reference, SceneError> {
+        let at = self.site("reference");
+        let gain = |key, gain| at.key(key).within(gain, &limits::GAIN);
+        Ok(Reference {
+            substeps: at
+                .key("substeps")
+                .within(reference.substeps, &limits::SUBSTEPS)?,
+            solver: reference.solver,
+            in_plane: reference.in_plane,
+            spring_gain: gain("spring_gain", reference.spring_gain)?,
+            shape_gain: gain("shape_gain", reference.shape_gain)?,
+        })
+    }
+}

@@ -1,0 +1,214 @@
+//! Tissues: a name of the catalogue, or a law with its parameters.
+
+use crate::error::Site;
+use crate::file::{OgdenTable, PronyTable, TissueSpec, TissueTable};
+use crate::law::{LawFault, Parts};
+use crate::limits::{self, Limits};
+use crate::units::{Kind, Quantity};
+use crate::{Law, OgdenTerm, Prony, PronyTerm, SceneError, Sourced, Status, Tissue, catalogue};
+
+pub(super) fn tissue(at: &Site<'_>, spec: TissueSpec) -> Result<Tissue, SceneError> {
+    let name = match spec {
+        TissueSpec::Name(name) => name,
+        TissueSpec::Inline(table) => return inline(at, *table),
+    };
+    let mut tissues = catalogue().iter();
+    tissues
+        .find(|tissue| tissue.name == name)
+        .cloned()
+        .ok_or_else(|| {
+            let names = catalogue().iter().map(|tissue| tissue.name.clone());
+            at.unknown("tissue", &name, names.collect())
+        })
+}
+
+/// What the scene gives, with the words in which it says where from.
+struct Given<'a> {
+    at: &'a Site<'a>,
+    source: &'a str,
+}
+
+impl Given<'_> {
+    fn sourced(&self, value: f64) -> Sourced {
+        Sourced {
+            value,
+            status: Status::Given,
+            source: self.source.to_owned(),
+        }
+    }
+
+    fn quantity<K: Kind>(
+        &self,
+        key: &'static str,
+        quantity: Option<Quantity<K>>,
+        limits: &Limits<Quantity<K>>,
+    ) -> Result<Option<Sourced>, SceneError> {
+        let Some(quantity) = quantity else {
+            return Ok(None);
+        };
+        let quantity = self.at.key(key).within(quantity, limits)?;
+        Ok(Some(self.sourced(quantity.si())))
+    }
+
+    fn number(
+        &self,
+        key: &'static str,
+        number: Option<f64>,
+        limits: &Limits<f64>,
+    ) -> Result<Option<Sourced>, SceneError> {
+        let Some(number) = number else {
+            return Ok(None);
+        };
+        let number = self.at.key(key).within(number, limits)?;
+        Ok(Some(self.sourced(number)))
+    }
+}
+
+fn inline(at: &Site<'_>, table: TissueTable) -> Result<Tissue, SceneError> {
+    let given = Given {
+        at,
+        source: &table.source,
+    };
+    let density = given.quantity("density", table.density, &limits::DENSITY)?;
+    let spring = given.quantity("spring", table.spring, &limits::SPRING)?;
+    let alpha = match table.alpha {
+        None => None,
+        Some(alpha) => Some(given.sourced(exponent(&at.key("alpha"), alpha)?)),
+    };
+    let terms = match &table.terms {
+        None => None,
+        Some(terms) => Some(ogden_terms(&given, terms)?),
+    };
+    let parts = Parts {
+        law: table.law.unwrap_or_default(),
+        young: given.quantity("young", table.young, &limits::YOUNG)?,
+        shear: given.quantity("shear", table.shear, &limits::SHEAR)?,
+        c10: given.quantity("c10", table.c10, &limits::SHEAR)?,
+        c01: given.quantity("c01", table.c01, &limits::C01)?,
+        c20: given.quantity("c20", table.c20, &limits::C20)?,
+        c30: given.quantity("c30", table.c30, &limits::C30)?,
+        terms,
+        alpha,
+        b: given.number("b", table.b, &limits::FUNG_B)?,
+        poisson: given.number("poisson", table.poisson, &limits::POISSON)?,
+        bulk: given.quantity("bulk", table.bulk, &limits::BULK)?,
+        volume: table.volume,
+    };
+    let law = match spring {
+        Some(constant) => {
+            check_spring(at, &table)?;
+            Law::Spring { constant }
+        }
+        None => parts.law().map_err(|LawFault { key, message }| match key {
+            Some(key) => at.key(key).invalid(message),
+            None => at.invalid(message),
+        })?,
+    };
+    let prony = match &table.prony {
+        None => None,
+        Some(prony) => Some(relaxation(&at.key("prony"), prony, &table.source)?),
+    };
+    Ok(Tissue {
+        law,
+        prony,
+        density,
+        name: table.name,
+    })
+}
+
+/// Bars of one stiffness take nothing else.
+fn check_spring(at: &Site<'_>, table: &TissueTable) -> Result<(), SceneError> {
+    if table.young.is_some() {
+        return Err(at
+            .key("spring")
+            .invalid("the stiffness is given twice; remove `young` or `spring`"));
+    }
+    if table.poisson.is_some() {
+        return Err(at.key("poisson").invalid(
+            "bars of one spring stiffness have no Poisson's ratio to choose; remove `poisson`, or \
+             give `young` instead of `spring`",
+        ));
+    }
+    let others = [
+        ("law", table.law.is_some()),
+        ("shear", table.shear.is_some()),
+        ("c10", table.c10.is_some()),
+        ("c01", table.c01.is_some()),
+        ("c20", table.c20.is_some()),
+        ("c30", table.c30.is_some()),
+        ("terms", table.terms.is_some()),
+        ("alpha", table.alpha.is_some()),
+        ("b", table.b.is_some()),
+        ("bulk", table.bulk.is_some()),
+        ("volume", table.volume.is_some()),
+        ("prony", table.prony.is_some()),
+    ];
+    match others.iter().find(|(_, given)| *given) {
+        None => Ok(()),
+        Some((key, _)) => Err(at.key(key).invalid(format!(
+            "bars of one spring stiffness have no law; remove `{key}`, or give `young` instead of `spring`"
+        ))),
+    }
+}
+
+fn ogden_terms(given: &Given<'_>, terms: &[OgdenTable]) -> Result<Vec<OgdenTerm>, SceneError> {
+    let at = given.at.key("terms");
+    check_number(&at, terms.len(), limits::MAX_OGDEN_TERMS)?;
+    (terms.iter().enumerate())
+        .map(|(i, term)| {
+            let at = at.index(i);
+            let mu = at.key("mu").within(term.mu, &limits::SHEAR)?;
+            Ok(OgdenTerm {
+                mu: given.sourced(mu.si()),
+                alpha: exponent(&at.key("alpha"), term.alpha)?,
+            })
+        })
+        .collect()
+}
+
+/// An exponent of either sign and an allowed size.
+fn exponent(at: &Site<'_>, alpha: f64) -> Result<f64, SceneError> {
+    if limits::OGDEN_ALPHA.contains(&alpha.abs()) {
+        return Ok(alpha);
+    }
+    Err(at.invalid(format!(
+        "an exponent of {alpha} is outside the allowed range {limits} of either sign; check the number",
+        limits = limits::OGDEN_ALPHA
+    )))
+}
+
+fn relaxation(at: &Site<'_>, prony: &PronyTable, source: &str) -> Result<Prony, SceneError> {
+    let at = at.key("terms");
+    check_number(&at, prony.terms.len(), limits::MAX_PRONY_TERMS)?;
+    let terms = (prony.terms.iter().enumerate())
+        .map(|(i, term)| {
+            let at = at.index(i);
+            Ok(PronyTerm {
+                g: at.key("g").within(term.g, &limits::PRONY_G)?,
+                tau: at.key("tau").within(term.tau, &limits::PRONY_TAU)?.si(),
+            })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let sum: f64 = terms.iter().map(|term| term.g).sum();
+    // Decimal shares that add up to the bound may miss it by rounding.
+    if sum > limits::PRONY_SUM + 1e-9 {
+        return Err(at.invalid(format!(
+            "the shares `g` add up to {sum:.4}, and some stiffness must be left in the end; make them {} at most together",
+            limits::PRONY_SUM
+        )));
+    }
+    Ok(Prony {
+        terms,
+        moduli: prony.moduli,
+        relaxes_volume: prony.volume,
+        status: Status::Given,
+        source: source.to_owned(),
+    })
+}
+
+fn check_number(at: &Site<'_>, n: usize, most: usize) -> Result<(), SceneError> {
+    if (1..=most).contains(&n) {
+        return Ok(());
+    }
+    Err(at.invalid(format!("{n} terms; give 1 to {most}")))
+}

@@ -1,0 +1,244 @@
+//! From a scene to what the continuum model takes: materials, lumps, supports, tool.
+
+use anyhow::Context as _;
+use nalgebra::{Rotation3, UnitQuaternion};
+use palpa_fem::law::{
+    Fung, Law, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm,
+    Prony, PronyTerm, StVenantKirchhoff, Volumetric, Yeoh,
+};
+use palpa_fem::lump::{ClosedMesh, Lump, LumpShape};
+use palpa_fem::shape::{
+    Capsule, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, ShapeError, Sphere, Tool,
+};
+use palpa_fem::{Mat3, Supports};
+use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use palpa_tissue::{
+    ContactShape, ContactTool, CutFaces, Elastic, Energy, LumpPlace, Scene, Tissue, Volume,
+};
+
+use crate::build::{BuiltBody, in_mm, mended, read_in_metres};
+
+/// What the scene's tissues are: first those of the layers, then those of the lumps, each in its order.
+///
+/// # Errors
+/// When a tissue is given by a spring stiffness, which no continuum has, or its law does not exist.
+pub fn materials(scene: &Scene) -> anyhow::Result<Vec<Material>> {
+    let layers = scene.layers.iter().map(|l| (&l.tissue, l.prestress));
+    let lumps = scene.lumps.iter().map(|l| (&l.tissue, 0.0));
+    layers
+        .chain(lumps)
+        .map(|(tissue, prestress)| material(tissue, prestress))
+        .collect()
+}
+
+/// A tissue as a material under this tension in its plane (Pa).
+///
+/// # Errors
+/// When the tissue is given by a spring stiffness, or its law does not exist.
+pub fn material(tissue: &Tissue, prestress: f64) -> anyhow::Result<Material> {
+    let in_tissue = || format!("tissue \"{}\"", tissue.name);
+    let elastic = tissue.elastic().with_context(|| {
+        format!(
+            "tissue \"{}\" is given by the stiffness of springs, which only the reference method has; give it `young` \
+             and `poisson`, or press with the reference method",
+            tissue.name
+        )
+    })?;
+    let mut material = Material::new(&tissue.name, law(elastic).with_context(in_tissue)?);
+    material.prestress = prestress;
+    if let Some(density) = &tissue.density {
+        material.density = density.value;
+    }
+    if let Some(prony) = &tissue.prony {
+        let terms = prony.terms.iter().map(|t| PronyTerm { g: t.g, tau: t.tau });
+        let moduli = match prony.moduli {
+            palpa_tissue::Moduli::LongTerm => Moduli::LongTerm,
+            palpa_tissue::Moduli::Instantaneous => Moduli::Instantaneous,
+        };
+        let prony = Prony::new(terms.collect(), moduli, prony.relaxes_volume);
+        material.prony = Some(prony.with_context(in_tissue)?);
+    }
+    material.check().with_context(in_tissue)?;
+    Ok(material)
+}
+
+fn law(elastic: &Elastic) -> Result<Law, LawError> {
+    let (shear, bulk) = (elastic.shear(), elastic.bulk());
+    let volume = match elastic.volume {
+        Volume::Quadratic => Volumetric::Quadratic { bulk },
+        Volume::Logarithmic => Volumetric::Logarithmic { bulk },
+    };
+    Ok(match &elastic.energy {
+        Energy::Linear { .. } => Linear::new(shear, bulk)?.into(),
+        Energy::StVenantKirchhoff { .. } => StVenantKirchhoff::new(shear, bulk)?.into(),
+        Energy::NeoHookean { .. } => NeoHookean::new(shear, volume)?.into(),
+        Energy::MooneyRivlin { c01, .. } => {
+            MooneyRivlin::new(elastic.c10(), c01.value, volume)?.into()
+        }
+        Energy::Yeoh { c20, c30, .. } => {
+            Yeoh::new([elastic.c10(), c20.value, c30.value], volume)?.into()
+        }
+        Energy::Ogden { terms } => {
+            let terms = terms.iter().map(|t| OgdenTerm {
+                mu: t.mu.value,
+                alpha: t.alpha,
+            });
+            Ogden::new(&terms.collect::<Vec<_>>(), volume)?.into()
+        }
+        Energy::Fung { b, .. } => Fung::new(shear, b.value, volume)?.into(),
+    })
+}
+
+/// The scene's lumps in their places under the body's skin. The material of the i-th is that of [`materials`] after those
+/// of the layers.
+///
+/// # Errors
+/// When a mesh cannot be read or has no inside.
+///
+/// # Panics
+/// When `built` is not the scene's.
+pub fn lumps(
+    scene: &Scene,
+    built: &BuiltBody,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<Vec<Lump>> {
+    if scene.lumps.is_empty() {
+        return Ok(Vec::new());
+    }
+    let skin = Skin::new(&built.growth.body.skin);
+    let mut lumps = Vec::new();
+    for (i, lump) in scene.lumps.iter().enumerate() {
+        let of_lump = || format!("lump \"{}\"", lump.name);
+        let shape = lump_shape(scene, &lump.shape, notes).with_context(of_lump)?;
+        let (middle, inward) = match (&lump.place, &shape) {
+            (LumpPlace::Below { depth, .. }, _) => {
+                let place = built.lump_places[i].expect("a lump below the skin has a place there");
+                let (on_skin, inward) = skin.nearest(place);
+                (on_skin + inward * *depth, inward)
+            }
+            (LumpPlace::At(at), _) => (Vec3::from(*at), skin.nearest(Vec3::from(*at)).1),
+            (LumpPlace::AsRead, LumpShape::Mesh(mesh)) => (mesh.centroid(), Vec3::zeros()),
+            (LumpPlace::AsRead, _) => unreachable!("only a mesh is placed as it was read"),
+        };
+        // A mesh stands as it was drawn.
+        let rotation = match &shape {
+            LumpShape::Mesh(_) => UnitQuaternion::identity(),
+            _ => turned_to(lump.axes(inward.into())),
+        };
+        let pose = Pose::from_parts(middle.into(), rotation);
+        let material = scene.layers.len() + i;
+        lumps.push(Lump::new(shape, pose, lump.transition, material).with_context(of_lump)?);
+    }
+    Ok(lumps)
+}
+
+fn lump_shape(
+    scene: &Scene,
+    shape: &palpa_tissue::LumpShape,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<LumpShape> {
+    use palpa_tissue::LumpShape as Given;
+    Ok(match shape {
+        Given::Sphere { radius } => LumpShape::Sphere(Sphere::new(*radius)?),
+        Given::Ellipsoid { radii } => LumpShape::Ellipsoid(Ellipsoid::new(Vec3::from(*radii))?),
+        Given::Capsule { radius, length } => LumpShape::Capsule(Capsule::new(*radius, *length)?),
+        Given::Mesh(path) => {
+            let surface = read_in_metres(path, scene.body.unit, notes)?;
+            let mesh = ClosedMesh::new(&mended(&surface, path, notes));
+            LumpShape::Mesh(mesh.with_context(|| path.display().to_string())?)
+        }
+    })
+}
+
+/// The rotation of a frame given by its three axes.
+fn turned_to(axes: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
+    let columns = Mat3::from_columns(&axes.map(Vec3::from));
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
+}
+
+/// A skin prepared for the question what is nearest.
+struct Skin<'a> {
+    surface: &'a Surface,
+    index: SurfaceIndex,
+    normals: Vec<Vec3>,
+}
+
+impl<'a> Skin<'a> {
+    fn new(surface: &'a Surface) -> Self {
+        Self {
+            surface,
+            index: SurfaceIndex::build(surface),
+            normals: surface.vertex_normals(),
+        }
+    }
+
+    /// The point of the skin nearest to `p`, and the inward normal there, between those of the vertices.
+    fn nearest(&self, p: Vec3) -> (Vec3, Vec3) {
+        let Some(closest) = self.index.closest(p) else {
+            return (p, -Vec3::z()); // a skin without triangles grows no body
+        };
+        let t = closest.triangle as usize;
+        let [a, b, c] = self.surface.corners(t);
+        let q = closest.point;
+        // Areas of the parts opposite to each corner are its weights.
+        let part = |u: Vec3, v: Vec3| (u - q).cross(&(v - q)).norm();
+        let weights = [part(b, c), part(c, a), part(a, b)];
+        let normal: Vec3 = (self.surface.triangles[t].iter().zip(weights))
+            .map(|(&v, w)| self.normals[v as usize] * w)
+            .sum();
+        let inward = (-normal)
+            .try_normalize(0.0)
+            .unwrap_or_else(|| -self.normals[self.surface.triangles[t][0] as usize]);
+        (q, inward)
+    }
+}
+
+/// What holds the body: its base, and its cut faces as the scene says. Faces that cannot be held so are left free, with
+/// a note.
+pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<String>) -> Supports {
+    let mut supports = Supports::on_base(body);
+    for face in &body.cut_faces {
+        let columns = face.vertices.iter().map(|&v| v as usize);
+        let nodes = columns.flat_map(|v| (0..body.n_levels).map(move |l| body.node(v, l)));
+        match cut_faces {
+            CutFaces::Free => {}
+            CutFaces::Fixed => supports.fixed.extend(nodes),
+            CutFaces::Symmetric if face.is_flat => {
+                supports.planes.extend(nodes.map(|node| (node, face.normal)));
+            }
+            CutFaces::Symmetric => notes.push(format!(
+                "the cut face at ({}) mm is not flat, so it is no plane of symmetry; it was left free",
+                in_mm(face.point)
+            )),
+        }
+    }
+    supports.fixed.sort_unstable();
+    supports.fixed.dedup();
+    supports
+}
+
+/// The rigid tool of a scene, and where it stands when it moves along the unit vector `direction` and its tip is at
+/// `tip`.
+///
+/// # Errors
+/// When its sizes make no shape.
+pub fn tool(given: &ContactTool, direction: Vec3, tip: Vec3) -> anyhow::Result<(Tool, Pose)> {
+    let shape = tool_shape(&given.shape)?;
+    let pose = Pose::from_parts(tip.into(), turned_to(given.axes(direction.into())));
+    Ok((Tool::new(shape, given.friction)?, pose))
+}
+
+fn tool_shape(shape: &ContactShape) -> Result<Shape, ShapeError> {
+    Ok(match *shape {
+        ContactShape::Sphere { radius } => Sphere::new(radius)?.into(),
+        ContactShape::FlatPunch {
+            radius,
+            edge_radius,
+        } => FlatPunch::new(radius, edge_radius)?.into(),
+        ContactShape::Capsule { radius, length } => Capsule::new(radius, length)?.into(),
+        ContactShape::Box { size, edge_radius } => {
+            RoundedBox::new(0.5 * Vec3::from(size), edge_radius)?.into()
+        }
+        ContactShape::Fingertip { radii } => Ellipsoid::new(Vec3::from(radii))?.into(),
+    })
+}

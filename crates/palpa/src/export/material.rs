@@ -1,0 +1,152 @@
+//! Materials in CalculiX's words, in megapascals.
+//!
+//! All its energies are `W_d + Σ (J − 1)²ⁱ/Dᵢ` with `D1 = 2/K`. That each of them is the law meant was tried with CalculiX
+//! 2.20 on one confined element, to 7 digits. There, a second or third D of 0 stands for a default, not for nothing.
+
+use anyhow::bail;
+use palpa_fem::law::{Fung, Law, Material, OgdenTerm, Volumetric, Yeoh};
+
+/// Terms of Ogden's energy that CalculiX takes.
+const MOST_OGDEN_TERMS: usize = 3;
+/// A `D2` or `D3` that leaves the term out.
+const NO_TERM: f64 = 1e20;
+const MPA_PER_PA: f64 = 1e-6;
+
+/// A material as it stands in the deck.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Card {
+    /// Name of its element set and of itself.
+    pub(super) name: String,
+    /// Its keyword with parameters, without the asterisk.
+    pub(super) keyword: String,
+    /// The lines under it, eight numbers at most on each.
+    pub(super) lines: Vec<String>,
+}
+
+/// The material with this number; what the card does not say as meant goes to `departures`.
+pub(super) fn card(
+    number: usize,
+    material: &Material,
+    departures: &mut Vec<String>,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<Card> {
+    let name = &material.name;
+    if material.prestress > 0.0 {
+        departures.push(format!(
+            "the tension at rest of layer \"{name}\" is left out"
+        ));
+    }
+    // All that CalculiX has for hyperelastic solids is time-independent: a press so slow that all has relaxed.
+    let (mut shear_scale, mut bulk_scale) = (1.0, 1.0);
+    if let Some(prony) = &material.prony {
+        notes.push(format!(
+            "tissue \"{name}\" relaxes; the deck has it at rest, as pressed very slowly"
+        ));
+        shear_scale = prony.long_term();
+        if prony.relaxes_volume() {
+            bulk_scale = shear_scale;
+        }
+    }
+    let to_mpa = shear_scale * MPA_PER_PA;
+    let bulk = material.law.bulk_modulus() * bulk_scale * MPA_PER_PA;
+    if matches!(
+        material.law.volumetric_energy(),
+        Volumetric::Logarithmic { .. }
+    ) {
+        departures.push(format!(
+            "tissue \"{name}\" has K/2 (ln J)² for its volume, and the deck K/2 (J − 1)²"
+        ));
+    }
+    let (keyword, numbers) = match &material.law {
+        Law::Linear(_) | Law::StVenantKirchhoff(_) => {
+            let shear = material.law.shear_modulus() * to_mpa;
+            let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
+            let poisson = (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear);
+            ("ELASTIC".to_owned(), vec![young, poisson])
+        }
+        Law::NeoHookean(_) => {
+            let c10 = 0.5 * material.law.shear_modulus() * to_mpa;
+            hyperelastic("NEO HOOKE", &[c10], bulk, 1)
+        }
+        Law::MooneyRivlin(law) => {
+            let constants = law.constants().map(|c| c * to_mpa);
+            hyperelastic("MOONEY-RIVLIN", &constants, bulk, 1)
+        }
+        Law::Yeoh(law) => yeoh(law, to_mpa, bulk),
+        Law::Fung(law) => {
+            departures.push(format!(
+                "tissue \"{name}\" has Fung's exponential, and the deck the first three terms of its series"
+            ));
+            let law = first_terms(
+                law,
+                material.law.shear_modulus(),
+                material.law.volumetric_energy(),
+            )?;
+            yeoh(&law, to_mpa, bulk)
+        }
+        Law::Ogden(law) if law.terms().len() > MOST_OGDEN_TERMS => bail!(
+            "tissue \"{name}\" has {} terms of Ogden's energy, and CalculiX takes {MOST_OGDEN_TERMS}; fit it with fewer",
+            law.terms().len()
+        ),
+        Law::Ogden(law) => ogden(law.terms(), to_mpa, bulk),
+    };
+    Ok(Card {
+        name: format!("M{}_{}", number + 1, plain(name)),
+        keyword,
+        lines: numbers.chunks(8).map(line).collect(),
+    })
+}
+
+/// `exp` to the third power of its argument: `μ/(2b) (b x + b² x²/2 + b³ x³/6)`.
+fn first_terms(law: &Fung, shear: f64, volumetric: &Volumetric) -> anyhow::Result<Yeoh> {
+    let b = law.b();
+    let c10 = 0.5 * shear;
+    Ok(Yeoh::new(
+        [c10, c10 * b / 2.0, c10 * b * b / 6.0],
+        *volumetric,
+    )?)
+}
+
+fn yeoh(law: &Yeoh, to_mpa: f64, bulk: f64) -> (String, Vec<f64>) {
+    hyperelastic("YEOH", &law.constants().map(|c| c * to_mpa), bulk, 3)
+}
+
+fn ogden(terms: &[OgdenTerm], to_mpa: f64, bulk: f64) -> (String, Vec<f64>) {
+    let constants: Vec<f64> = terms
+        .iter()
+        .flat_map(|t| [t.mu * to_mpa, t.alpha])
+        .collect();
+    let n = terms.len();
+    hyperelastic(&format!("OGDEN, N={n}"), &constants, bulk, n)
+}
+
+/// The keyword, and the constants followed by `n_volumetric` numbers D.
+fn hyperelastic(
+    law: &str,
+    constants: &[f64],
+    bulk: f64,
+    n_volumetric: usize,
+) -> (String, Vec<f64>) {
+    let mut numbers = constants.to_vec();
+    numbers.push(2.0 / bulk);
+    numbers.resize(constants.len() + n_volumetric, NO_TERM);
+    (format!("HYPERELASTIC, {law}"), numbers)
+}
+
+/// Ten digits each: eight such numbers keep to the 132 characters of a line.
+fn line(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(|x| format!("{x:.9e}")).collect();
+    numbers.join(",")
+}
+
+/// A name of letters, digits and `_`.
+fn plain(name: &str) -> String {
+    let plain = name.chars().take(40).map(|c| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_uppercase()
+        } else {
+            '_'
+        }
+    });
+    plain.collect()
+}
