@@ -40,12 +40,17 @@ pub(crate) struct Contact {
     curvature: Mat3,
     /// Where the anchor is now, from the vertex, m.
     to_anchor: Vec3,
+    /// See [`Contacts::smoothing`].
+    smoothing: f64,
 }
 
 /// Contacts of all tools at the current positions.
 #[derive(Debug, Default)]
 pub(crate) struct Contacts {
     pub(crate) active: Vec<Contact>,
+    /// A slip (m) over which friction turns round gradually, all vertices sliding: a detour to a good first guess where
+    /// the exact law does not converge from afar. 0 is the exact law.
+    pub(crate) smoothing: f64,
 }
 
 /// How far a state is from obeying the laws of contact.
@@ -66,8 +71,7 @@ pub struct ContactResiduals {
 impl Contacts {
     /// Finds gaps, normals and anchors of the vertices that touch now, and takes up those that have come to touch.
     ///
-    /// `touches` is the state; vertices that are held otherwise (`supports` in all directions) cannot touch.
-    /// `take_up` is off once the active set has to settle.
+    /// `touches` is the state; vertices that are `held` in all directions cannot touch. Returns how many are new.
     pub(crate) fn update(
         &mut self,
         model: &Model,
@@ -76,9 +80,9 @@ impl Contacts {
         held: &[Hold],
         touches: &mut [Touch],
         tolerance: f64,
-    ) -> (usize, f64) {
+    ) -> usize {
         self.active.clear();
-        let (mut n_new, mut deepest) = (0, 0.0_f64);
+        let mut n_new = 0;
         for (vertex, touch) in touches.iter_mut().enumerate() {
             let node = model.body.node(vertex, 0);
             if tools.is_empty() || held[node].n == 3 {
@@ -93,41 +97,80 @@ impl Contacts {
             });
             let Some(k) = k else { continue };
             let PosedTool { tool, pose } = &tools[k];
-            let distance = tool.distance_at(pose, &x);
-            let surface = x - distance.normal * distance.distance;
             if *touch == Touch::Open {
                 n_new += 1;
-                deepest = deepest.max(-distance.distance);
+                let distance = tool.distance_at(pose, &x);
+                let surface = x - distance.normal * distance.distance;
                 let anchor = pose.inverse_transform_point(&surface.into()).coords;
+                let has_friction = tool.friction() > 0.0;
                 let tool = k as u32;
-                *touch = if tools[k].tool.friction() > 0.0 {
+                *touch = if has_friction && self.smoothing == 0.0 {
                     Touch::Stick { tool, anchor }
                 } else {
                     Touch::Slip { tool, anchor }
                 };
             }
-            let to_anchor = match *touch {
-                Touch::Stick { anchor, .. } | Touch::Slip { anchor, .. } => {
-                    pose.transform_point(&anchor.into()).coords - x
-                }
-                Touch::Open => Vec3::zeros(),
-            };
+            let contact = Contact::new(node, vertex, *touch, &tools[k], &x);
             self.active.push(Contact {
-                node,
-                vertex,
-                friction: tool.friction(),
-                touch: *touch,
-                gap: distance.distance,
-                normal: distance.normal,
-                curvature: distance.curvature,
-                to_anchor,
+                smoothing: self.smoothing,
+                ..contact
             });
         }
-        (n_new, deepest)
+        n_new
+    }
+
+    /// Vertices that slide under pressure with friction: node, friction per pressure `μ d`, and normal.
+    pub(crate) fn sliding(&self, body_forces: &[Vec3]) -> Vec<(usize, Vec3, Vec3)> {
+        self.active
+            .iter()
+            .filter_map(|contact| {
+                let Touch::Slip { .. } = contact.touch else {
+                    return None;
+                };
+                let force = &body_forces[contact.node];
+                let pressure = contact.pressure(force);
+                if contact.friction == 0.0 || pressure <= 0.0 || contact.is_just_released() {
+                    return None;
+                }
+                let (friction, _) = contact.friction(force);
+                Some((contact.node, friction / pressure, contact.normal))
+            })
+            .collect()
     }
 }
 
 impl Contact {
+    /// A touching vertex at the place `x`.
+    fn new(node: usize, vertex: usize, touch: Touch, tool: &PosedTool, x: &Vec3) -> Self {
+        let PosedTool { tool, pose } = tool;
+        let distance = tool.distance_at(pose, x);
+        let to_anchor = match touch {
+            Touch::Stick { anchor, .. } | Touch::Slip { anchor, .. } => {
+                pose.transform_point(&anchor.into()).coords - x
+            }
+            Touch::Open => Vec3::zeros(),
+        };
+        Self {
+            node,
+            vertex,
+            friction: tool.friction(),
+            touch,
+            gap: distance.distance,
+            normal: distance.normal,
+            curvature: distance.curvature,
+            to_anchor,
+            smoothing: 0.0,
+        }
+    }
+
+    /// The same vertex at another place.
+    pub(crate) fn moved(&self, tools: &[PosedTool], x: &Vec3) -> Self {
+        match self.touch.tool() {
+            Some(tool) => Self::new(self.node, self.vertex, self.touch, &tools[tool], x),
+            None => *self,
+        }
+    }
+
     /// What the tool demands: directions held, and the move along them.
     pub(crate) fn demand(&self, hold: Hold) -> (Hold, Vec3) {
         match self.touch {
@@ -141,6 +184,14 @@ impl Contact {
         body_force.dot(&self.normal)
     }
 
+    /// Whether friction has held the vertex until now. It then leaves in the direction in which it was held back: what
+    /// would soften it, a bent surface and friction that falls as it slides, is left out until it does.
+    fn is_just_released(&self) -> bool {
+        self.friction > 0.0
+            && self.smoothing == 0.0
+            && self.tangential(&self.to_anchor).norm() <= LEAST_SLIP
+    }
+
     /// Largest curvature of the tool's surface here, 1/m.
     pub(crate) fn sharpness(&self) -> f64 {
         self.curvature.norm()
@@ -150,7 +201,8 @@ impl Contact {
         v - self.normal * self.normal.dot(v)
     }
 
-    /// Friction on a sliding vertex, N, and its stiffness (`−∂t/∂u`, positive semidefinite).
+    /// Friction on a sliding vertex, N, and its stiffness (`−∂t/∂u`, positive semidefinite). `body_force` is that of the
+    /// last iteration, whose pressure and, before there is any slip, direction are taken.
     pub(crate) fn friction(&self, body_force: &Vec3) -> (Vec3, Mat3) {
         let limit = self.friction * self.pressure(body_force).max(0.0);
         if limit == 0.0 {
@@ -158,7 +210,7 @@ impl Contact {
         }
         // From the vertex back to its anchor: against the slip.
         let back = self.tangential(&self.to_anchor);
-        let slip = back.norm();
+        let slip = back.norm().hypot(self.smoothing);
         if slip <= LEAST_SLIP {
             // It is about to slide: friction points where it has held until now.
             let tangential = self.tangential(body_force);
@@ -170,6 +222,7 @@ impl Contact {
             };
             return (force, Mat3::zeros());
         }
+        // Shorter than 1 while friction is smoothed.
         let direction = back / slip;
         let across = Mat3::identity()
             - self.normal * self.normal.transpose()
@@ -181,35 +234,42 @@ impl Contact {
     pub(crate) fn geometric(&self, body_force: &Vec3) -> Mat3 {
         match self.touch {
             Touch::Stick { .. } => Mat3::zeros(),
+            Touch::Slip { .. } if self.is_just_released() => Mat3::zeros(),
             _ => self.curvature * -self.pressure(body_force).max(0.0),
         }
     }
 
-    /// The touch that the laws of contact ask for, given the body's force on the vertex. `least` is a force that counts
-    /// as none.
-    pub(crate) fn revised(&self, body_force: &Vec3, least: f64) -> Touch {
+    /// The other touch that the laws of contact ask for, if they do, and by which force, N, the present one breaks them.
+    /// `body_force` is that on the vertex; `least` is a force that counts as none.
+    pub(crate) fn revised(&self, body_force: &Vec3, least: f64) -> Option<(Touch, f64)> {
         let pressure = self.pressure(body_force);
         if pressure < -least {
-            return Touch::Open;
+            return Some((Touch::Open, -pressure));
         }
         let tangential = self.tangential(body_force);
         match self.touch {
             Touch::Stick { tool, anchor } => {
                 // The cone's border belongs to sticking; a little beyond is rounding.
-                if tangential.norm() > self.friction * pressure.max(0.0) * (1.0 + 1e-9) + least {
-                    Touch::Slip { tool, anchor }
-                } else {
-                    self.touch
-                }
+                let excess = tangential.norm() - self.friction * pressure.max(0.0) * (1.0 + 1e-9);
+                (excess > least).then_some((Touch::Slip { tool, anchor }, excess))
             }
-            Touch::Slip { tool, anchor } if self.friction > 0.0 => {
+            Touch::Slip { tool, anchor } if self.friction > 0.0 && self.smoothing == 0.0 => {
                 // Friction that would push it on has turned it round: it sticks.
                 let back = self.tangential(&self.to_anchor);
-                if back.norm() > LEAST_SLIP && back.dot(&tangential) < 0.0 {
-                    Touch::Stick { tool, anchor }
-                } else {
-                    self.touch
-                }
+                let is_turned = back.norm() > LEAST_SLIP && back.dot(&tangential) < 0.0;
+                is_turned.then_some((Touch::Stick { tool, anchor }, tangential.norm()))
+            }
+            _ => None,
+        }
+    }
+
+    /// What a vertex that slides with smoothed friction most likely does by the exact law.
+    pub(crate) fn sharpened(&self) -> Touch {
+        match self.touch {
+            Touch::Slip { tool, anchor }
+                if self.friction > 0.0 && self.tangential(&self.to_anchor).norm() < self.smoothing =>
+            {
+                Touch::Stick { tool, anchor }
             }
             touch => touch,
         }
@@ -226,7 +286,7 @@ impl Contact {
         if let Touch::Slip { .. } = self.touch {
             let back = self.tangential(&self.to_anchor);
             if limit > 0.0 && back.norm() > LEAST_SLIP {
-                let share = (tangential / limit - back.normalize()).norm();
+                let share = (tangential / limit - back / back.norm().hypot(self.smoothing)).norm();
                 residuals.slip = residuals.slip.max(share);
             }
         }

@@ -7,6 +7,7 @@ mod dynamics;
 mod element;
 mod error;
 mod fields;
+mod gmres;
 pub mod law;
 pub mod lump;
 mod materials;

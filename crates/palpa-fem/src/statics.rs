@@ -2,9 +2,11 @@
 
 use palpa_mesh::Vec3;
 
+use crate::Mat3;
 use crate::assembly::{Inverted, assemble};
 use crate::contact::{ContactResiduals, Contacts, PosedTool, settle};
 use crate::dynamics::{Dynamics, Inertia};
+use crate::gmres::gmres;
 use crate::model::Model;
 use crate::shape::Pose;
 use crate::state::{Memory, State, Touch};
@@ -20,6 +22,12 @@ const NO_FORCE: f64 = 1e-9;
 const LEAST_SUBSTEP: f64 = 1.0 / 128.0;
 /// A sliding vertex may leave the tool's surface in an iteration by this share of the surface's radius of curvature.
 const NEAR_SURFACE: f64 = 0.05;
+/// Residual of a linear system with friction, relative to its right side.
+const GMRES_TOLERANCE: f64 = 1e-6;
+/// Slips over which friction is smoothed, one after the other, where the exact law does not converge at once, m.
+const SMOOTHING: [f64; 4] = [1e-3, 2e-4, 4e-5, 1e-5];
+/// Smoothing that is small enough to be an answer where the exact law has none within reach, m.
+const FINE_SMOOTHING: f64 = 5e-5;
 /// Iterations without any progress after which a solve is given up.
 const PATIENCE: usize = 12;
 /// Newton iterations below which the next substep may be longer.
@@ -96,6 +104,9 @@ pub struct StepReport {
     pub residual: f64,
     /// How well the laws of contact hold.
     pub contact: ContactResiduals,
+    /// Slip over which friction had to be smoothed, m: vertices that would be held creep by about as much. 0 for the
+    /// exact law, which nearly every step obeys.
+    pub friction_smoothing: f64,
     /// Strain energy, J (of a viscous material that of the step's potential).
     pub energy: f64,
     /// For each tool the force of the tissue on it, N.
@@ -126,6 +137,8 @@ pub struct Workspace {
     given: Vec<Hold>,
     holds: Vec<Hold>,
     contacts: Contacts,
+    /// What contact has added to blocks of the stiffness.
+    added: Vec<(usize, Mat3)>,
 }
 
 impl Workspace {
@@ -144,6 +157,7 @@ impl Workspace {
             given: model.supports.clone(),
             holds: model.supports.clone(),
             contacts: Contacts::default(),
+            added: Vec::new(),
         }
     }
 
@@ -166,7 +180,8 @@ pub fn advance(
 ) -> StepReport {
     let start = state.clone();
     let (mut done, mut size) = (0.0_f64, 1.0_f64);
-    let (mut iterations, mut substeps, mut shift) = (0, 0, 0.0_f64);
+    let (mut iterations, mut substeps) = (0, 0);
+    let (mut shift, mut smoothing) = (0.0_f64, 0.0_f64);
     loop {
         let share = (done + size).min(1.0);
         let tools = between(before.tools, load.tools, share);
@@ -186,12 +201,14 @@ pub fn advance(
         iterations += report.iterations;
         substeps += 1;
         shift = shift.max(report.shift);
+        smoothing = smoothing.max(report.friction_smoothing);
         if report.outcome == Outcome::Converged {
             done = share;
             if done >= 1.0 {
                 report.iterations = iterations;
                 report.substeps = substeps;
                 report.shift = shift;
+                report.friction_smoothing = smoothing;
                 return report;
             }
             if report.iterations <= EASY {
@@ -210,6 +227,7 @@ pub fn advance(
                 report.iterations = iterations;
                 report.substeps = substeps;
                 report.shift = shift;
+                report.friction_smoothing = smoothing;
                 return report;
             }
         }
@@ -284,6 +302,7 @@ pub fn equilibrate(
     params: &SolveParams,
 ) -> StepReport {
     ws.memory.begin(model, state, load.duration);
+    ws.contacts.smoothing = 0.0;
     let inertia = load
         .dynamics
         .filter(|_| load.duration > 0.0 && load.duration.is_finite())
@@ -305,7 +324,16 @@ pub fn equilibrate(
         residual: f64::INFINITY,
         energy: 0.0,
     };
-    let outcome = newton.run(state, ws);
+    let start = (!load.tools.is_empty()).then(|| (state.displacements.clone(), state.touches.clone()));
+    let mut outcome = newton.run(state, ws);
+    if let Some((displacements, touches)) = start
+        && outcome != Outcome::Converged
+        && load.tools.iter().any(|t| t.tool.friction() > 0.0)
+    {
+        state.displacements = displacements;
+        state.touches = touches;
+        outcome = newton.run_smoothed(state, ws);
+    }
     if outcome == Outcome::Converged {
         ws.memory.commit(model, state);
         settle(model, &state.displacements, load.tools, &mut state.touches);
@@ -317,6 +345,14 @@ pub fn equilibrate(
         }
     }
     newton.report(state, ws, outcome)
+}
+
+/// Gives sliding vertices the friction of the pressure in `forces`: `f −= μ d (n · f)`.
+fn couple(sliding: &[(usize, Vec3, Vec3)], forces: &mut [Vec3]) {
+    for (node, friction, normal) in sliding {
+        let pressure = normal.dot(&forces[*node]);
+        forces[*node] -= friction * pressure;
+    }
 }
 
 struct Newton<'a> {
@@ -333,12 +369,10 @@ struct Newton<'a> {
 impl Newton<'_> {
     fn run(&mut self, state: &mut State, ws: &mut Workspace) -> Outcome {
         let model = self.model;
-        // Whether the last assembly's forces belong to a solve with the present active set.
-        let mut is_settled = false;
         // The smallest residual since the first solve, and when.
         let mut best = (f64::INFINITY, 0);
         loop {
-            let (n_new, _) = ws.contacts.update(
+            let n_new = ws.contacts.update(
                 model,
                 &state.displacements,
                 self.load.tools,
@@ -356,20 +390,22 @@ impl Newton<'_> {
                 Ok(energy) => self.energy = energy,
                 Err(Inverted { at }) => return Outcome::Inverted { at: at.into() },
             }
+            ws.added.clear();
             self.add_loads(state, ws, true);
-            let n_changed = if self.iterations > 0 && (self.iterations < SETTLE_AFTER || is_settled)
-            {
-                self.revise(state, ws)
-            } else {
-                0
-            };
-            let largest_demand = self.put_constraints(state, ws);
-            let (free, held) = self.norms(ws);
-            self.residual = free / held.max(self.floor());
-            is_settled = self.residual <= self.params.tolerance
-                && largest_demand <= self.params.gap_tolerance;
-            if is_settled && n_new + n_changed == 0 {
-                return Outcome::Converged;
+            if self.iterations > 0 {
+                self.revise(state, ws);
+            }
+            let (mut free, mut demand) = self.put_constraints(state, ws);
+            let is_settled = self.residual <= self.params.tolerance
+                && demand <= self.params.gap_tolerance
+                && n_new == 0;
+            if std::env::var("PT").is_ok() { let st = ws.contacts.active.iter().filter(|c| matches!(c.touch, Touch::Stick{..})).count(); eprintln!("  it {} res {:.2e} demand {:.2e} new {} active {} stick {}", self.iterations, self.residual, demand, n_new, ws.contacts.active.len(), st); }
+            if is_settled {
+                // Forces are right for these touches; are the touches right for these forces?
+                if self.iterations == 0 || self.revise(state, ws) == 0 {
+                    return Outcome::Converged;
+                }
+                (free, demand) = self.put_constraints(state, ws);
             }
             if self.iterations > 0 && self.residual < 0.7 * best.0 {
                 best = (self.residual, self.iterations);
@@ -386,10 +422,55 @@ impl Newton<'_> {
                 Err(_) => return Outcome::Singular,
             }
             self.solve(ws);
-            if let Err(Inverted { at }) = self.search(state, ws, free, largest_demand) {
+            if let Err(Inverted { at }) = self.search(state, ws, free, demand) {
                 return Outcome::Inverted { at: at.into() };
             }
         }
+    }
+
+    /// The detour by smoothed friction, then the exact law from there.
+    fn run_smoothed(&mut self, state: &mut State, ws: &mut Workspace) -> Outcome {
+        for touch in &mut state.touches {
+            if let Touch::Stick { tool, anchor } = *touch {
+                *touch = Touch::Slip { tool, anchor };
+            }
+        }
+        let mut spent = self.iterations;
+        let mut good = None;
+        for smoothing in SMOOTHING {
+            ws.contacts.smoothing = smoothing;
+            self.iterations = 0;
+            let outcome = self.run(state, ws);
+            spent += self.iterations;
+            if outcome != Outcome::Converged {
+                if good.is_none() {
+                    self.iterations = spent;
+                    return outcome;
+                }
+                break;
+            }
+            good = Some((smoothing, state.displacements.clone(), state.touches.clone()));
+        }
+        for contact in &ws.contacts.active {
+            state.touches[contact.vertex] = contact.sharpened();
+        }
+        ws.contacts.smoothing = 0.0;
+        self.iterations = 0;
+        let mut outcome = self.run(state, ws);
+        spent += self.iterations;
+        if let Some((smoothing, displacements, touches)) = good
+            && outcome != Outcome::Converged
+            && smoothing <= FINE_SMOOTHING
+        {
+            state.displacements = displacements;
+            state.touches = touches;
+            ws.contacts.smoothing = smoothing;
+            self.iterations = 0;
+            outcome = self.run(state, ws);
+            spent += self.iterations;
+        }
+        self.iterations = spent;
+        outcome
     }
 
     /// Below this the body counts as free of forces, N.
@@ -420,7 +501,8 @@ impl Newton<'_> {
         }
     }
 
-    /// Lets go what would be pulled, and turns sticking to sliding and back.
+    /// Lets go what would be pulled, and turns sticking to sliding and back; late in a solve only the one vertex of which
+    /// that is least in doubt, so that touches cannot chatter.
     fn revise(&self, state: &mut State, ws: &mut Workspace) -> usize {
         let largest = ws
             .contacts
@@ -429,22 +511,29 @@ impl Newton<'_> {
             .map(|c| ws.forces[c.node].norm())
             .fold(0.0, f64::max);
         let least = NO_FORCE * largest.max(self.floor());
-        let mut n_changed = 0;
-        for contact in &mut ws.contacts.active {
-            let touch = contact.revised(&ws.forces[contact.node], least);
-            if std::mem::discriminant(&touch) != std::mem::discriminant(&contact.touch) {
-                n_changed += 1;
-            }
+        let changes = ws.contacts.active.iter().enumerate().filter_map(|(i, contact)| {
+            let force = &ws.forces[contact.node];
+            let (touch, doubt) = contact.revised(force, least)?;
+            Some((i, touch, doubt))
+        });
+        let mut changes: Vec<(usize, Touch, f64)> = changes.collect();
+        if self.iterations >= SETTLE_AFTER {
+            changes.sort_by(|a, b| b.2.total_cmp(&a.2));
+            changes.truncate(1);
+        }
+        for &(i, touch, _) in &changes {
+            let contact = &mut ws.contacts.active[i];
             contact.touch = touch;
             state.touches[contact.vertex] = touch;
         }
         ws.contacts.active.retain(|c| c.touch != Touch::Open);
-        n_changed
+        changes.len()
     }
 
     /// Collects what is held and which moves that demands; puts friction and the tools' curvature into the system.
-    /// Returns the largest demand, m.
-    fn put_constraints(&self, state: &State, ws: &mut Workspace) -> f64 {
+    /// Returns the norm of the free forces, N, and the largest demand, m.
+    fn put_constraints(&mut self, state: &State, ws: &mut Workspace) -> (f64, f64) {
+        self.take_off(ws);
         ws.holds.copy_from_slice(&ws.given);
         ws.demand.fill(Vec3::zeros());
         ws.right_side.copy_from_slice(&ws.forces);
@@ -472,9 +561,20 @@ impl Newton<'_> {
                 ws.right_side[node] -= friction;
                 stiffness += slope;
             }
-            ws.system.blocks[self.model.structure.diagonal(node)] += stiffness;
+            let block = self.model.structure.diagonal(node);
+            ws.system.blocks[block] += stiffness;
+            ws.added.push((block, stiffness));
         }
-        largest
+        let (free, held) = self.norms(ws);
+        self.residual = free / held.max(self.floor());
+        (free, largest)
+    }
+
+    /// Takes off what contact has put on the stiffness since the last assembly.
+    fn take_off(&self, ws: &mut Workspace) {
+        for (block, stiffness) in ws.added.drain(..) {
+            ws.system.blocks[block] -= stiffness;
+        }
     }
 
     /// Norms of the forces in free and in held directions, N.
@@ -498,14 +598,44 @@ impl Newton<'_> {
     }
 
     /// `δ = demand` in held directions, and in free ones what balances the linearised forces.
+    ///
+    /// Friction at a sliding vertex grows with its pressure, which makes the stiffness unsymmetric,
+    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good guess for GMRES.
     fn solve(&self, ws: &mut Workspace) {
         let structure = &self.model.structure;
-        structure.multiply(&ws.system.blocks, &ws.demand, &mut ws.right_side);
-        for force in &mut ws.right_side {
-            *force = -*force;
+        let Workspace {
+            system,
+            forces,
+            right_side,
+            demand,
+            delta,
+            holds,
+            contacts,
+            ..
+        } = ws;
+        let mut carried = vec![Vec3::zeros(); right_side.len()];
+        structure.multiply(&system.blocks, demand, &mut carried);
+        let sliding = contacts.sliding(forces);
+        couple(&sliding, &mut carried);
+        for ((force, carried), hold) in right_side.iter_mut().zip(&carried).zip(holds.iter()) {
+            *force = hold.free_part(&-(*force + carried));
         }
-        ws.system.solve(structure, &ws.right_side, &mut ws.delta);
-        for (delta, demand) in ws.delta.iter_mut().zip(&ws.demand) {
+        if sliding.is_empty() {
+            system.solve(structure, right_side, delta);
+        } else {
+            let guess = gmres(right_side, GMRES_TOLERANCE, |x, out| {
+                system.solve(structure, x, delta);
+                out.clear();
+                out.resize(x.len(), Vec3::zeros());
+                structure.multiply(&system.blocks, delta, out);
+                couple(&sliding, out);
+                for (y, hold) in out.iter_mut().zip(holds.iter()) {
+                    *y = hold.free_part(y);
+                }
+            });
+            system.solve(structure, &guess, delta);
+        }
+        for (delta, demand) in delta.iter_mut().zip(demand.iter()) {
             *delta += demand;
         }
     }
@@ -521,7 +651,8 @@ impl Newton<'_> {
         let mut share = 1.0;
         let mut last = None;
         // While the tool still has to be met, forces must grow.
-        let must_fall = demand <= self.params.gap_tolerance.max(1e-6);
+        let must_fall = demand <= self.params.gap_tolerance.max(1e-6)
+            && ws.contacts.active.iter().all(|c| c.friction == 0.0);
         for _ in 0..=MOST_HALVINGS {
             for ((trial, u), delta) in ws.trial.iter_mut().zip(&state.displacements).zip(&ws.delta)
             {
@@ -561,12 +692,8 @@ impl Newton<'_> {
     /// Whether sliding vertices stay near the tool's surface, whose bend the linear step does not see.
     fn keeps_touch(&self, ws: &Workspace, share: f64) -> bool {
         ws.contacts.active.iter().all(|contact| {
-            let Some(tool) = contact.touch.tool() else {
-                return true;
-            };
-            let PosedTool { tool, pose } = &self.load.tools[tool];
             let x = self.model.body.positions[contact.node] + ws.trial[contact.node];
-            let gap = tool.distance_at(pose, &x).distance.abs();
+            let gap = contact.moved(self.load.tools, &x).gap.abs();
             let radius = 1.0 / contact.sharpness().max(1.0);
             gap <= ((1.0 - 0.5 * share) * contact.gap.abs()).max(NEAR_SURFACE * radius)
         })
@@ -583,7 +710,9 @@ impl Newton<'_> {
         }
         for contact in &ws.contacts.active {
             if let Touch::Slip { .. } = contact.touch {
-                let (friction, _) = contact.friction(&ws.forces[contact.node]);
+                let x = self.model.body.positions[contact.node] + ws.trial[contact.node];
+                let moved = contact.moved(self.load.tools, &x);
+                let (friction, _) = moved.friction(&ws.forces[contact.node]);
                 forces[contact.node] -= friction;
             }
         }
@@ -593,7 +722,7 @@ impl Newton<'_> {
             .map(|(force, hold)| hold.free_part(force).norm_squared())
             .sum();
         ws.trial_forces = forces;
-        free_sq.sqrt() <= free_before * 1.000_1 || energy < self.energy
+        free_sq.sqrt() <= free_before * 1.000_1 || (ws.contacts.active.is_empty() && energy < self.energy)
     }
 
     fn report(&self, state: &State, ws: &mut Workspace, outcome: Outcome) -> StepReport {
@@ -605,6 +734,7 @@ impl Newton<'_> {
             substeps: 1,
             residual: self.residual,
             contact: ContactResiduals::default(),
+            friction_smoothing: ws.contacts.smoothing,
             energy: self.energy,
             tool_forces: vec![Vec3::zeros(); n_tools],
             tool_areas: vec![0.0; n_tools],

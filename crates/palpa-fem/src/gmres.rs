@@ -1,0 +1,102 @@
+//! GMRES, for the systems that friction makes unsymmetric.
+
+use palpa_mesh::Vec3;
+
+/// Longest basis; a solve that needs more goes on with what it has.
+const MOST_VECTORS: usize = 40;
+
+fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+fn norm(a: &[Vec3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad & Schultz 1986). Stops when the
+/// residual is `tolerance` of `b`.
+pub(crate) fn gmres(
+    b: &[Vec3],
+    tolerance: f64,
+    mut apply: impl FnMut(&[Vec3], &mut Vec<Vec3>),
+) -> Vec<Vec3> {
+    let size = norm(b);
+    let mut solution = vec![Vec3::zeros(); b.len()];
+    if size == 0.0 {
+        return solution;
+    }
+    let mut basis: Vec<Vec<Vec3>> = vec![b.iter().map(|x| x / size).collect()];
+    // Columns of the triangular factor, rotations (cosine, sine), and the rotated right side.
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut rotations: Vec<(f64, f64)> = Vec::new();
+    let mut right = vec![size];
+    while columns.len() < MOST_VECTORS {
+        let j = columns.len();
+        let mut next = Vec::new();
+        apply(&basis[j], &mut next);
+        let mut column = Vec::with_capacity(j + 2);
+        for vector in &basis {
+            let share = dot(&next, vector);
+            for (x, v) in next.iter_mut().zip(vector) {
+                *x -= v * share;
+            }
+            column.push(share);
+        }
+        let rest = norm(&next);
+        for (i, &(c, s)) in rotations.iter().enumerate() {
+            let (x, y) = (column[i], column[i + 1]);
+            column[i] = c * x + s * y;
+            column[i + 1] = c * y - s * x;
+        }
+        let length = column[j].hypot(rest);
+        if length == 0.0 || !length.is_finite() {
+            break;
+        }
+        let (c, s) = (column[j] / length, rest / length);
+        column[j] = length;
+        rotations.push((c, s));
+        right.push(-s * right[j]);
+        right[j] *= c;
+        columns.push(column);
+        if right[j + 1].abs() <= tolerance * size || rest <= f64::EPSILON * length {
+            break;
+        }
+        for x in &mut next {
+            *x /= rest;
+        }
+        basis.push(next);
+    }
+    // Back substitution.
+    let n = columns.len();
+    let mut weights = vec![0.0; n];
+    for i in (0..n).rev() {
+        let known: f64 = (i + 1..n).map(|j| columns[j][i] * weights[j]).sum();
+        weights[i] = (right[i] - known) / columns[i][i];
+    }
+    for (vector, weight) in basis.iter().zip(weights) {
+        for (x, v) in solution.iter_mut().zip(vector) {
+            *x += v * weight;
+        }
+    }
+    solution
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unsymmetric_system_is_solved() {
+        // A = I + a bᵀ: exact after two vectors.
+        let a: Vec<Vec3> = (0..5).map(|i| Vec3::new(f64::from(i), 1.0, -0.5)).collect();
+        let c: Vec<Vec3> = (0..5).map(|i| Vec3::new(0.1, 0.2, 0.05 * f64::from(i))).collect();
+        let b: Vec<Vec3> = (0..5).map(|i| Vec3::new(1.0, f64::from(i), 2.0)).collect();
+        let apply = |x: &[Vec3]| -> Vec<Vec3> {
+            let share = dot(&c, x);
+            x.iter().zip(&a).map(|(x, a)| x + a * share).collect()
+        };
+        let x = gmres(&b, 1e-12, |x, out| *out = apply(x));
+        let error: f64 = apply(&x).iter().zip(&b).map(|(x, b)| (x - b).norm()).sum();
+        assert!(error < 1e-10, "{error}");
+    }
+}
