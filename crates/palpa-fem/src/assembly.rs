@@ -39,7 +39,7 @@ pub(crate) fn assemble(
             let local = nodes.map(|n| displacements[n]);
             phases_at(model, memory, index, &mut phases);
             evaluate(
-                &group.shape,
+                group.shape,
                 &model.geometries[index],
                 &local,
                 &phases,

@@ -267,7 +267,8 @@ impl Contact {
     pub(crate) fn sharpened(&self) -> Touch {
         match self.touch {
             Touch::Slip { tool, anchor }
-                if self.friction > 0.0 && self.tangential(&self.to_anchor).norm() < self.smoothing =>
+                if self.friction > 0.0
+                    && self.tangential(&self.to_anchor).norm() < self.smoothing =>
             {
                 Touch::Stick { tool, anchor }
             }

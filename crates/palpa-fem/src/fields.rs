@@ -54,8 +54,7 @@ pub fn prism_fields(model: &Model, state: &State, ws: &Workspace) -> Vec<PrismFi
             phases_at(model, &ws.memory, index, &mut phases);
             let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
             let geometry = &model.geometries[index];
-            let wedges =
-                element_fields(&group.shape, geometry, &local, &phases, model.params.alpha);
+            let wedges = element_fields(group.shape, geometry, &local, &phases, model.params.alpha);
             for (w, &(cauchy, f, volume_ratio, energy)) in wedges
                 .iter()
                 .enumerate()
@@ -91,7 +90,7 @@ pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
             phases_at(model, &ws.memory, index, &mut phases);
             let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
             evaluate(
-                &group.shape,
+                group.shape,
                 &model.geometries[index],
                 &local,
                 &phases,

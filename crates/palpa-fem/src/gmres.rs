@@ -89,7 +89,9 @@ mod tests {
     fn an_unsymmetric_system_is_solved() {
         // A = I + a bᵀ: exact after two vectors.
         let a: Vec<Vec3> = (0..5).map(|i| Vec3::new(f64::from(i), 1.0, -0.5)).collect();
-        let c: Vec<Vec3> = (0..5).map(|i| Vec3::new(0.1, 0.2, 0.05 * f64::from(i))).collect();
+        let c: Vec<Vec3> = (0..5)
+            .map(|i| Vec3::new(0.1, 0.2, 0.05 * f64::from(i)))
+            .collect();
         let b: Vec<Vec3> = (0..5).map(|i| Vec3::new(1.0, f64::from(i), 2.0)).collect();
         let apply = |x: &[Vec3]| -> Vec<Vec3> {
             let share = dot(&c, x);

@@ -158,11 +158,9 @@ impl Memory {
                 _ => [1.0; 2],
             };
         }
-        let n_groups = model.n_groups();
         for g in 0..model.geometries.len() {
             let normal = model.geometries[g].thickness_gradient.normalize();
             let in_plane = Mat3::identity() - normal * normal.transpose();
-            let _interval = g / n_groups;
             for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
                 let index = model.phases[p].material as usize;
                 let material = &model.materials[index];
@@ -199,7 +197,7 @@ impl Memory {
                     continue;
                 };
                 let stresses = elastic_stresses(
-                    &model.structure.groups[group].shape,
+                    model.structure.groups[group].shape,
                     &model.geometries[g],
                     &displacements,
                     &material.law,

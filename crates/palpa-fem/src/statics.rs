@@ -30,6 +30,8 @@ const SMOOTHING: [f64; 4] = [1e-3, 2e-4, 4e-5, 1e-5];
 const FINE_SMOOTHING: f64 = 5e-5;
 /// Iterations without any progress after which a solve is given up.
 const PATIENCE: usize = 12;
+/// Solves' worth of iterations after which a step that keeps failing is given up.
+const MOST_SOLVES: usize = 10;
 /// Newton iterations below which the next substep may be longer.
 const EASY: usize = 8;
 
@@ -222,7 +224,7 @@ pub fn advance(
                 state.clone_from(&start);
             }
             size *= 0.5;
-            if size < LEAST_SUBSTEP {
+            if size < LEAST_SUBSTEP || iterations > MOST_SOLVES * params.max_iterations {
                 *state = start;
                 report.iterations = iterations;
                 report.substeps = substeps;
@@ -324,7 +326,8 @@ pub fn equilibrate(
         residual: f64::INFINITY,
         energy: 0.0,
     };
-    let start = (!load.tools.is_empty()).then(|| (state.displacements.clone(), state.touches.clone()));
+    let start =
+        (!load.tools.is_empty()).then(|| (state.displacements.clone(), state.touches.clone()));
     let mut outcome = newton.run(state, ws);
     if let Some((displacements, touches)) = start
         && outcome != Outcome::Converged
@@ -399,7 +402,6 @@ impl Newton<'_> {
             let is_settled = self.residual <= self.params.tolerance
                 && demand <= self.params.gap_tolerance
                 && n_new == 0;
-            if std::env::var("PT").is_ok() { let st = ws.contacts.active.iter().filter(|c| matches!(c.touch, Touch::Stick{..})).count(); eprintln!("  it {} res {:.2e} demand {:.2e} new {} active {} stick {}", self.iterations, self.residual, demand, n_new, ws.contacts.active.len(), st); }
             if is_settled {
                 // Forces are right for these touches; are the touches right for these forces?
                 if self.iterations == 0 || self.revise(state, ws) == 0 {
@@ -449,7 +451,11 @@ impl Newton<'_> {
                 }
                 break;
             }
-            good = Some((smoothing, state.displacements.clone(), state.touches.clone()));
+            good = Some((
+                smoothing,
+                state.displacements.clone(),
+                state.touches.clone(),
+            ));
         }
         for contact in &ws.contacts.active {
             state.touches[contact.vertex] = contact.sharpened();
@@ -511,11 +517,16 @@ impl Newton<'_> {
             .map(|c| ws.forces[c.node].norm())
             .fold(0.0, f64::max);
         let least = NO_FORCE * largest.max(self.floor());
-        let changes = ws.contacts.active.iter().enumerate().filter_map(|(i, contact)| {
-            let force = &ws.forces[contact.node];
-            let (touch, doubt) = contact.revised(force, least)?;
-            Some((i, touch, doubt))
-        });
+        let changes = ws
+            .contacts
+            .active
+            .iter()
+            .enumerate()
+            .filter_map(|(i, contact)| {
+                let force = &ws.forces[contact.node];
+                let (touch, doubt) = contact.revised(force, least)?;
+                Some((i, touch, doubt))
+            });
         let mut changes: Vec<(usize, Touch, f64)> = changes.collect();
         if self.iterations >= SETTLE_AFTER {
             changes.sort_by(|a, b| b.2.total_cmp(&a.2));
@@ -533,7 +544,10 @@ impl Newton<'_> {
     /// Collects what is held and which moves that demands; puts friction and the tools' curvature into the system.
     /// Returns the norm of the free forces, N, and the largest demand, m.
     fn put_constraints(&mut self, state: &State, ws: &mut Workspace) -> (f64, f64) {
-        self.take_off(ws);
+        // What contact has put on since the last assembly comes off first.
+        for (block, stiffness) in ws.added.drain(..) {
+            ws.system.blocks[block] -= stiffness;
+        }
         ws.holds.copy_from_slice(&ws.given);
         ws.demand.fill(Vec3::zeros());
         ws.right_side.copy_from_slice(&ws.forces);
@@ -568,13 +582,6 @@ impl Newton<'_> {
         let (free, held) = self.norms(ws);
         self.residual = free / held.max(self.floor());
         (free, largest)
-    }
-
-    /// Takes off what contact has put on the stiffness since the last assembly.
-    fn take_off(&self, ws: &mut Workspace) {
-        for (block, stiffness) in ws.added.drain(..) {
-            ws.system.blocks[block] -= stiffness;
-        }
     }
 
     /// Norms of the forces in free and in held directions, N.
@@ -679,14 +686,12 @@ impl Newton<'_> {
             }
             share *= 0.5;
         }
-        match last {
-            Some(inverted) => Err(inverted),
-            None => {
-                // Rounding, or a bad model of the forces: the shortest move, and the iterations decide.
-                std::mem::swap(&mut state.displacements, &mut ws.trial);
-                Ok(())
-            }
+        if let Some(inverted) = last {
+            return Err(inverted);
         }
+        // Rounding, or a bad model of the forces: the shortest move, and the iterations decide.
+        std::mem::swap(&mut state.displacements, &mut ws.trial);
+        Ok(())
     }
 
     /// Whether sliding vertices stay near the tool's surface, whose bend the linear step does not see.
@@ -722,7 +727,8 @@ impl Newton<'_> {
             .map(|(force, hold)| hold.free_part(force).norm_squared())
             .sum();
         ws.trial_forces = forces;
-        free_sq.sqrt() <= free_before * 1.000_1 || (ws.contacts.active.is_empty() && energy < self.energy)
+        free_sq.sqrt() <= free_before * 1.000_1
+            || (ws.contacts.active.is_empty() && energy < self.energy)
     }
 
     fn report(&self, state: &State, ws: &mut Workspace, outcome: Outcome) -> StepReport {

@@ -10,7 +10,14 @@
 //!
 //! Derivation: `docs/theory/paired_prism.md`.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "wedges, points and nodes index several arrays together"
+)]
+
 mod geometry;
+#[cfg(test)]
+mod tests;
 mod unit;
 
 use palpa_mesh::Vec3;
@@ -92,19 +99,19 @@ impl GroupResponse {
 }
 
 /// Local node of a wedge's corner (0–2 upper, 3–5 lower).
-fn node(columns: &[u8; 3], corner: usize) -> usize {
+fn node(columns: [u8; 3], corner: usize) -> usize {
     2 * usize::from(columns[corner % 3]) + corner / 3
 }
 
 /// Deformation gradients of the wedges at their points.
 pub(crate) fn deformation(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
 ) -> [[Mat3; 2]; 2] {
     let mut f = [[Mat3::identity(); 2]; 2];
     for w in 0..usize::from(shape.n_wedges) {
-        let columns = &shape.wedges[w];
+        let columns = shape.wedges[w];
         for q in 0..2 {
             for (corner, gradient) in geometry.wedges[w].gradients[q].iter().enumerate() {
                 f[w][q] += displacements[node(columns, corner)] * gradient.transpose();
@@ -116,7 +123,7 @@ pub(crate) fn deformation(
 
 /// Evaluates a group. `alpha` is the share of the pair's mean deviator.
 pub(crate) fn evaluate(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],
@@ -193,7 +200,7 @@ pub(crate) fn evaluate(
                 }
             }
         }
-        let nodes: [usize; 6] = std::array::from_fn(|corner| node(&shape.wedges[w], corner));
+        let nodes: [usize; 6] = std::array::from_fn(|corner| node(shape.wedges[w], corner));
         add(&nodes, &wedge.gradients, &response, with_tangent, out);
     }
     if with_tangent {
@@ -230,7 +237,7 @@ pub(crate) fn volume_change(measure: VolumeMeasure, f: &Mat3) -> (f64, Mat3) {
 }
 
 fn volumetric(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     f: &[[Mat3; 2]; 2],
     phases: &[PhaseAt<'_>],
@@ -279,7 +286,7 @@ fn volumetric(
 }
 
 fn add_bulk_stiffness(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     volume: &Volumetric,
     out: &mut GroupResponse,
@@ -290,7 +297,7 @@ fn add_bulk_stiffness(
         for q in 0..2 {
             let weighted = volume.derivative[w][q] * wedge.volumes[q];
             for corner in 0..6 {
-                gradient[node(&shape.wedges[w], corner)] += weighted * wedge.gradients[q][corner];
+                gradient[node(shape.wedges[w], corner)] += weighted * wedge.gradients[q][corner];
             }
         }
     }
@@ -321,12 +328,12 @@ impl PairMean {
         }
     }
 
-    fn node_gradients(&self, shape: &Shape, geometry: &GroupGeometry) -> [[Vec3; N_NODES]; 2] {
+    fn node_gradients(&self, shape: Shape, geometry: &GroupGeometry) -> [[Vec3; N_NODES]; 2] {
         let mut gradients = [[Vec3::zeros(); N_NODES]; 2];
         for w in 0..2 {
             for q in 0..2 {
                 for (corner, gradient) in geometry.wedges[w].gradients[q].iter().enumerate() {
-                    gradients[q][node(&shape.wedges[w], corner)] += gradient * self.share[w][q];
+                    gradients[q][node(shape.wedges[w], corner)] += gradient * self.share[w][q];
                 }
             }
         }
@@ -459,7 +466,7 @@ fn add<const N: usize>(
 
 /// The deviatoric stress of a law at every point of a group, as second Piola–Kirchhoff stress, and its `U'`.
 pub(crate) fn elastic_stresses(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     law: &Law,
@@ -508,7 +515,7 @@ pub(crate) fn elastic_stresses(
 
 /// For each wedge of a group: Cauchy stress, mean deformation gradient, volume ratio and energy density.
 pub(crate) fn element_fields(
-    shape: &Shape,
+    shape: Shape,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],

@@ -6,4 +6,5 @@
 mod law;
 mod lump;
 mod pairing;
+mod robust;
 mod shape;

@@ -87,6 +87,7 @@ fn graded_blocks_leave_at_most_the_odd_triangle_alone() {
                     centre: [0.0, 0.0],
                     ring_radius: Some(10e-3),
                     spacing,
+                    inner_growth: 0.0,
                     growth: 0.45 * spacing / 3.3e-3,
                     jitter,
                 };
@@ -212,6 +213,7 @@ fn a_skin_of_twenty_thousand_irregular_triangles_takes_well_below_a_second() {
         centre: [0.0, 0.0],
         ring_radius: None,
         spacing: 1e-3,
+        inner_growth: 0.0,
         growth: 0.0,
         jitter: Some(1),
     };
