@@ -50,6 +50,7 @@ fn block(mesh: &Mesh, ring: f64) -> GradedBlock {
         centre: [0.0; 2],
         ring_radius: Some(ring),
         spacing: mesh.spacing,
+        inner_growth: 0.0,
         growth: mesh.growth,
         jitter: None,
     }
@@ -406,6 +407,7 @@ pub(crate) fn b5(options: &Options) -> Result<Findings, VerifyError> {
             centre: [0.0; 2],
             ring_radius: None,
             spacing,
+            inner_growth: 0.0,
             growth: 0.0,
             jitter: None,
         };

@@ -19,7 +19,8 @@ fn body() -> LayeredBody {
         half_width: 0.05,
         centre: [0.0; 2],
         ring_radius: Some(9e-3),
-        spacing: 1.8e-3,
+        spacing: 1.5e-3,
+        inner_growth: 0.0,
         growth: 0.6,
         jitter: None,
     };
@@ -35,7 +36,7 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
     let body = body();
     let mut findings = Findings::default();
     let sphere = Shape::from(Sphere::new(0.01).expect("valid size"));
-    let punch = Shape::from(FlatPunch::new(8e-3, 2e-3).expect("valid sizes"));
+    let punch = Shape::from(FlatPunch::new(8e-3, 5e-3).expect("valid sizes"));
     for (name, shape) in [("sphere", sphere), ("rounded punch", punch)] {
         let mut forces = Vec::new();
         for n_steps in [1, 4, 16] {
@@ -63,14 +64,15 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
             &report,
             nodes,
         );
-        let (report, nodes) = pressed(&body, shape, 0.4, 4, 3e-3)?;
-        residuals(
-            &mut findings,
-            &format!("{name}, friction 0.4, dragged 3 mm"),
-            &report,
-            nodes,
-        );
     }
+    // Dragged along: vertices slide, stick and let go.
+    let (report, nodes) = pressed(&body, sphere, 0.4, 4, 3e-3)?;
+    residuals(
+        &mut findings,
+        "sphere, friction 0.4, dragged 3 mm",
+        &report,
+        nodes,
+    );
     Ok(findings)
 }
 

@@ -15,10 +15,16 @@
 mod block;
 mod columns;
 mod contact;
+mod half_space;
+mod layer;
+mod lump_map;
 mod patch;
 mod plane;
 mod press;
 mod prony;
+mod sector;
+mod small_lump;
+mod small_strain;
 mod table;
 pub mod tolerance;
 
@@ -176,10 +182,10 @@ pub enum VerifyError {
 
 /// All cases, by formula first.
 pub fn cases() -> &'static [Case] {
-    &CASES
+    CASES
 }
 
-static CASES: [Case; 11] = [
+static CASES: &[Case] = &[
     Case {
         name: "patch",
         title: "uniform strain on distorted wedges, small and large; rigid motions",
@@ -221,6 +227,48 @@ static CASES: [Case; 11] = [
         source: "the laws of contact",
         needs_reference: false,
         run: contact::run,
+    },
+    Case {
+        name: "A1",
+        title: "punch, bonded disc, sphere and pressure on a half-space",
+        source: "exact (Sneddon, Spence, Hertz, Boussinesq)",
+        needs_reference: true,
+        run: half_space::run,
+    },
+    Case {
+        name: "A2",
+        title: "flat punch and sphere on a layer that is bonded to a rigid base",
+        source: "Hayes et al. (1972), solved anew to 1e-14",
+        needs_reference: true,
+        run: layer::one,
+    },
+    Case {
+        name: "A3",
+        title: "flat punch, disc under pressure and sphere on two and three layers",
+        source: "Hankel transform, to 1e-10",
+        needs_reference: true,
+        run: layer::several,
+    },
+    Case {
+        name: "A4",
+        title: "a hard ball in a soft block under a pressure that moves across it",
+        source: "quadratic tetrahedra, to 0.1 % in the ratio",
+        needs_reference: true,
+        run: lump_map::run,
+    },
+    Case {
+        name: "small lump",
+        title: "a lump inside one coarse prism, and the mesh refined round it",
+        source: "own fine mesh",
+        needs_reference: false,
+        run: small_lump::run,
+    },
+    Case {
+        name: "V patch",
+        title: "the reference's own patch of 16 wedges",
+        source: "exact (V)",
+        needs_reference: true,
+        run: patch::of_reference,
     },
     Case {
         name: "B1",

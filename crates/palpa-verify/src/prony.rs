@@ -20,6 +20,7 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
         centre: [0.0; 2],
         ring_radius: Some(5e-3),
         spacing: 2.5e-3,
+        inner_growth: 0.0,
         growth: 0.6,
         jitter: None,
     };

@@ -6,8 +6,8 @@ use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
 use palpa_mesh::growth::{ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
-    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, Vec3, grow,
-    read_surface, repair,
+    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, SurfaceIndex, Vec3,
+    grow, read_surface, repair,
 };
 use palpa_tissue::{
     Generator, LengthUnit, LumpPlace, Scene, Skin, Target, Thickness, read_thickness,
@@ -28,6 +28,8 @@ pub struct BuiltBody {
     pub bones: Vec<Surface>,
     /// The skin vertex of the body that the scene presses on.
     pub press_vertex: usize,
+    /// Where on its skin the scene presses: the point nearest to the one that it names, which need not be a vertex. m
+    pub press_at: Vec3,
     /// For each lump of the scene the place on the skin that it lies under, if it is placed so. m
     pub lump_places: Vec<Option<Vec3>>,
     /// What was done to the surfaces on the way and a user should know.
@@ -95,10 +97,16 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     }
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     let on_body = &growth.body.skin;
+    let press_at = match (&scene.press.target, press_at) {
+        (Target::Point(_), Some(point)) => SurfaceIndex::build(on_body)
+            .closest(point)
+            .map_or(point, |closest| closest.point),
+        _ => on_body.points[press_vertex],
+    };
     let lump_places = (scene.lumps.iter().zip(lumps_at))
         .map(|(lump, at)| match &lump.place {
             LumpPlace::Below { target, .. } if *target == scene.press.target => {
-                Some(on_body.points[press_vertex])
+                Some(press_at)
             }
             LumpPlace::Below { .. } => {
                 Some(at.unwrap_or_else(|| on_body.points[nearest(on_body, area_centroid(on_body))]))
@@ -113,6 +121,7 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
         growth,
         bones,
         press_vertex,
+        press_at,
         lump_places,
         notes,
     })
@@ -186,7 +195,7 @@ fn with_bone_name(error: GrowthError, files: &[PathBuf]) -> anyhow::Error {
     }
 }
 
-fn nearest(skin: &Surface, point: Vec3) -> usize {
+pub(crate) fn nearest(skin: &Surface, point: Vec3) -> usize {
     let distance = |v: usize| (skin.points[v] - point).norm_squared();
     (0..skin.points.len())
         .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))

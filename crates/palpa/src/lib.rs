@@ -23,3 +23,4 @@ pub use palpa_fem as fem;
 pub use palpa_mesh as mesh;
 pub use palpa_springs as springs;
 pub use palpa_tissue as tissue;
+pub use palpa_verify as verify;

@@ -81,11 +81,31 @@ impl OutDir {
     /// # Errors
     /// When the file cannot be made.
     pub fn table<R: Serialize>(&self, name: &str) -> anyhow::Result<CsvTable<R>> {
+        self.begin_table(name, true)
+    }
+
+    /// Begins a CSV table under a given header, for rows whose fields are lists.
+    ///
+    /// # Errors
+    /// When the file cannot be made.
+    pub fn table_under<R: Serialize>(
+        &self,
+        name: &str,
+        header: &[String],
+    ) -> anyhow::Result<CsvTable<R>> {
+        let mut table = self.begin_table(name, false)?;
+        let written = table.writer.write_record(header);
+        written.with_context(|| cannot_write(&table.path))?;
+        Ok(table)
+    }
+
+    fn begin_table<R>(&self, name: &str, has_header: bool) -> anyhow::Result<CsvTable<R>> {
         let path = self.path.join(name);
         let file = temporary_for(&path).with_context(|| cannot_write(&path))?;
+        let mut builder = csv::WriterBuilder::new();
         Ok(CsvTable {
             path,
-            writer: csv::Writer::from_writer(file),
+            writer: builder.has_headers(has_header).from_writer(file),
             row: PhantomData,
         })
     }

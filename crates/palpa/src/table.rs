@@ -1,8 +1,8 @@
-//! Small tables for people: right-aligned columns under their headers.
+//! Small tables for people: aligned columns under their headers.
 
 use std::fmt;
 
-/// A table of text cells, printed with aligned columns.
+/// A table of text cells, printed with columns aligned at the right.
 ///
 /// ```
 /// let mut table = palpa::table::Table::new(["depth mm", "force N"]);
@@ -13,6 +13,7 @@ use std::fmt;
 pub struct Table<const N: usize> {
     header: [String; N],
     rows: Vec<[String; N]>,
+    is_first_left: bool,
 }
 
 impl<const N: usize> Table<N> {
@@ -21,7 +22,15 @@ impl<const N: usize> Table<N> {
         Self {
             header: header.map(str::to_owned),
             rows: Vec::new(),
+            is_first_left: false,
         }
+    }
+
+    /// Aligns the first column at the left: for words.
+    #[must_use]
+    pub fn with_left_names(mut self) -> Self {
+        self.is_first_left = true;
+        self
     }
 
     /// Appends a row.
@@ -46,7 +55,11 @@ impl<const N: usize> fmt::Display for Table<N> {
             for (column, cell) in line.iter().enumerate() {
                 let gap = if column == 0 { "" } else { "  " };
                 let pad = width[column] - cell.chars().count();
-                write!(f, "{gap}{:pad$}{cell}", "")?;
+                if column == 0 && self.is_first_left {
+                    write!(f, "{cell}{:pad$}", "")?;
+                } else {
+                    write!(f, "{gap}{:pad$}{cell}", "")?;
+                }
             }
         }
         Ok(())

@@ -149,6 +149,19 @@ impl Grid {
         self
     }
 
+    /// Adds a 3 × 3 tensor per cell, row by row: `cauchy` in pascals.
+    ///
+    /// # Panics
+    /// If there is not one value per cell.
+    #[must_use]
+    pub fn with_cell_tensors(mut self, name: &str, values: &[nalgebra::Matrix3<f64>]) -> Self {
+        assert_eq!(values.len(), self.n_cells(), "one value of {name} per cell");
+        let rows = values.iter().flat_map(|m| m.transpose().data.0.concat());
+        self.cell_data
+            .push(Array::new(name, 9, Values::Float(rows.collect())));
+        self
+    }
+
     /// Number of points.
     pub fn n_points(&self) -> usize {
         self.points.len() / 3

@@ -38,8 +38,11 @@ pub struct GradedBlock {
     /// A circle on which a ring of vertices lies, such as the edge of a punch. They stand at the corners of a polygon with
     /// the *area* of the circle: its corners lie a little outside, the middles of its sides inside.
     pub ring_radius: Option<f64>,
-    /// Length of edges within the ring (without a ring: in the middle).
+    /// Length of edges on the ring and within it (without a ring: in the middle).
     pub spacing: f64,
+    /// By how much edges lengthen per metre from the ring to the middle, 0 to 1: where a punch's edge counts, its
+    /// middle need not be as fine.
+    pub inner_growth: f64,
     /// By how much edges lengthen per metre beyond the ring.
     pub growth: f64,
     /// Makes the mesh irregular, from this seed: rings turned and vertices moved by chance.
@@ -52,6 +55,7 @@ impl GradedBlock {
     pub fn halved(&self) -> Self {
         Self {
             spacing: 0.5 * self.spacing,
+            inner_growth: 0.5 * self.inner_growth,
             growth: 0.5 * self.growth,
             ..*self
         }
@@ -71,14 +75,36 @@ impl GradedBlock {
             .collect()
     }
 
-    /// Rings from the middle to the ring; the spacing itself stands for a ring that is not given.
-    fn n_inner_rings(&self) -> usize {
+    /// How many edges of the ring's lie along its radius; the spacing itself stands for a ring that is not given.
+    fn n_on_radius(&self) -> usize {
         self.ring_radius
             .map_or(1, |a| (a / self.spacing).round().max(1.0) as usize)
     }
 
     fn n_on_ring(&self) -> usize {
-        6 * self.n_inner_rings()
+        6 * self.n_on_radius()
+    }
+
+    /// Radii of the rings inside the ring, outwards, and their numbers of vertices.
+    fn inner_rings(&self) -> Vec<(f64, usize)> {
+        let (a, h, g) = (self.inner_radius(), self.spacing_at(0.0), self.inner_growth);
+        if g == 0.0 {
+            return (1..self.n_on_radius())
+                .map(|i| (i as f64 * h, 6 * i))
+                .collect();
+        }
+        // Distance from the ring after k rows whose heights grow with it: h/g (e^(g k) − 1).
+        let rows = (g * a / h).ln_1p() / g;
+        let n_rows = rows.round().max(1.0) as usize;
+        (1..n_rows)
+            .rev()
+            .map(|k| {
+                let from_ring = h / g * (g * rows * k as f64 / n_rows as f64).exp_m1();
+                let r = a - from_ring;
+                let n = (6.0 * r / (h + g * from_ring)).round().max(6.0);
+                (r, n as usize)
+            })
+            .collect()
     }
 
     /// Radius from which edges lengthen.
@@ -88,7 +114,7 @@ impl GradedBlock {
 
     /// Wanted length of edges at a distance from the middle.
     fn spacing_at(&self, r: f64) -> f64 {
-        let at_ring = self.inner_radius() / self.n_inner_rings() as f64;
+        let at_ring = self.inner_radius() / self.n_on_radius() as f64;
         at_ring + self.growth * (r - self.inner_radius()).max(0.0)
     }
 
@@ -121,15 +147,16 @@ impl GradedBlock {
                 && self.ring_radius.is_none_or(is_length)
                 && self.growth >= 0.0
                 && self.growth.is_finite()
+                && (0.0..=1.0).contains(&self.inner_growth)
                 && self.centre.iter().all(|c| c.is_finite()),
-            "lengths must be positive and growth not negative: {self:?}"
+            "lengths must be positive, growth not negative and inner growth 0 to 1: {self:?}"
         );
         assert!(
             self.inner_radius() + 0.5 * self.spacing_at(0.0) < self.half_width,
             "the ring leaves no room in the block: {self:?}"
         );
         let rim = TAU * self.half_width / self.spacing_at(self.half_width);
-        let (m, n) = (self.n_inner_rings() as f64, self.n_on_ring() as f64);
+        let (m, n) = (self.n_on_radius() as f64, self.n_on_ring() as f64);
         assert!(
             3.0 * m * m + self.rows_to(self.half_width) * rim.max(n) < 1e6,
             "over a million vertices: {self:?}"
@@ -139,8 +166,8 @@ impl GradedBlock {
 
 /// The block with its skin in the plane z = 0, looking to +z, and straight columns to −z.
 ///
-/// Within the ring, ring i of m has 6 i vertices, so that triangles are nearly equilateral; outside rings lie ever further
-/// apart, joined by Delaunay's triangulation. No edge crosses the ring.
+/// Within the ring, if its edges do not lengthen, ring i of m has 6 i vertices, so that triangles are nearly equilateral;
+/// outside rings lie ever further apart, joined by Delaunay's triangulation. No edge crosses the ring.
 ///
 /// # Panics
 /// If lengths or levels do not make a body (this is for shapes written in code).
@@ -218,10 +245,15 @@ impl Plan {
     /// The middle and the rings up to the ring of the block.
     fn add_inner(&mut self, block: &GradedBlock, mut random: Option<&mut Random>) {
         self.push([0.0, 0.0], false);
-        let (m, h) = (block.n_inner_rings(), block.spacing_at(0.0));
-        for i in 1..m {
-            let turn = random.as_mut().map_or(0.0, |r| r.both_ways());
-            let first = self.ring(6 * i, i as f64 * h, turn, false);
+        let h = block.spacing_at(0.0);
+        for (k, (radius, n)) in block.inner_rings().into_iter().enumerate() {
+            let turn = match random.as_mut() {
+                Some(random) => random.both_ways(),
+                // Rings of 6 i vertices fit as they are; others are turned by half a step, as outside.
+                None if block.inner_growth > 0.0 && k % 2 == 1 => 0.5 * TAU / n as f64,
+                None => 0.0,
+            };
+            let first = self.ring(n, radius, turn, false);
             if let Some(random) = random.as_mut() {
                 self.jitter_from(first, h, random);
             }

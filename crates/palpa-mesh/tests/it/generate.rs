@@ -29,6 +29,7 @@ fn block(outline: Outline, spacing: f64, jitter: Option<u64>) -> GradedBlock {
         centre: [0.1, -0.2],
         ring_radius: Some(10e-3),
         spacing,
+        inner_growth: 0.0,
         growth: 0.45 * spacing / 3.3e-3,
         jitter,
     }

@@ -243,6 +243,7 @@ fn a_closed_rim_is_refined_all_round() {
         centre: [0.0, 0.0],
         ring_radius: Some(0.01),
         spacing: 5e-3,
+        inner_growth: 0.0,
         growth: 0.4,
         jitter: Some(1),
     };
@@ -300,6 +301,7 @@ proptest! {
             centre: [0.05, 0.05],
             ring_radius: Some(0.01),
             spacing: 5e-3,
+            inner_growth: 0.0,
             growth: 0.4,
             jitter: Some(seed),
         };

@@ -11,6 +11,7 @@ pub mod export;
 pub mod press;
 pub mod reproduce;
 pub mod schema;
+pub mod verify;
 
 use crate::cli::Context;
 
@@ -34,6 +35,7 @@ pub enum Command {
     Press(press::Args),
     Reproduce(reproduce::Args),
     Schema(schema::Args),
+    Verify(verify::Args),
 }
 
 impl Command {
@@ -45,6 +47,7 @@ impl Command {
             Self::Press(_) => "press",
             Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
+            Self::Verify(_) => "verify",
         }
     }
 
@@ -59,6 +62,7 @@ impl Command {
             Self::Press(args) => press::run(args, context),
             Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),
+            Self::Verify(args) => verify::run(args, context),
         }
     }
 }

@@ -6,7 +6,10 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
+use crate::output::OutDir;
+use crate::reproduce::Body;
 use crate::reproduce::claims::{EULER_STEP_SIZES, combined_steps_to_cross, convergence, euler};
+use crate::reproduce::continuum::{Continuum, Resolution, discs, n_steps};
 use crate::reproduce::curves::{Curves, MAIN, Reading, SweepRow, readings};
 use crate::reproduce::picture::draw;
 use crate::reproduce::report::{Figures, Report};
@@ -22,8 +25,8 @@ const LEAST_R2: f64 = 0.99;
 /// Reproduce the evaluation of the reference method: table 4.2 and figures 4.2 to 4.4
 ///
 /// Steps per second against the dense inverse of 2009, and force against depth for a uniform body and two layered ones, over
-/// all readings of what the text leaves open. Writes reproduce.json, table.csv, sweep.csv, curves.csv, and reproduce.svg
-/// and .png.
+/// all readings of what the text leaves open; and the same bodies as a continuum, to show from which push on a hard layer is
+/// felt. Writes reproduce.json, table.csv, sweep.csv, curves.csv, continuum.csv, and reproduce.svg and .png.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Leave out of the speed table what has more nodes than this
@@ -61,6 +64,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let mut done = Done::default();
     let is_whole = figures(context, &mut done)?
         && claims(context, &mut done)?
+        && continuum(context, &mut done)?
         && table(args, context, &mut done)?;
     done.report.is_complete = is_whole;
     write(context, &done)?;
@@ -230,6 +234,62 @@ fn claims(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     Ok(!context.is_interrupted())
 }
 
+/// The bodies as a continuum; whether they were finished.
+fn continuum(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
+    let discs = discs();
+    let progress = context.progress(n_steps(&discs), "continuum");
+    let continuum = Continuum::compute(&discs, Resolution::FULL, || {
+        progress.inc(1);
+        context.is_interrupted()
+    })?;
+    drop(progress);
+    context.say(format_args!(
+        "\nThe same bodies as a continuum, {:.0} and {:.0} kPa, Poisson's ratio {}: the push from which on a layer is felt",
+        continuum.soft_young_pa / 1e3,
+        continuum.hard_young_pa / 1e3,
+        continuum.poisson,
+    ))?;
+    let [attentive, all] = continuum.felt_ratios.map(|r| format!("felt at {r} mm"));
+    let mut table = Table::new([
+        "disc mm",
+        "body",
+        "to mm",
+        "force N",
+        "times as stiff: first",
+        "last",
+        &attentive,
+        &all,
+        "upper layer left",
+    ]);
+    let felt = |at: Option<f64>| match at {
+        None => "not".to_owned(),
+        Some(0.0) => "at once".to_owned(),
+        Some(at) => format!("{at:.0}"),
+    };
+    for disc in &continuum.discs {
+        for pressed in &disc.bodies {
+            let is_uniform = pressed.body == Body::Uniform;
+            let [push, force] = pressed.curve.last().copied().unwrap_or_default();
+            let of_layered = |text: String| if is_uniform { String::new() } else { text };
+            let ratios = &pressed.stiffness_ratio;
+            table.push([
+                format!("{:.1}", disc.radius_mm),
+                pressed.body.title().into(),
+                format!("{push:.0}"),
+                format!("{force:.3}"),
+                of_layered(shown(ratios.first().map(|r| r[1]), 2)),
+                of_layered(shown(ratios.last().map(|r| r[1]), 2)),
+                of_layered(felt(pressed.felt_from_mm[0])),
+                of_layered(felt(pressed.felt_from_mm[1])),
+                format!("{:.0} %", pressed.upper_layer_left * 1e2),
+            ]);
+        }
+    }
+    context.say(&table)?;
+    done.report.continuum = Some(continuum);
+    Ok(!context.is_interrupted())
+}
+
 /// The speed table; whether it was finished.
 fn table(args: &Args, context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     let budget = Duration::from_secs_f64(args.seconds);
@@ -278,6 +338,35 @@ struct CurveRow {
     hard_bottom_n: Option<f64>,
 }
 
+/// A point of the continuum's curves.
+#[derive(Debug, Serialize)]
+struct ContinuumRow {
+    disc_radius_mm: f64,
+    push_mm: f64,
+    uniform_n: Option<f64>,
+    hard_middle_n: Option<f64>,
+    hard_bottom_n: Option<f64>,
+}
+
+fn write_continuum(dir: &OutDir, continuum: &Continuum) -> anyhow::Result<()> {
+    let mut curves = dir.table("continuum.csv")?;
+    for disc in &continuum.discs {
+        let n_points = disc.bodies.iter().map(|b| b.curve.len()).max();
+        for i in 0..n_points.unwrap_or(0) {
+            let force = |body: usize| disc.bodies.get(body)?.curve.get(i).map(|p| p[1]);
+            curves.push(&ContinuumRow {
+                disc_radius_mm: disc.radius_mm,
+                push_mm: i as f64,
+                uniform_n: force(0),
+                hard_middle_n: force(1),
+                hard_bottom_n: force(2),
+            })?;
+        }
+    }
+    curves.finish()?;
+    Ok(())
+}
+
 fn write(context: &Context, done: &Done) -> anyhow::Result<()> {
     let dir = context.out_dir()?;
     let mut curves = dir.table("curves.csv")?;
@@ -305,6 +394,9 @@ fn write(context: &Context, done: &Done) -> anyhow::Result<()> {
         speed.push(row)?;
     }
     speed.finish()?;
+    if let Some(continuum) = &done.report.continuum {
+        write_continuum(dir, continuum)?;
+    }
     dir.write_json("reproduce.json", &done.report)?;
     let picture = draw(&done.report, done.main.as_ref(), done.small.as_ref());
     let [_, png] = picture.save(dir, "reproduce")?;

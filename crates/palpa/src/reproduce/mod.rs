@@ -4,6 +4,7 @@
 //! right; `docs/reproduce.md` tells what comes out.
 
 pub mod claims;
+pub mod continuum;
 pub mod curves;
 pub mod fit;
 pub mod picture;

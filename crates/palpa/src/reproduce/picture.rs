@@ -1,5 +1,6 @@
 //! The evaluation in one picture.
 
+use super::continuum::{Continuum, PressedDisc};
 use super::curves::Curves;
 use super::report::{Figures, Report};
 use super::{Body, LEVEL_SPACING, Shape};
@@ -22,6 +23,12 @@ pub fn draw(report: &Report, main: Option<&Curves>, small: Option<&Curves>) -> P
     }
     if !report.table.is_empty() {
         charts.push(speed_chart(report));
+    }
+    if let Some(continuum) = &report.continuum {
+        for disc in &continuum.discs {
+            charts.push(continuum_force_chart(continuum, disc));
+            charts.push(continuum_ratio_chart(continuum, disc));
+        }
     }
     panels("The evaluation of 2009, run again", &charts, 2)
 }
@@ -117,6 +124,50 @@ fn crossing_chart(report: &Report) -> Chart {
                 .dashed()
                 .with_color(PALETTE[6]),
         );
+    }
+    chart
+}
+
+fn continuum_force_chart(continuum: &Continuum, disc: &PressedDisc) -> Chart {
+    let mut chart = Chart::new(
+        Axis::linear("push [mm]").with_zero(),
+        Axis::linear("force on the disc [N]").with_zero(),
+    )
+    .title(format!("As a continuum, {}", disc.name))
+    .subtitle(format!(
+        "bonded disc of {:.1} mm radius, {:.0} and {:.0} kPa, Poisson's ratio {}",
+        disc.radius_mm,
+        continuum.soft_young_pa / 1e3,
+        continuum.hard_young_pa / 1e3,
+        continuum.poisson,
+    ));
+    for (pressed, color) in disc.bodies.iter().zip(COLORS) {
+        let series = Series::new(pressed.body.title(), pressed.curve.clone());
+        chart = chart.series(series.with_color(PALETTE[color]));
+    }
+    chart
+}
+
+fn continuum_ratio_chart(continuum: &Continuum, disc: &PressedDisc) -> Chart {
+    /// Far above all that is told apart: what is stiffer leaves the chart.
+    const STIFFEST: f64 = 2.0;
+    let mut chart = Chart::new(
+        Axis::linear("push [mm]").with_zero(),
+        Axis::linear("force over that of the uniform body").with_range(0.9, STIFFEST),
+    )
+    .title(format!("When the layers are felt, {}", disc.name))
+    .subtitle("dotted: differences that the attentive and that all people feel");
+    for ratio in continuum.felt_ratios {
+        chart = chart.guide(Guide::y(ratio, format!("{:.0} %", (ratio - 1.0) * 1e2)));
+    }
+    for (pressed, color) in disc.bodies.iter().zip(COLORS).skip(1) {
+        let series = Series::new(pressed.body.title(), pressed.stiffness_ratio.clone());
+        chart = chart.series(series.with_color(PALETTE[color]));
+        for (at, ratio) in pressed.felt_from_mm.iter().zip(continuum.felt_ratios) {
+            if let Some(at) = at.filter(|at| *at > 0.0) {
+                chart = chart.note([at, ratio], format!("from {at:.0} mm on"));
+            }
+        }
     }
     chart
 }

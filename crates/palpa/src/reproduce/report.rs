@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::claims::{Convergence, EulerRow};
+use super::continuum::Continuum;
 use super::curves::{Curves, SLICE_MM, SweepRow, knee_of, r2, slope_ratio};
 use super::speed::{self, SpeedRow};
 use super::{Body, fit::Knee};
@@ -20,6 +21,8 @@ pub struct Report {
     pub euler: Vec<EulerRow>,
     /// Steps of the combined method until the base feels 90 % of a push: uniform, hard middle, hard bottom.
     pub combined_steps_to_cross: Option<[Option<usize>; 3]>,
+    /// The same bodies as a continuum.
+    pub continuum: Option<Continuum>,
     /// Table 4.2.
     pub table: Vec<SpeedRow>,
     /// How the table is measured.
@@ -34,6 +37,7 @@ impl Default for Report {
             convergence: Vec::new(),
             euler: Vec::new(),
             combined_steps_to_cross: None,
+            continuum: None,
             table: Vec::new(),
             table_method: speed::HOW,
         }

@@ -229,6 +229,7 @@ fn slow_the_layered_block_of_the_reference_has_its_force() {
         centre: [0.0, 0.0],
         ring_radius: Some(10e-3),
         spacing: 3.4e-3,
+        inner_growth: 0.0,
         growth: 0.4,
         jitter: None,
     };

@@ -9,6 +9,7 @@ mod output;
 mod plot;
 mod press;
 mod section;
+mod verify;
 mod vtu;
 
 use std::path::PathBuf;

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use palpa_mesh::growth::GrowthReport;
-use palpa_tissue::{MaterialStatus, Scene, Status};
+use palpa_tissue::{MaterialStatus, Scene};
 use serde::Serialize;
 
+use super::super::words::{say_layers, status_line};
 use super::record::Recorded;
 use crate::build::{BuiltBody, in_mm};
 use crate::cli::Context;
-use crate::press::{Indentation, Phase, Sample};
+use crate::press::Phase;
+use crate::press::reference::{Indentation, Sample};
 use crate::table::Table;
 
 /// What `--json` prints and press.json holds.
@@ -53,19 +55,15 @@ pub(super) struct PressResult {
 
 pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
     PressFacts {
-        vertex: indentation.vertex,
-        at_m: indentation.at.into(),
-        direction: indentation.direction.into_inner().into(),
-        tool: tool_name(scene),
+        vertex: indentation.place.vertex,
+        at_m: indentation.place.at.into(),
+        direction: indentation.place.direction.into_inner().into(),
+        tool: scene.tool.to_string(),
         n_operated_nodes: indentation.model.operated().len(),
         mesh_size_near_tool_mm: indentation.mesh_size * 1e3,
-        tissue_depth_mm: indentation.tissue_depth * 1e3,
+        tissue_depth_mm: indentation.place.tissue_depth * 1e3,
         substeps: scene.reference.substeps,
     }
-}
-
-pub(super) fn tool_name(scene: &Scene) -> String {
-    scene.tool.to_string()
 }
 
 pub(super) fn result_of(
@@ -96,30 +94,6 @@ pub(super) fn result_of(
     }
 }
 
-/// One sentence on how far the stiffnesses can be trusted.
-fn status_line(materials: &[MaterialStatus]) -> String {
-    let named = |status: Status| -> Vec<&str> {
-        materials
-            .iter()
-            .filter(|m| m.status == status)
-            .map(|m| m.tissue.as_str())
-            .collect()
-    };
-    let parts: Vec<String> = [
-        (Status::Measured, "measured"),
-        (Status::Literature, "from literature"),
-        (Status::Assumed, "ASSUMED"),
-        (Status::Given, "given by the scene"),
-    ]
-    .into_iter()
-    .filter_map(|(status, word)| {
-        let names = named(status);
-        (!names.is_empty()).then(|| format!("{word}: {}", names.join(", ")))
-    })
-    .collect();
-    format!("stiffness {}", parts.join("; "))
-}
-
 pub(super) fn announce(
     context: &Context,
     scene_name: &str,
@@ -134,51 +108,14 @@ pub(super) fn announce(
          5 % below {:.2})",
         r.n_vertices, r.n_levels, r.n_nodes, r.n_prisms, r.scaled_jacobian.min, r.scaled_jacobian.p05
     ))?;
-    let mut table = Table::new(["layer", "levels", "thickness mm", "stiffness", "status"]);
-    for ((layer, material), spec) in r.layers.iter().zip(materials).zip(&scene.layers) {
-        let t = &layer.thickness;
-        table.push([
-            layer.name.clone(),
-            spec.levels.to_string(),
-            format!(
-                "{:.2} ({:.2}–{:.2})",
-                t.median * 1e3,
-                t.min * 1e3,
-                t.max * 1e3
-            ),
-            match (material.young, material.spring) {
-                (Some(young), _) => format!("E {:.1} kPa", young / 1e3),
-                (_, Some(spring)) => format!("k {spring:.3e} N/m per bar"),
-                _ => String::new(),
-            },
-            format!("{:?}", material.status).to_lowercase(),
-        ]);
-    }
-    context.say(table)?;
-    if let Some(worst) = &r.worst_thinning {
-        context.say(format!(
-            "layers thinned under {:.1} % of the skin's area, for want of room; most at ({}) mm, to {:.0} % of their thickness",
-            100.0 * r.thinned_share,
-            in_mm(worst.at.into()),
-            100.0 * worst.value
-        ))?;
-    }
-    if let (Some(spread), Some(worst)) = (&r.stand_off, &r.worst_stand_off) {
-        context.say(format!(
-            "rigid core stands off the bone by {:.1} mm (median; 95 % below {:.1}), most {:.1} mm under ({}) mm",
-            spread.median * 1e3,
-            spread.p95 * 1e3,
-            worst.value * 1e3,
-            in_mm(worst.at.into())
-        ))?;
-    }
+    say_layers(context, scene, r, materials)?;
     context.say(format!(
         "reference method; {} holding {} nodes at ({}) mm, where the tissue is {:.1} mm deep; skin edges near the tool \
          {:.1} mm",
-        tool_name(scene),
+        scene.tool,
         indentation.model.operated().len(),
-        in_mm(indentation.at),
-        indentation.tissue_depth * 1e3,
+        in_mm(indentation.place.at),
+        indentation.place.tissue_depth * 1e3,
         indentation.mesh_size * 1e3
     ))
 }

@@ -6,11 +6,12 @@ use palpa_mesh::{Surface, Vec3};
 use palpa_tissue::{Scene, Tool};
 
 use super::record::Recorded;
-use super::report::{PressResult, tool_name};
+use super::report::PressResult;
 use crate::build::{BuiltBody, in_mm};
 use crate::output::OutDir;
 use crate::plot::{Axis, Chart, Guide};
-use crate::press::{Indentation, Phase, Sample};
+use crate::press::Phase;
+use crate::press::reference::{Indentation, Sample};
 use crate::section::{Panel, Plane, ToolOutline, cut_body, cut_surface, draw};
 
 pub(super) fn draw_pictures(
@@ -35,7 +36,7 @@ pub(super) fn draw_pictures(
     };
     let subtitle = format!(
         "{}; skin edges {:.1} mm near it; {}",
-        tool_name(scene),
+        scene.tool,
         indentation.mesh_size * 1e3,
         result.material_status
     );
@@ -87,7 +88,7 @@ fn section_picture(
     recorded: &Recorded,
 ) -> Option<crate::plot::Picture> {
     let body = &built.growth.body;
-    let direction = indentation.direction.into_inner();
+    let direction = indentation.place.direction.into_inner();
     // Across the limb where it has an end; else along the longest way.
     let across = body
         .cut_faces
@@ -100,7 +101,7 @@ fn section_picture(
         Vec3::y()
     };
     let plane = Plane::new(
-        indentation.at,
+        indentation.place.at,
         across.unwrap_or(other).cross(&direction).cross(&direction),
         -direction,
     )?;
@@ -124,18 +125,18 @@ fn section_picture(
             title: "at rest",
             section: &rest,
             bones: &bones,
-            tool: Some(tool(indentation.at)),
+            tool: Some(tool(indentation.place.at)),
         },
         Panel {
             title: &pressed_title,
             section: &pressed,
             bones: &bones,
-            tool: Some(tool(indentation.at + direction * (depth * 1e-3))),
+            tool: Some(tool(indentation.place.at + direction * (depth * 1e-3))),
         },
     ];
     let subtitle = format!(
         "through ({}) mm, the press direction downward",
-        in_mm(indentation.at)
+        in_mm(indentation.place.at)
     );
     Some(draw("Section through the press point", &subtitle, &panels))
 }

@@ -1,0 +1,213 @@
+//! A sixth of a round body between two planes of symmetry, for problems that are the same all round an axis.
+//!
+//! ```text
+//!            .·'\           rings of vertices about the corner; the one round the inner disc is a polygon with the
+//!        .·'  /\ \          *area* of its circle
+//!    .·' \  /  _\ \
+//!   o─────┴──'────+--      base fixed, rim free, both straight sides planes of symmetry
+//! ```
+
+use palpa_fem::Supports;
+use palpa_mesh::{CutFace, LayeredBody, Surface, Vec3};
+
+/// Sectors in a turn.
+pub(crate) const N_SECTORS: f64 = 6.0;
+const ANGLE: f64 = std::f64::consts::TAU / N_SECTORS;
+
+/// Where the disc is finest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Finest {
+    /// At its rim, where a punch has its edge.
+    Rim,
+    /// All over, for contact that ends somewhere in it.
+    Inside,
+    /// All over and for some radii around, for displacements there.
+    Around,
+}
+
+impl Finest {
+    /// Over so many radii of the disc edges begin to lengthen from where they are finest.
+    fn reach(self) -> f64 {
+        match self {
+            Self::Rim => 0.5,
+            Self::Inside => 1.0,
+            Self::Around => 2.0,
+        }
+    }
+}
+
+/// A sixth of a disc of layers on a rigid base.
+pub(crate) struct Sector {
+    pub(crate) body: LayeredBody,
+    pub(crate) supports: Supports,
+    /// Radius of the inner disc, m.
+    pub(crate) ring: f64,
+    /// Vertices of the inner disc, ascending.
+    pub(crate) patch: Vec<u32>,
+}
+
+impl Sector {
+    /// With an inner disc of radius `ring` whose rim has `n` edges, and layers of the given thicknesses, m.
+    pub(crate) fn new(
+        ring: f64,
+        n: usize,
+        finest: Finest,
+        width: f64,
+        thicknesses: &[f64],
+    ) -> Self {
+        let h = ring / n as f64;
+        let mut skin = Surface {
+            points: vec![Vec3::zeros()],
+            triangles: Vec::new(),
+        };
+        let angle = ANGLE / n as f64;
+        let equal_area = (angle / angle.sin()).sqrt();
+        let mut inner = Ring { first: 0, n: 0 };
+        let grading = Grading {
+            h,
+            reach: finest.reach() * ring,
+        };
+        // An angle of a radian, so that n rings of equal steps are a lattice of nearly equilateral triangles.
+        let n_at = |r: f64| (r / grading.spacing((r - ring).abs())).round() as usize;
+        let inside = match finest {
+            Finest::Rim => grading.divide(0.0, ring, 1),
+            Finest::Inside | Finest::Around => (0..=n).map(|i| i as f64 * h).collect(),
+        };
+        for x in inside[1..inside.len() - 1].iter().rev() {
+            let r = ring - x;
+            let edges = match finest {
+                Finest::Rim => n_at(r),
+                Finest::Inside | Finest::Around => (r / h).round() as usize,
+            };
+            inner = add_ring(&mut skin, inner, r, edges.max(1));
+        }
+        inner = add_ring(&mut skin, inner, ring * equal_area, n);
+        let patch = (0..skin.points.len() as u32).collect();
+        for x in &grading.divide(0.0, width - ring, 1)[1..] {
+            let r = ring + x;
+            inner = add_ring(&mut skin, inner, r, n_at(r).max(3));
+        }
+        let mut depths = vec![0.0];
+        let mut interval_layer = Vec::new();
+        for (layer, thickness) in thicknesses.iter().enumerate() {
+            let top = depths[depths.len() - 1];
+            let least = n.div_ceil(4);
+            let levels = grading.divide(top, top + thickness, least);
+            interval_layer.extend(std::iter::repeat_n(layer, levels.len() - 1));
+            depths.extend(&levels[1..]);
+        }
+        let body = LayeredBody {
+            positions: skin
+                .points
+                .iter()
+                .flat_map(|p| depths.iter().map(move |depth| p - Vec3::z() * *depth))
+                .collect(),
+            n_levels: depths.len(),
+            interval_layer,
+            layer_names: (1..=thicknesses.len()).map(|l| format!("layer {l}")).collect(),
+            cut_faces: sides(&skin),
+            skin,
+        };
+        let mut supports = Supports::on_base(&body);
+        for side in &body.cut_faces {
+            for &v in &side.vertices {
+                let nodes = (0..body.n_levels).map(|l| body.node(v as usize, l));
+                supports.planes.extend(nodes.map(|node| (node, side.normal)));
+            }
+        }
+        Self {
+            body,
+            supports,
+            ring,
+            patch,
+        }
+    }
+}
+
+/// Edges that lengthen with the distance x from the load as `h (1 + x/x₀)^(4/3)`: as its field decays, that spends vertices
+/// where they save most error.
+struct Grading {
+    h: f64,
+    reach: f64,
+}
+
+impl Grading {
+    fn spacing(&self, x: f64) -> f64 {
+        self.h * (1.0 + x / self.reach).powf(4.0 / 3.0)
+    }
+
+    /// Edges from 0 to x.
+    fn count(&self, x: f64) -> f64 {
+        3.0 * self.reach / self.h * (1.0 - (1.0 + x / self.reach).powf(-1.0 / 3.0))
+    }
+
+    /// Inverse of `count`.
+    fn position(&self, count: f64) -> f64 {
+        self.reach * ((1.0 - count * self.h / (3.0 * self.reach)).powi(-3) - 1.0)
+    }
+
+    /// Divides an interval into at least so many edges; both ends included.
+    fn divide(&self, from: f64, to: f64, least: usize) -> Vec<f64> {
+        let (a, b) = (self.count(from), self.count(to));
+        let n = ((b - a).round() as usize).max(least);
+        let mut at: Vec<f64> = (0..=n)
+            .map(|i| self.position(a + (b - a) * i as f64 / n as f64))
+            .collect();
+        // But for rounding they are.
+        (at[0], at[n]) = (from, to);
+        at
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Ring {
+    first: usize,
+    /// Number of edges.
+    n: usize,
+}
+
+/// Adds an arc of `n` edges, and the triangles between it and the one inside.
+fn add_ring(skin: &mut Surface, inner: Ring, radius: f64, n: usize) -> Ring {
+    let outer = Ring {
+        first: skin.points.len(),
+        n,
+    };
+    for k in 0..=n {
+        let (sin, cos) = (ANGLE * k as f64 / n as f64).sin_cos();
+        skin.points.push(Vec3::new(cos, sin, 0.0) * radius);
+    }
+    let (mut i, mut j) = (0, 0);
+    while i < inner.n || j < n {
+        let [a, b] = [inner.first + i, outer.first + j].map(|v| v as u32);
+        // The next edge is that whose end comes first, the outer one if they are level.
+        if i == inner.n || (j < n && (j + 1) * inner.n <= (i + 1) * n) {
+            skin.triangles.push([a, b, b + 1]);
+            j += 1;
+        } else {
+            skin.triangles.push([a, b, a + 1]);
+            i += 1;
+        }
+    }
+    outer
+}
+
+/// The straight sides.
+fn sides(skin: &Surface) -> Vec<CutFace> {
+    [0.0, ANGLE]
+        .map(|angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            let along = Vec3::new(cos, sin, 0.0);
+            let vertices = (0..skin.points.len() as u32).filter(|&v| {
+                let p = skin.points[v as usize];
+                (p - along * along.dot(&p)).norm() <= 1e-9 * p.norm()
+            });
+            let out = if angle == 0.0 { -1.0 } else { 1.0 };
+            CutFace {
+                vertices: vertices.collect(),
+                normal: Vec3::new(-sin, cos, 0.0) * out,
+                point: Vec3::zeros(),
+                is_flat: true,
+            }
+        })
+        .to_vec()
+}

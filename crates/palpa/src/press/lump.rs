@@ -1,0 +1,253 @@
+//! Lumps as they are looked at: their share of every prism, and their surface as it moves with the tissue.
+
+use palpa_fem::lump::{Lump, LumpShape};
+use palpa_mesh::{LayeredBody, Surface, Vec3};
+use palpa_tissue::Scene;
+
+use crate::build::{mended, read_in_metres};
+
+/// Samples along each side of a triangle, and over the height of a prism.
+const IN_PLANE: usize = 4;
+const IN_DEPTH: usize = 4;
+/// Corners round the surface of a lump of a simple shape, and from pole to pole.
+const AROUND: usize = 48;
+const UPWARD: usize = 24;
+
+/// Share of every prism that is lump, by volume, sampled; empty without lumps. `[n_prisms]`
+pub fn lump_shares(body: &LayeredBody, lumps: &[Lump]) -> Vec<f64> {
+    if lumps.is_empty() {
+        return Vec::new();
+    }
+    let n_intervals = body.n_levels - 1;
+    (0..body.n_prisms())
+        .map(|p| {
+            let nodes = body.prism(p / n_intervals, p % n_intervals);
+            let corners = nodes.map(|n| body.positions[n]);
+            let middle = corners.iter().sum::<Vec3>() / 6.0;
+            let reach = (corners.iter().map(|c| (c - middle).norm())).fold(0.0, f64::max);
+            let nearby: Vec<&Lump> = (lumps.iter())
+                .filter(|lump| {
+                    let (centre, radius) = lump.bounding_sphere();
+                    (centre - middle).norm() < radius + reach
+                })
+                .collect();
+            if nearby.is_empty() {
+                return 0.0;
+            }
+            let (mut sum, mut n) = (0.0, 0.0);
+            for x in samples(&corners) {
+                // Where lumps overlap there is no more than one.
+                let left: f64 = nearby.iter().map(|lump| 1.0 - lump.fraction(&x)).product();
+                sum += 1.0 - left;
+                n += 1.0;
+            }
+            sum / n
+        })
+        .collect()
+}
+
+/// Points spread evenly over a prism.
+fn samples(corners: &[Vec3; 6]) -> impl Iterator<Item = Vec3> + '_ {
+    let n = IN_PLANE as f64;
+    let upright = (0..IN_PLANE).flat_map(move |i| {
+        (0..IN_PLANE - i).map(move |j| [i as f64 + 1.0 / 3.0, j as f64 + 1.0 / 3.0])
+    });
+    let turned = (0..IN_PLANE - 1).flat_map(move |i| {
+        (0..IN_PLANE - 1 - i).map(move |j| [i as f64 + 2.0 / 3.0, j as f64 + 2.0 / 3.0])
+    });
+    upright.chain(turned).flat_map(move |[i, j]| {
+        let weights = [1.0 - (i + j) / n, i / n, j / n];
+        (0..IN_DEPTH).map(move |k| {
+            let down = (k as f64 + 0.5) / IN_DEPTH as f64;
+            (0..3)
+                .map(|c| corners[c].lerp(&corners[c + 3], down) * weights[c])
+                .sum()
+        })
+    })
+}
+
+/// The surface of a lump at rest. m
+///
+/// # Errors
+/// When the file of a mesh cannot be read any more.
+pub fn lump_surface(
+    scene: &Scene,
+    given: &palpa_tissue::Lump,
+    lump: &Lump,
+) -> anyhow::Result<Surface> {
+    if let (palpa_tissue::LumpShape::Mesh(path), LumpShape::Mesh(mesh)) =
+        (&given.shape, lump.shape())
+    {
+        // What there is to note was noted when the lump was made.
+        let mut notes = Vec::new();
+        let mut surface = read_in_metres(path, scene.body.unit, &mut notes)?;
+        surface = mended(&surface, path, &mut notes);
+        let shift = lump.pose().translation.vector - mesh.centroid();
+        surface.points.iter_mut().for_each(|p| *p += shift);
+        return Ok(surface);
+    }
+    let (middle, reach) = lump.bounding_sphere();
+    let axes = lump.pose().rotation;
+    let point = |j: usize, i: usize| {
+        let up = std::f64::consts::PI * (j as f64 / UPWARD as f64 - 0.5);
+        let round = std::f64::consts::TAU * i as f64 / AROUND as f64;
+        // The poles lie on the long axis.
+        let direction = Vec3::new(up.sin(), up.cos() * round.cos(), up.cos() * round.sin());
+        middle + axes * direction * border(lump, &middle, &(axes * direction), 2.0 * reach)
+    };
+    let mut points = vec![point(0, 0)];
+    points.extend((1..UPWARD).flat_map(|j| (0..AROUND).map(move |i| (j, i))).map(|(j, i)| point(j, i)));
+    points.push(point(UPWARD, 0));
+    let last = points.len() as u32 - 1;
+    let at = |j: usize, i: usize| match j {
+        0 => 0,
+        UPWARD => last,
+        _ => (1 + (j - 1) * AROUND + i % AROUND) as u32,
+    };
+    let triangles = (0..UPWARD)
+        .flat_map(|j| (0..AROUND).map(move |i| (j, i)))
+        .flat_map(|(j, i)| {
+            [
+                [at(j, i), at(j, i + 1), at(j + 1, i + 1)],
+                [at(j, i), at(j + 1, i + 1), at(j + 1, i)],
+            ]
+        })
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    Ok(Surface { points, triangles })
+}
+
+/// How far a convex lump reaches from its middle in a direction. m
+fn border(lump: &Lump, middle: &Vec3, direction: &Vec3, most: f64) -> f64 {
+    let (mut inside, mut outside) = (0.0, most);
+    for _ in 0..50 {
+        let half = f64::midpoint(inside, outside);
+        if lump.signed_distance(&(middle + direction * half)) < 0.0 {
+            inside = half;
+        } else {
+            outside = half;
+        }
+    }
+    f64::midpoint(inside, outside)
+}
+
+/// Points inside a body that move with it.
+#[derive(Debug)]
+pub struct Embedded {
+    /// For each point four nodes and their weights.
+    nodes: Vec<[usize; 4]>,
+    weights: Vec<[f64; 4]>,
+}
+
+impl Embedded {
+    /// Finds each of the points (m, at rest) among the tetrahedra that prisms divide into; one outside the body goes with the
+    /// nearest.
+    pub fn new(body: &LayeredBody, points: &[Vec3]) -> Self {
+        let mut found: Vec<(f64, [usize; 4], [f64; 4])> =
+            vec![(f64::NEG_INFINITY, [0; 4], [0.0; 4]); points.len()];
+        let bounds = points.iter().fold(
+            (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)),
+            |(lo, hi), p| (lo.inf(p), hi.sup(p)),
+        );
+        for t in 0..body.skin.triangles.len() {
+            for i in 0..body.n_levels - 1 {
+                let prism = body.prism(t, i);
+                let corners = prism.map(|n| body.positions[n]);
+                let (lo, hi) = corners
+                    .iter()
+                    .fold((corners[0], corners[0]), |(lo, hi), c| (lo.inf(c), hi.sup(c)));
+                if (0..3).any(|k| hi[k] < bounds.0[k] || lo[k] > bounds.1[k]) {
+                    continue;
+                }
+                for tet in [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]] {
+                    let Some(inverse) = inverse(&tet.map(|k| corners[k])) else {
+                        continue;
+                    };
+                    for (point, best) in points.iter().zip(&mut found) {
+                        let w = inverse * (point - corners[tet[0]]);
+                        let weights = [1.0 - w.sum(), w.x, w.y, w.z];
+                        // Inside, the least weight is positive; the greatest least is the nearest.
+                        let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
+                        if least > best.0 {
+                            *best = (least, tet.map(|k| prism[k]), weights);
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            nodes: found.iter().map(|f| f.1).collect(),
+            weights: found
+                .iter()
+                .map(|f| {
+                    let inside = f.2.map(|w| w.max(0.0));
+                    let sum: f64 = inside.iter().sum();
+                    inside.map(|w| if sum > 0.0 { w / sum } else { 0.0 })
+                })
+                .collect(),
+        }
+    }
+
+    /// How far each point moves with the nodes. m
+    pub fn displacements(&self, of_nodes: &[Vec3]) -> Vec<Vec3> {
+        (self.nodes.iter().zip(&self.weights))
+            .map(|(nodes, weights)| (nodes.iter().zip(weights)).map(|(&n, &w)| of_nodes[n] * w).sum())
+            .collect()
+    }
+}
+
+/// The matrix that gives the weights of the last three corners; `None` for a flat tetrahedron.
+fn inverse(corners: &[Vec3; 4]) -> Option<nalgebra::Matrix3<f64>> {
+    let edges = [1, 2, 3].map(|k| corners[k] - corners[0]);
+    nalgebra::Matrix3::from_columns(&edges).try_inverse()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpa_fem::shape::{Pose, Sphere};
+    use palpa_mesh::generate;
+
+    fn block() -> LayeredBody {
+        let skin = generate::block_skin([0.04, 0.04], 0.005);
+        let layer = palpa_mesh::LayerSpec {
+            name: "all".into(),
+            thickness: Some(palpa_mesh::growth::Thickness::Constant(0.02)),
+            n_levels: 4,
+            min_thickness: 0.0,
+        };
+        let params = palpa_mesh::GrowthParams {
+            layers: vec![layer],
+            cut_out: None,
+        };
+        palpa_mesh::grow(&skin, &[], &params).unwrap().body
+    }
+
+    #[test]
+    fn shares_of_a_ball_add_up_to_its_volume() {
+        let body = block();
+        let pose = Pose::translation(0.001, 0.002, -0.01);
+        let shape = LumpShape::Sphere(Sphere::new(0.006).unwrap());
+        let lump = Lump::new(shape, pose, 0.0, 1).unwrap();
+        let shares = lump_shares(&body, std::slice::from_ref(&lump));
+        // All prisms of the block are alike.
+        let each = 0.04 * 0.04 * 0.02 / body.n_prisms() as f64;
+        let volume = shares.iter().sum::<f64>() * each;
+        assert!((volume / lump.volume() - 1.0).abs() < 0.05, "{volume} of {}", lump.volume());
+    }
+
+    #[test]
+    fn embedded_points_follow_an_affine_map() {
+        let body = block();
+        let points = [
+            Vec3::new(0.0012, -0.0034, -0.0071),
+            Vec3::new(-0.011, 0.004, -0.0002),
+        ];
+        let stretch = nalgebra::Matrix3::new(0.1, 0.2, 0.0, -0.3, 0.05, 0.1, 0.0, 0.4, -0.2);
+        let of_nodes: Vec<Vec3> = body.positions.iter().map(|p| stretch * p).collect();
+        let moved = Embedded::new(&body, &points).displacements(&of_nodes);
+        for (moved, point) in moved.iter().zip(&points) {
+            assert!((moved - stretch * point).norm() < 1e-15, "{moved}");
+        }
+    }
+}

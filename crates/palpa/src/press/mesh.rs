@@ -1,0 +1,436 @@
+//! The body made fine where it is pressed and where lumps lie, and the skin under a bonded disc.
+
+use nalgebra::Unit;
+use palpa_fem::lump::{Lump, LumpShape};
+use palpa_mesh::refine::{
+    Circle, RefineParams, Refined, imprint_circle, mean_depths, near_depth, near_points, parts_for,
+    refine, split_levels,
+};
+use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use palpa_tissue::{ContactShape, Scene, Target, Tool};
+
+use super::place::mesh_size_near;
+use super::{Place, nodes_under_disc};
+use crate::build::{BuiltBody, in_mm, nearest};
+
+/// Most levels that splitting leads to: the cost grows with their cube.
+const MOST_LEVELS: usize = 24;
+/// How near the radius of the circle with the patch's area comes to the disc's, and how often that is tried.
+const RADIUS_TOLERANCE: f64 = 1e-4;
+const TRIES: usize = 5;
+/// Columns draw together towards a bone: for a lump there the skin is refined more widely, and less finely, by up to this.
+const MOST_CONVERGENCE: f64 = 4.0;
+
+/// Halving leaves triangles whose longest edge is from half to the whole of what was asked for; of this multiple, the edges
+/// have the wanted length in the mean.
+const SLACK: f64 = 1.4;
+
+/// An interval that is too high by less than this factor is not worth another level in the whole body.
+const SPARED: f64 = 1.05;
+
+/// A body fit to be pressed.
+#[derive(Debug)]
+pub struct PressedBody {
+    /// The refined body. Its first vertices are those of the body as it was grown.
+    pub body: LayeredBody,
+    /// Where it is pressed: at the vertex nearest to where the scene says.
+    pub place: Place,
+    /// For each vertex to which share of their thickness the layers were thinned. `[n_vertices]`
+    pub thinning: Vec<f64>,
+    /// How far the base stands off the bone, m; empty without bones. `[n_vertices]`
+    pub stand_off: Vec<f64>,
+    /// The skin that is bonded to a disc.
+    pub patch: Option<Patch>,
+    /// Mean length of the skin's edges near the tool. m
+    pub mesh_size: f64,
+    /// Whether everything is as fine as it is wanted to be.
+    pub is_resolved: bool,
+}
+
+/// The skin that is bonded to a disc.
+#[derive(Debug, Clone)]
+pub struct Patch {
+    /// Its skin vertices, ascending.
+    pub vertices: Vec<usize>,
+    /// For each of them the area of the patch that it stands for. m²
+    pub areas: Vec<f64>,
+    /// Radius of the circle with the patch's area, seen along the press. m
+    pub radius: f64,
+}
+
+impl PressedBody {
+    /// Refines the scene's body as its `[mesh]` says.
+    ///
+    /// # Errors
+    /// When direction or depth do not fit the place.
+    pub fn build(
+        scene: &Scene,
+        built: &BuiltBody,
+        lumps: &[Lump],
+        notes: &mut Vec<String>,
+    ) -> anyhow::Result<Self> {
+        let grown = &built.growth.body;
+        // What is wrong with the place is said before any work, and once.
+        let mut vertex = built.press_vertex;
+        let coarse = Place::find(scene, grown, vertex, &mut Vec::new())?;
+        let mut refined = refine_near(scene, built, &coarse, lumps, notes);
+        if matches!(scene.press.target, Target::Point(_)) {
+            vertex = nearest(&refined.body.skin, built.press_at);
+        }
+        let place = Place::find(scene, &refined.body, vertex, notes)?;
+        let patch = match scene.tool {
+            Tool::Disc { radius } => Some(bond(scene, &mut refined, &place, radius, notes)),
+            _ => None,
+        };
+        let thinning = refined.interpolate(&built.growth.thinning);
+        let stand_off = refined.interpolate(&built.growth.stand_off);
+        let is_fine = refined.n_too_large == 0;
+        if !is_fine {
+            notes.push(format!(
+                "{} skin triangles are larger than wanted near the tool or a lump, since [mesh] max_vertices = {} was \
+                 reached",
+                refined.n_too_large, scene.mesh.max_vertices
+            ));
+        }
+        let (body, is_split) = split_near(scene, refined.body, &place, lumps);
+        if !is_split {
+            notes.push(format!(
+                "levels are higher than wanted under the tool or round a lump, since there are {MOST_LEVELS} already"
+            ));
+        }
+        Ok(Self {
+            mesh_size: mesh_size_near(&body, place.at, scene.tool.contact_radius()),
+            body,
+            place,
+            thinning,
+            stand_off,
+            patch,
+            is_resolved: is_fine && is_split,
+        })
+    }
+}
+
+/// More columns near the tool and above lumps.
+fn refine_near(
+    scene: &Scene,
+    built: &BuiltBody,
+    place: &Place,
+    lumps: &[Lump],
+    notes: &mut Vec<String>,
+) -> Refined {
+    let body = &built.growth.body;
+    let params = RefineParams {
+        max_vertices: scene.mesh.max_vertices,
+        ..RefineParams::default()
+    };
+    if !scene.mesh.refine {
+        return refine(body, &params, |_, _| f64::INFINITY);
+    }
+    let growth = scene.mesh.growth;
+    let mut wishes: Vec<Box<dyn Fn(u32, &[Vec3; 3]) -> f64>> = Vec::new();
+    if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
+        let (points, radius) = footprint(scene, built.press_at, &place.direction);
+        wishes.push(Box::new(near_points(&points, radius, SLACK * h, growth)));
+    }
+    if !lumps.is_empty() {
+        let shadows = Shadows::new(body);
+        for (lump, given) in lumps.iter().zip(&scene.lumps) {
+            let Some(h) = scene.mesh.near_lump_of(given) else {
+                notes.push(format!(
+                    "the mesh is not refined round the lump \"{}\", whose size it does not know; set [mesh] near_lumps",
+                    given.name
+                ));
+                continue;
+            };
+            let (points, radius) = backbone(lump);
+            for point in points {
+                let shadow = shadows.of(point);
+                let wide = shadow.convergence;
+                wishes.push(Box::new(near_points(
+                    &[shadow.on_skin],
+                    radius * wide,
+                    SLACK * h * wide,
+                    growth,
+                )));
+            }
+        }
+    }
+    refine(body, &params, move |t, corners| {
+        wishes
+            .iter()
+            .map(|wish| wish(t, corners))
+            .fold(f64::INFINITY, f64::min)
+    })
+}
+
+/// Points of the skin that the tool presses on, and how far round them it reaches. m
+fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
+    // A round tool sinks in: the circle in which it cuts the skin's plane at its deepest.
+    let sunk = |r: f64| (scene.press.depth * (2.0 * r - scene.press.depth).max(0.0)).sqrt();
+    let (reach, radius) = match scene.tool {
+        Tool::Disc { radius } => ([0.0; 2], radius),
+        Tool::Node => ([0.0; 2], 0.0),
+        Tool::Contact(tool) => match tool.shape {
+            ContactShape::Sphere { radius } => ([0.0; 2], sunk(radius)),
+            ContactShape::FlatPunch { radius, .. } => ([0.0; 2], radius),
+            ContactShape::Capsule { radius, length } => ([length / 2.0, 0.0], sunk(radius)),
+            ContactShape::Box {
+                size: [x, y, _], ..
+            } => ([x / 2.0, y / 2.0], 0.0),
+            ContactShape::Fingertip { radii: [a, b, c] } => {
+                ([0.0; 2], sunk((a * a / c).max(b * b / c)))
+            }
+        },
+    };
+    let mut points = vec![at];
+    if let Some(tool) = scene.tool.contact() {
+        let axes = tool.axes(direction.into_inner().into()).map(Vec3::from);
+        let h = scene.mesh.near_tool_of(&scene.tool).unwrap_or(1e-3);
+        let steps = reach.map(|r| (r / h).ceil() as i32);
+        for i in -steps[0]..=steps[0] {
+            for j in -steps[1]..=steps[1] {
+                let along = reach[0] * f64::from(i) / f64::from(steps[0].max(1));
+                let across = reach[1] * f64::from(j) / f64::from(steps[1].max(1));
+                points.push(at + axes[0] * along + axes[1] * across);
+            }
+        }
+    }
+    (points, radius)
+}
+
+/// Points along a lump, and the radius of balls round them that hold it. m
+fn backbone(lump: &Lump) -> (Vec<Vec3>, f64) {
+    let (middle, bound) = lump.bounding_sphere();
+    let (half_length, radius) = match lump.shape() {
+        LumpShape::Capsule(shape) => (shape.length() / 2.0, shape.radius()),
+        LumpShape::Ellipsoid(shape) => {
+            // Its first axis is the one that is usually long; the others are held by the radius.
+            let across = shape.radii().y.max(shape.radii().z);
+            ((shape.radii().x - across).max(0.0), across)
+        }
+        LumpShape::Sphere(_) | LumpShape::Mesh(_) => (0.0, bound),
+    };
+    let axis = lump.pose().rotation * Vec3::x();
+    let n = (half_length / radius).ceil() as i32;
+    let at = |i: i32| middle + axis * (half_length * f64::from(i) / f64::from(n.max(1)));
+    ((-n..=n).map(at).collect(), radius + lump.transition() / 2.0)
+}
+
+/// Finds the skin above a place inside.
+struct Shadows<'a> {
+    body: &'a LayeredBody,
+    levels: Vec<(Surface, SurfaceIndex)>,
+}
+
+/// The skin above a place inside.
+struct Shadow {
+    on_skin: Vec3,
+    /// The triangle of the skin whose columns hold the place.
+    triangle: usize,
+    /// How much wider the columns are at the skin than at the place.
+    convergence: f64,
+}
+
+impl<'a> Shadows<'a> {
+    fn new(body: &'a LayeredBody) -> Self {
+        let levels = (0..body.n_levels)
+            .map(|l| {
+                let surface = Surface {
+                    points: (0..body.n_vertices())
+                        .map(|v| body.positions[body.node(v, l)])
+                        .collect(),
+                    triangles: body.skin.triangles.clone(),
+                };
+                let index = SurfaceIndex::build(&surface);
+                (surface, index)
+            })
+            .collect();
+        Self { body, levels }
+    }
+
+    fn of(&self, place: Vec3) -> Shadow {
+        let nearest = self
+            .levels
+            .iter()
+            .filter_map(|(surface, index)| {
+                let closest = index.closest(place)?;
+                let distance = (closest.point - place).norm();
+                Some((distance, surface, closest))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, level, closest)) = nearest else {
+            return Shadow {
+                on_skin: place,
+                triangle: 0,
+                convergence: 1.0,
+            };
+        };
+        let t = closest.triangle as usize;
+        let [a, b, c] = level.corners(t);
+        let part = |p: Vec3, q: Vec3| (p - closest.point).cross(&(q - closest.point)).norm();
+        let weights = [part(b, c), part(c, a), part(a, b)];
+        let sum: f64 = weights.iter().sum();
+        let on_skin = (self.body.skin.corners(t).iter().zip(weights))
+            .map(|(p, w)| p * (w / sum))
+            .sum();
+        let areas = [&self.body.skin, level].map(|s| s.area_vector(t).norm());
+        Shadow {
+            on_skin,
+            triangle: t,
+            convergence: (areas[0] / areas[1]).sqrt().clamp(1.0, MOST_CONVERGENCE),
+        }
+    }
+}
+
+/// Splits levels under the tool and round lumps; says whether they are as low as wanted now.
+fn split_near(
+    scene: &Scene,
+    body: LayeredBody,
+    place: &Place,
+    lumps: &[Lump],
+) -> (LayeredBody, bool) {
+    if !scene.mesh.refine {
+        return (body, true);
+    }
+    let growth = scene.mesh.growth;
+    let mut parts = vec![1; body.n_levels - 1];
+    let mut wish = |depths: &[f64], depth: f64, radius: f64, h: f64| {
+        let (wanted, is_met) = parts_for(depths, near_depth(depth, radius, SPARED * h, growth), MOST_LEVELS);
+        for (n, wanted) in parts.iter_mut().zip(wanted) {
+            *n = wanted.max(*n);
+        }
+        is_met
+    };
+    let mut is_met = true;
+    if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
+        let depths = mean_depths(&body, &[place.vertex as u32]);
+        is_met &= wish(&depths, 0.0, 0.0, h);
+    }
+    if !lumps.is_empty() {
+        let shadows = Shadows::new(&body);
+        for (lump, given) in lumps.iter().zip(&scene.lumps) {
+            let Some(h) = scene.mesh.near_lump_of(given) else {
+                continue;
+            };
+            let (points, radius) = backbone(lump);
+            for point in points {
+                let shadow = shadows.of(point);
+                let depths = mean_depths(&body, &body.skin.triangles[shadow.triangle]);
+                let depth = (point - shadow.on_skin).norm();
+                is_met &= wish(&depths, depth, radius, h);
+            }
+        }
+    }
+    is_met &= parts.iter().sum::<usize>() < MOST_LEVELS;
+    if parts.iter().all(|&n| n == 1) {
+        return (body, is_met);
+    }
+    (split_levels(&body, &parts).body, is_met)
+}
+
+/// The skin that a disc holds. On a body that may be refined the disc's edge becomes a ring of vertices, on a circle that
+/// gives the patch the disc's area.
+fn bond(
+    scene: &Scene,
+    refined: &mut Refined,
+    place: &Place,
+    radius: f64,
+    notes: &mut Vec<String>,
+) -> Patch {
+    if scene.mesh.refine {
+        match imprinted(refined, place, radius) {
+            Ok((imprint, triangles, effective)) => {
+                *refined = imprint;
+                let corners = triangles.iter().flat_map(|&t| refined.body.skin.triangles[t as usize]);
+                let mut vertices: Vec<usize> = corners.map(|v| v as usize).collect();
+                vertices.sort_unstable();
+                vertices.dedup();
+                return Patch {
+                    areas: areas_of(&refined.body, &triangles, vertices.iter().copied()),
+                    vertices,
+                    radius: effective,
+                };
+            }
+            Err(why) => notes.push(format!(
+                "the disc's edge could not be made a ring of vertices, so that its radius is that of the vertices under it: \
+                 {why}"
+            )),
+        }
+    }
+    let body = &refined.body;
+    let nodes = nodes_under_disc(body, place.vertex, place.at, &place.direction, radius);
+    let mut is_in = vec![false; body.n_vertices()];
+    for &node in &nodes {
+        is_in[node / body.n_levels] = true;
+    }
+    let triangles: Vec<u32> = (0..body.skin.triangles.len() as u32)
+        .filter(|&t| {
+            let corners = body.skin.triangles[t as usize];
+            corners.iter().all(|&v| is_in[v as usize])
+        })
+        .collect();
+    let area = seen_area(body, &triangles, &place.direction);
+    let patch = Patch {
+        // Vertices that hang on edges or stand alone have no area.
+        areas: areas_of(body, &triangles, nodes.iter().map(|node| node / body.n_levels)),
+        vertices: nodes.iter().map(|node| node / body.n_levels).collect(),
+        radius: (area / std::f64::consts::PI).sqrt(),
+    };
+    notes.push(format!(
+        "{} skin vertices lie under the disc of radius {:.1} mm at ({}) mm; they hold a patch of radius {:.1} mm",
+        nodes.len(),
+        radius * 1e3,
+        in_mm(place.at),
+        patch.radius * 1e3,
+    ));
+    patch
+}
+
+/// The refined body with the disc's edge in its skin, the triangles inside, and the radius of their area.
+fn imprinted(
+    refined: &Refined,
+    place: &Place,
+    radius: f64,
+) -> Result<(Refined, Vec<u32>, f64), palpa_mesh::refine::ImprintError> {
+    let mut circle = Circle {
+        point: place.at,
+        direction: place.direction.into_inner(),
+        radius,
+    };
+    let mut tries = 0;
+    loop {
+        let imprint = imprint_circle(&refined.body, &circle)?;
+        tries += 1;
+        let ratio = radius / imprint.effective_radius;
+        if (ratio - 1.0).abs() < RADIUS_TOLERANCE || tries == TRIES {
+            let triangles = imprint.inside;
+            return Ok((
+                imprint.refined.after(refined),
+                triangles,
+                imprint.effective_radius,
+            ));
+        }
+        circle.radius *= ratio;
+    }
+}
+
+/// The area of the triangles that each of the vertices stands for. m²
+fn areas_of(
+    body: &LayeredBody,
+    triangles: &[u32],
+    vertices: impl Iterator<Item = usize>,
+) -> Vec<f64> {
+    let mut areas = vec![0.0; body.n_vertices()];
+    for &t in triangles {
+        let share = body.skin.area_vector(t as usize).norm() / 3.0;
+        for v in body.skin.triangles[t as usize] {
+            areas[v as usize] += share;
+        }
+    }
+    vertices.map(|v| areas[v]).collect()
+}
+
+fn seen_area(body: &LayeredBody, triangles: &[u32], direction: &Unit<Vec3>) -> f64 {
+    let seen = |&t: &u32| body.skin.area_vector(t as usize).dot(direction).abs();
+    triangles.iter().map(seen).sum()
+}

@@ -1,0 +1,387 @@
+//! The indentation with the reference method: bars between nodes, and a tool whose nodes are bonded to it.
+
+use anyhow::bail;
+use palpa_mesh::quality::prism_shapes;
+use palpa_mesh::{LayeredBody, Vec3};
+use palpa_springs::{
+    Constraints, Corrections, EulerParams, InterfaceBars, LayerStiffness, Method, Outcome, Solver,
+    SpringModel, SpringParams, SpringState, StepParams, Workspace, step,
+};
+use palpa_tissue::{CutFaces, InPlane, Law, Scene, Tool};
+use serde::Serialize;
+
+use super::place::mesh_size_near;
+use super::{Phase, Place, Waypoint, tidy, waypoints};
+use crate::build::{BuiltBody, in_mm};
+
+/// Samples of a rest, evenly spread: springs do not relax, so that it is all the same.
+const HOLD_SAMPLES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
+/// Fewer skin nodes under a disc are worth a note: from 7 to 35 nodes the force on a real forearm changed by a quarter.
+const ENOUGH_NODES: usize = 20;
+/// Heights of a level over the length of its edges within which bars stand for a Young's modulus
+/// (`docs/theory/spring_stiffness.md`).
+const SOUND_ASPECT: std::ops::RangeInclusive<f64> = 0.5..=1.2;
+
+/// An indentation that is set up: what does not change while it runs.
+#[derive(Debug)]
+pub struct Indentation {
+    /// The spring model of the body under the tool.
+    pub model: SpringModel,
+    /// Where it is pressed.
+    pub place: Place,
+    /// Mean length of the skin's edges near the tool. m
+    pub mesh_size: f64,
+    /// What a user should know beside the result.
+    pub notes: Vec<String>,
+    params: StepParams,
+    path: Vec<Waypoint>,
+}
+
+/// One line of the result. Forces act on the tool.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sample {
+    /// Part of the indentation.
+    pub phase: Phase,
+    /// Time since the start. s
+    pub time_s: f64,
+    /// Depth of the tool along its direction. mm
+    pub depth_mm: f64,
+    /// Force against the tool's direction: what pushes back. N
+    pub force_n: f64,
+    /// Components of the force on the tool. N
+    pub force_x_n: f64,
+    /// See `force_x_n`.
+    pub force_y_n: f64,
+    /// See `force_x_n`.
+    pub force_z_n: f64,
+    /// Pushing back by the bars as they are stretched now; its difference to `force_n` is what the increments leave out.
+    pub bar_force_n: f64,
+    /// (3.18) to the letter, along the direction: the reaction before the free nodes moved over the step's duration. It
+    /// depends on the step; for comparison only, never sent to a device. N/ms
+    pub literal_n_per_ms: f64,
+    /// Largest force on a free node that is not in equilibrium, over the largest nodal force.
+    pub imbalance: f64,
+    /// Prisms that are turned over: bars have no volume and do not prevent it. From the first one on the force is that
+    /// of the bars alone, no longer of a body.
+    pub n_inverted: usize,
+    /// `converged`, `euler_fallback` (a singular step was done by explicit Euler) or `diverged`: then the state is the one
+    /// before, the forces are those of the sample before, and the run ends.
+    pub outcome: &'static str,
+}
+
+/// What moves while an indentation runs.
+#[derive(Debug)]
+pub struct Run<'a> {
+    indentation: &'a Indentation,
+    body: &'a LayeredBody,
+    /// The body's state.
+    pub state: SpringState,
+    workspace: Workspace,
+    next: usize,
+    depth: f64,
+    time: f64,
+}
+
+impl Indentation {
+    /// Sets up the indentation that `scene` asks for on its body.
+    ///
+    /// # Errors
+    /// When the place, the depth or the constraints do not fit the body.
+    pub fn build(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
+        check_reference(scene)?;
+        let body = &built.growth.body;
+        let mut notes = Vec::new();
+        let place = Place::find(scene, body, built.press_vertex, &mut notes)?;
+        let Place {
+            vertex,
+            at,
+            direction,
+            ..
+        } = place;
+        let radius = scene.tool.contact_radius();
+        let operated = match scene.tool {
+            Tool::Disc { .. } => nodes_under_disc(body, vertex, at, &direction, radius),
+            Tool::Node | Tool::Contact(_) => vec![body.node(vertex, 0)],
+        };
+        let mesh_size = mesh_size_near(body, at, radius);
+        if matches!(scene.tool, Tool::Disc { .. }) && operated.len() < ENOUGH_NODES {
+            notes.push(format!(
+                "only {} skin vertices lie under the tool of radius {:.1} mm, with edges of {:.1} mm there: the force \
+                 depends on the mesh; take a finer skin or a larger tool",
+                operated.len(),
+                radius * 1e3,
+                mesh_size * 1e3,
+            ));
+        }
+        note_aspects(built, scene, mesh_size, &mut notes);
+        if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
+            notes.push("bars are without tension at rest; `prestress` was left out".into());
+        }
+        if scene.press.speeds.len() > 1 {
+            notes.push(
+                "bars have no time, so every speed gives the same force; only the first of `speeds` was run"
+                    .into(),
+            );
+        }
+        let model = SpringModel::build(
+            body,
+            &spring_params(scene),
+            &constraints(scene, body, operated, &mut notes),
+        )?;
+        let params = step_params(scene, &model);
+        Ok(Self {
+            model,
+            place,
+            mesh_size,
+            notes,
+            params,
+            path: waypoints(&scene.press, scene.press.speed, &HOLD_SAMPLES),
+        })
+    }
+
+    /// Number of samples of a whole run.
+    pub fn n_samples(&self) -> usize {
+        self.path.len()
+    }
+
+    /// The index of the deepest sample, where loading ends.
+    pub fn deepest(&self) -> usize {
+        self.path
+            .iter()
+            .rposition(|w| w.phase == Phase::Load)
+            .unwrap_or(0)
+    }
+
+    /// Begins a run at rest. `body` is the one that this was built on.
+    pub fn start<'a>(&'a self, body: &'a LayeredBody) -> Run<'a> {
+        Run {
+            indentation: self,
+            body,
+            state: SpringState::new(&self.model),
+            workspace: Workspace::new(&self.model),
+            next: 0,
+            depth: 0.0,
+            time: 0.0,
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Goes on to the next sample; `None` at the end. A sample that diverged is the last.
+    pub fn advance(&mut self) -> Option<Sample> {
+        let Indentation {
+            model,
+            place: Place { direction, .. },
+            params,
+            path,
+            ..
+        } = self.indentation;
+        let waypoint = *path.get(self.next)?;
+        let displacement = direction.into_inner() * (waypoint.depth - self.depth);
+        // Springs do not relax with time: at rest nothing happens, whatever the number of samples.
+        let corrections = match waypoint.phase {
+            Phase::Hold => Corrections::OFF,
+            Phase::Load | Phase::Retract => params.corrections,
+        };
+        let duration_ms = (waypoint.time - self.time) * 1e3;
+        let params = &StepParams {
+            corrections,
+            literal_duration_ms: Some(duration_ms).filter(|&d| d > 0.0),
+            ..*params
+        };
+        let report = step(
+            model,
+            &mut self.state,
+            &mut self.workspace,
+            displacement,
+            params,
+        );
+        let outcome = match report.outcome {
+            Outcome::Converged => "converged",
+            Outcome::EulerFallback { .. } => "euler_fallback",
+            Outcome::Diverged { .. } | Outcome::NotFinite => "diverged",
+        };
+        self.next = if outcome == "diverged" {
+            path.len()
+        } else {
+            self.next + 1
+        };
+        (self.depth, self.time) = (waypoint.depth, waypoint.time);
+        let shapes = prism_shapes(self.body, &self.state.positions);
+        Some(Sample {
+            phase: waypoint.phase,
+            time_s: tidy(waypoint.time),
+            depth_mm: tidy(waypoint.depth * 1e3),
+            // Plus zero: no sample is "minus nothing".
+            force_n: -report.force.dot(direction) + 0.0,
+            force_x_n: report.force.x,
+            force_y_n: report.force.y,
+            force_z_n: report.force.z,
+            bar_force_n: -report.bar_force.dot(direction),
+            literal_n_per_ms: -report.literal_force.map_or(0.0, |f| f.dot(direction)) + 0.0,
+            imbalance: report.imbalance,
+            n_inverted: shapes.iter().filter(|s| !s.is_valid()).count(),
+            outcome,
+        })
+    }
+}
+
+/// Refuses what bars between nodes cannot do.
+fn check_reference(scene: &Scene) -> anyhow::Result<()> {
+    if !scene.tool.is_bonded() {
+        bail!(
+            "the reference method moves nodes that are bonded to the tool, and a {} presses by contact; give the scene's \
+             [tool] shape = \"disc\" or \"node\"",
+            scene.tool
+        );
+    }
+    if let Some(lump) = scene.lumps.first() {
+        bail!(
+            "the reference method has bars between nodes and no place for the lump \"{}\"; remove [[lump]]",
+            lump.name
+        );
+    }
+    Ok(())
+}
+
+fn spring_params(scene: &Scene) -> SpringParams {
+    let layers: Vec<LayerStiffness> = scene
+        .layers
+        .iter()
+        .map(|layer| match &layer.tissue.law {
+            Law::Elastic(elastic) => LayerStiffness::Young {
+                modulus: elastic.young(),
+            },
+            Law::Spring { constant } => LayerStiffness::Spring {
+                stiffness: constant.value,
+            },
+        })
+        .collect();
+    SpringParams {
+        interface_bars: match scene.reference.in_plane {
+            InPlane::Above => InterfaceBars::Above,
+            InPlane::Below => InterfaceBars::Below,
+            InPlane::Mean => InterfaceBars::Mean,
+        },
+        solver: match scene.reference.solver {
+            palpa_tissue::Solver::DenseInverse => Solver::HistoricalInverse,
+            palpa_tissue::Solver::Sparse | palpa_tissue::Solver::Euler => Solver::Auto,
+        },
+        ..SpringParams::new(layers)
+    }
+}
+
+/// Share of the largest stable step size that Euler alone takes: half of it bears moderate loads and still gets on.
+const EULER_FRACTION: f64 = 0.5;
+
+fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
+    let reference = &scene.reference;
+    StepParams {
+        substeps: reference.substeps as usize,
+        method: match reference.solver {
+            palpa_tissue::Solver::Euler => {
+                Method::Euler(EulerParams::of_stable(model, EULER_FRACTION))
+            }
+            _ => Method::FiniteElements,
+        },
+        corrections: Corrections {
+            spring_gain: reference.spring_gain,
+            shape_gain: reference.shape_gain,
+        },
+        ..StepParams::default()
+    }
+}
+
+/// The base is fixed, the tool holds `operated`, cut faces as the scene says.
+fn constraints(
+    scene: &Scene,
+    body: &LayeredBody,
+    operated: Vec<usize>,
+    notes: &mut Vec<String>,
+) -> Constraints {
+    let mut constraints = Constraints::hold(body, operated);
+    let nodes = |v: u32| (0..body.n_levels).map(move |l| body.node(v as usize, l));
+    for face in &body.cut_faces {
+        let rim = face.vertices.iter().copied();
+        match scene.body.cut_faces {
+            CutFaces::Free => {}
+            CutFaces::Symmetric if face.is_flat => {
+                constraints
+                    .symmetric
+                    .extend(rim.flat_map(nodes).map(|node| (node, face.normal)));
+            }
+            CutFaces::Symmetric => {
+                notes.push(format!(
+                    "the cut face at ({}) mm is not flat, so it is no plane of symmetry; it was left free",
+                    in_mm(face.point)
+                ));
+            }
+            // What the tool holds, it holds.
+            CutFaces::Fixed => {
+                let held = &constraints.operated;
+                let fixed: Vec<usize> = rim.flat_map(nodes).filter(|n| !held.contains(n)).collect();
+                constraints.fixed.extend(fixed);
+            }
+        }
+    }
+    constraints.fixed.sort_unstable();
+    constraints.fixed.dedup();
+    constraints
+}
+
+/// Skin nodes of the side pressed on within `radius` of the tool's axis, and connected with the vertex in the middle.
+pub(crate) fn nodes_under_disc(
+    body: &LayeredBody,
+    vertex: usize,
+    at: Vec3,
+    direction: &Vec3,
+    radius: f64,
+) -> Vec<usize> {
+    let normals = body.skin.vertex_normals();
+    let is_under = |v: usize| {
+        let r = body.skin.points[v] - at;
+        let off_axis = (r - direction * r.dot(direction)).norm();
+        // A far side of the body, or another finger, is not under the tool.
+        off_axis <= radius && r.norm() <= 2.0 * radius && normals[v].dot(direction) < 0.0
+    };
+    let mut is_in = vec![false; body.n_vertices()];
+    is_in[vertex] = true;
+    let edges = body.skin.edges();
+    loop {
+        let before = is_in.iter().filter(|&&x| x).count();
+        for &[a, b] in &edges {
+            let (a, b) = (a as usize, b as usize);
+            if is_in[a] != is_in[b] && is_under(if is_in[a] { b } else { a }) {
+                (is_in[a], is_in[b]) = (true, true);
+            }
+        }
+        if is_in.iter().filter(|&&x| x).count() == before {
+            break;
+        }
+    }
+    (0..is_in.len())
+        .filter(|&v| is_in[v])
+        .map(|v| body.node(v, 0))
+        .collect()
+}
+
+/// Says which layers have levels too flat or too tall for bars to stand for their modulus.
+fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<String>) {
+    let unsound: Vec<String> = (built.growth.report.layers.iter().zip(&scene.layers))
+        .filter(|(_, layer)| layer.tissue.elastic().is_some())
+        .filter_map(|(report, _)| {
+            let height = report.thickness.median / report.n_levels as f64;
+            let aspect = height / mesh_size;
+            (!SOUND_ASPECT.contains(&aspect)).then(|| format!("{} {aspect:.2}", report.name))
+        })
+        .collect();
+    if !unsound.is_empty() {
+        notes.push(format!(
+            "levels over skin edges near the tool: {}; outside {} to {} bars are too stiff across or too soft in shear, \
+             and the force depends on the number of levels",
+            unsound.join(", "),
+            SOUND_ASPECT.start(),
+            SOUND_ASPECT.end(),
+        ));
+    }
+}
