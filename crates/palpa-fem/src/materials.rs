@@ -1,15 +1,20 @@
 //! Which material is where: layers, lumps in them, and a field of stiffness over both.
 //!
 //! Material is sampled where the element asks for it, so a lump need not follow the mesh. A place that is partly lump is
-//! given an energy between both materials' that is not their mean by volume: a stiff grain in soft tissue is hardly
-//! strained itself, and the mean would feel it many times too strongly. The share c of the lump's energy is that of a
-//! spherical inclusion among others (Mori & Tanaka 1973), by which moduli come out as
+//! given an energy between both materials' that is not their mean by volume: where one is much stiffer it is hardly
+//! strained itself, and the mean would feel it many times too strongly. The share c of the lump's energy is
 //!
 //! ```text
-//! G = G_m + c (G_l − G_m),  c = φ / (1 + (1 − φ) β (G_l/G_m − 1)),  β_G = 2 (4 − 5 ν)/(15 (1 − ν))  (Eshelby 1957)
+//! G = G_m + c (G_l − G_m),  c = φ / (1 + (1 − φ) β (G_l/G_m − 1))
+//! β = s β_E + (1 − s),      β_E = 2 (4 − 5 ν)/(15 (1 − ν))        s = V/(V + V_l)
 //! ```
-//! with φ the lump's share of volume, ν that of the layer, and for the bulk modulus `β_K = (1 + ν)/(3 (1 − ν))`. A place
-//! wholly inside has c = 1.
+//! with φ the lump's share of volume, ν that of the layer; a place wholly inside has c = 1. With `β = β_E` the lump is a
+//! grain inside the group (Eshelby 1957, Mori & Tanaka 1973; for the bulk modulus `β_E = (1 + ν)/(3 (1 − ν))`), with β = 1
+//! both are in series: to a group that is small beside the lump its border is a plane, and the group's one strain is stiff
+//! enough as it is (a hard ball in a soft block adds 6 to 17 % too much stiffness as grains, at most 6 % in series, with
+//! three groups to its radius). The volumes of group and lump say which it is. A lump softer than its layer is a grain to
+//! all groups: in series a trace of it would take all their stiffness (a soft ball takes 7 % too little as grains, and
+//! would 14 % too much in series).
 
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -270,14 +275,16 @@ fn push_phases(
         }
         let material = materials.lumps[lump].material();
         let law = &materials.materials[material].law;
+        let volume = geometry.volume();
+        let grain = volume / (volume + materials.lumps[lump].volume());
         let mut phase = Phase {
             material: material as u32,
             points: [0.0; N_POINTS],
-            volume: mean_stiffness * volume_share(base, law, share),
+            volume: mean_stiffness * volume_share(base, law, share, grain),
         };
         matrix.volume -= phase.volume;
         for (point, share) in shares.into_iter().enumerate() {
-            phase.points[point] = stiffness[point] * shear_share(base, law, share);
+            phase.points[point] = stiffness[point] * shear_share(base, law, share, grain);
             matrix.points[point] -= phase.points[point];
         }
         phases.push(phase);
@@ -289,25 +296,55 @@ fn push_phases(
     }
 }
 
-fn shear_share(layer: &Law, lump: &Law, share: f64) -> f64 {
+fn shear_share(layer: &Law, lump: &Law, share: f64, grain: f64) -> f64 {
     let nu = layer.poisson();
     let beta = 2.0 * (4.0 - 5.0 * nu) / (15.0 * (1.0 - nu));
-    concentrated(share, beta, lump.shear_modulus() / layer.shear_modulus())
+    let ratio = lump.shear_modulus() / layer.shear_modulus();
+    concentrated(share, beta, ratio, grain)
 }
 
-fn volume_share(layer: &Law, lump: &Law, share: f64) -> f64 {
+fn volume_share(layer: &Law, lump: &Law, share: f64, grain: f64) -> f64 {
     let nu = layer.poisson();
     let beta = (1.0 + nu) / (3.0 * (1.0 - nu));
-    concentrated(share, beta, lump.bulk_modulus() / layer.bulk_modulus())
+    let ratio = lump.bulk_modulus() / layer.bulk_modulus();
+    concentrated(share, beta, ratio, grain)
 }
 
-fn concentrated(share: f64, beta: f64, ratio: f64) -> f64 {
+/// c of the module's formula; `grain` is s.
+fn concentrated(share: f64, of_grain: f64, ratio: f64, grain: f64) -> f64 {
+    let beta = if ratio > 1.0 {
+        grain * of_grain + 1.0 - grain
+    } else {
+        of_grain
+    };
     share / (1.0 + (1.0 - share) * beta * (ratio - 1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Between layer and lump, and where both are alike nothing changes.
+    #[test]
+    fn stiffness_of_mixtures_lies_between_that_of_series_and_the_mean() {
+        for ratio in [0.01, 0.5, 1.0, 2.0, 30.0] {
+            for grain in [1e-6, 0.3, 0.9] {
+                for beta in [0.4, 0.9] {
+                    let mut last = 1.0;
+                    for share in [0.0, 0.1, 0.5, 0.9, 1.0] {
+                        let c = concentrated(share, beta, ratio, grain);
+                        let stiffness = 1.0 + c * (ratio - 1.0);
+                        let series = 1.0 / (1.0 - share + share / ratio);
+                        let mean = 1.0 + share * (ratio - 1.0);
+                        assert!(series - 1e-12 <= stiffness && stiffness <= mean + 1e-12);
+                        assert!((stiffness - last) * (ratio - 1.0) >= 0.0);
+                        last = stiffness;
+                    }
+                    assert!((last - ratio).abs() < 1e-12);
+                }
+            }
+        }
+    }
 
     #[test]
     fn samples_of_a_triangle_have_its_centroid() {

@@ -13,6 +13,16 @@ use crate::tolerance::{LUMP, LUMP_LEAST};
 use crate::{Findings, Options, Row, StudyPoint, VerifyError};
 
 const CASE: &str = "A4";
+/// Edges to a ball's radius, and length of edges under pressures, m.
+const PER_RADIUS: f64 = 4.0;
+const LOAD_EDGE: f64 = 1.75e-3;
+/// Sizes of the meshes on which errors are studied, over the one on which results are quoted.
+const STUDIED: [f64; 4] = [2.0, 1.5, 1.0, 0.75];
+/// The ball with which they are, at all offsets.
+const STUDIED_BALL: Ball = Ball {
+    depth: 0.014,
+    radius: 0.008,
+};
 const HALF_WIDTH: f64 = 0.05;
 const THICKNESS: f64 = 0.04;
 /// By how much edges lengthen per metre from where they are fine.
@@ -58,9 +68,11 @@ fn graded(from: f64, to: f64, fine: &[Fine]) -> Vec<f64> {
     points
 }
 
-/// Half of the block, y ≥ 0, fine where pressures and a ball of radius `r` at depth `z` are.
-fn body(h: f64, [z, r]: [f64; 2]) -> LayeredBody {
-    let n: f64 = std::env::var("NB").map_or(5.0, |s| s.parse().unwrap());
+/// Half of the block, y ≥ 0, fine where pressures and a ball are; `size` 1 is what results are quoted for.
+fn body(ball: &Ball, size: f64) -> LayeredBody {
+    let Ball { depth: z, radius: r } = *ball;
+    let h = size * LOAD_EDGE;
+    let n = PER_RADIUS / size;
     let ball = |middle: f64| Fine {
         from: middle - r,
         to: middle + r,
@@ -101,7 +113,7 @@ fn pressure(body: &LayeredBody, x: f64, a: f64) -> Vec<Vec3> {
                     if turned == 1 && i + j + 1 == N {
                         continue;
                     }
-                    let third = (1 + turned) as f64 / 3.0;
+                    let third = f64::from(1 + turned) / 3.0;
                     let (s, t) = ((i as f64 + third) / N as f64, (j as f64 + third) / N as f64);
                     let at = p * (1.0 - s - t) + q * s + r * t;
                     let load = area * (1.0 - at.norm_squared() / (a * a)).max(0.0);
@@ -114,17 +126,6 @@ fn pressure(body: &LayeredBody, x: f64, a: f64) -> Vec<Vec3> {
     }
     let total: f64 = forces.iter().map(|f| -2.0 * f.z).sum();
     forces.iter().map(|f| f / total).collect()
-}
-
-/// The block's half on its base and plane of symmetry, with or without a ball.
-fn block(body: &LayeredBody, materials: &Materials) -> Result<Pressed, VerifyError> {
-    let mut supports = Supports::on_base(body);
-    let symmetry = &body.cut_faces[2];
-    for &v in &symmetry.vertices {
-        let nodes = (0..body.n_levels).map(|l| body.node(v as usize, l));
-        supports.planes.extend(nodes.map(|node| (node, symmetry.normal)));
-    }
-    Pressed::new(body, materials, &supports)
 }
 
 /// Force over the displacement below it, weighted by the pressure, N/m.
@@ -142,40 +143,122 @@ fn stiffness(pressed: &mut Pressed, forces: &[Vec3]) -> Result<f64, VerifyError>
     Ok(1.0 / (2.0 * work))
 }
 
+/// Depth of a ball's middle and its radius, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ball {
+    depth: f64,
+    radius: f64,
+}
+
+/// Young's moduli of block and ball, Pa, and Poisson's ratio of both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Moduli {
+    soft: f64,
+    hard: f64,
+    nu: f64,
+}
+
+/// The block's half on its base and plane of symmetry, with the ball and without.
+struct Blocks {
+    ball: Ball,
+    body: LayeredBody,
+    with: Pressed,
+    without: Pressed,
+}
+
+impl Blocks {
+    fn new(ball: Ball, moduli: &Moduli, size: f64) -> Result<Self, VerifyError> {
+        let body = body(&ball, size);
+        let mut supports = Supports::on_base(&body);
+        // The faces are in the order −x, +x, y = 0, +y.
+        let symmetry = &body.cut_faces[2];
+        for &v in &symmetry.vertices {
+            let nodes = (0..body.n_levels).map(|l| body.node(v as usize, l));
+            supports.planes.extend(nodes.map(|node| (node, symmetry.normal)));
+        }
+        let material = |name: &str, young: f64| {
+            let law = Linear::from_young(young, moduli.nu).expect("valid constants");
+            Material::new(name, law)
+        };
+        let mut materials = Materials::of_layers(vec![material("soft", moduli.soft)]);
+        let without = Pressed::new(&body, &materials, &supports)?;
+        materials.materials.push(material("hard", moduli.hard));
+        let shape = LumpShape::Sphere(Sphere::new(ball.radius).expect("valid size"));
+        let pose = Pose::translation(0.0, 0.0, -ball.depth);
+        materials.lumps.push(Lump::new(shape, pose, 0.0, 1).expect("a valid lump"));
+        let with = Pressed::new(&body, &materials, &supports)?;
+        Ok(Self {
+            ball,
+            body,
+            with,
+            without,
+        })
+    }
+
+    /// How many times stiffer the ball makes the block under a pressure over the radius `a` round (x, 0).
+    fn ratio(&mut self, x: f64, a: f64) -> Result<f64, VerifyError> {
+        let forces = pressure(&self.body, x, a);
+        Ok(stiffness(&mut self.with, &forces)? / stiffness(&mut self.without, &forces)?)
+    }
+}
+
 pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
-    let columns = ["depth_centre_m", "lump_radius_m", "load_radius_m", "E_soft_Pa", "E_lump_Pa", "nu", "x_offset_m", "ratio", "ndof"];
+    let columns = [
+        "depth_centre_m",
+        "lump_radius_m",
+        "load_radius_m",
+        "E_soft_Pa",
+        "E_lump_Pa",
+        "nu",
+        "x_offset_m",
+        "ratio",
+    ];
     let table = Table::read(options, "A4_lump_map.csv", &columns)?;
     let mut findings = Findings::default();
-    let h: f64 = std::env::var("H").map_or(2e-3, |s| s.parse::<f64>().unwrap()*1e-3);
-    let mut last = [0.0; 2];
-    let mut n = 0;
-    let mut state: Option<(LayeredBody, Pressed, Pressed)> = None;
-    for row in 0..table.len() {
-        let [depth, radius, a, soft, hard, nu, x, ratio, _] = columns.map(|c| table.number(row, c));
-        if ratio - 1.0 < LUMP_LEAST { continue; }
-        let t = std::time::Instant::now();
-        if last != [depth, radius] {
-            last = [depth, radius];
-            let body = body(h, [depth, radius]);
-            let material = |young: f64| Material::new("x", Linear::from_young(young, nu).unwrap());
-            let make = |with: bool| {
-                let mut materials = Materials { materials: vec![material(soft), material(hard)], layers: vec![0], ..Materials::default() };
-                if with {
-                    let shape = LumpShape::Sphere(Sphere::new(radius).unwrap());
-                    materials.lumps.push(Lump::new(shape, Pose::translation(0.0, 0.0, -depth - if std::env::var("TIP").is_ok() {radius} else {0.0}), 0.0, 1).unwrap());
-                }
-                block(&body, &materials)
+    for size in STUDIED {
+        let mut blocks: Option<Blocks> = None;
+        for row in 0..table.len() {
+            let [depth, radius, a, soft, hard, nu, x, reference] =
+                columns.map(|column| table.number(row, column));
+            let ball = Ball { depth, radius };
+            let is_studied = ball == STUDIED_BALL;
+            // What a ball adds that adds less is not compared.
+            if reference - 1.0 < LUMP_LEAST || (size != 1.0 && !is_studied) {
+                continue;
+            }
+            let blocks = match &mut blocks {
+                Some(blocks) if blocks.ball == ball => blocks,
+                other => other.insert(Blocks::new(ball, &Moduli { soft, hard, nu }, size)?),
             };
-            let (with, without) = (make(true)?, make(false)?);
-            state = Some((body, with, without));
+            let ratio = blocks.ratio(x, a)?;
+            let nodes = blocks.with.nodes();
+            let error = (ratio - 1.0) / (reference - 1.0) - 1.0;
+            let name = format!(
+                "ball of {} mm {} mm deep, pressure {} mm beside",
+                radius * 1e3,
+                depth * 1e3,
+                x * 1e3
+            );
+            if is_studied {
+                findings.study.push(StudyPoint {
+                    case: CASE,
+                    series: name.clone(),
+                    h: size,
+                    nodes,
+                    error,
+                });
+            }
+            if size == 1.0 {
+                findings.rows.push(Row::with_error(
+                    CASE,
+                    format!("{name}: stiffness over that without (error of what it adds)"),
+                    [reference, ratio],
+                    error,
+                    LUMP,
+                    nodes,
+                ));
+            }
         }
-        let (body, with, without) = state.as_mut().unwrap();
-        let forces = pressure(body, x, a);
-        let (k, k0) = (stiffness(with, &forces)?, stiffness(without, &forces)?);
-        let error = (k / k0 - 1.0) / (ratio - 1.0) - 1.0;
-        println!("{} x {} {depth} {radius} {x}: k0 {k0:.3} ref {ratio:.5} ours {:.5} error {:+.2}% nodes {} {:?}", body.n_vertices(), body.n_levels, k / k0, 100.0 * error, with.nodes(), t.elapsed());
-        n += 1;
     }
-    let _ = (Row::ratio(CASE, "", 1.0, 1.0, LUMP, n), StudyPoint { case: CASE, series: String::new(), h, nodes: 0, error: 0.0 });
     Ok(findings)
 }

@@ -1,4 +1,4 @@
-//! A sixth of a round body between two planes of symmetry, for problems that are the same all round an axis.
+//! A sixth of a round body or an eighth of a square one, between two planes of symmetry.
 //!
 //! ```text
 //!            .·'\           rings of vertices about the corner; the one round the inner disc is a polygon with the
@@ -7,12 +7,33 @@
 //!   o─────┴──'────+--      base fixed, rim free, both straight sides planes of symmetry
 //! ```
 
+use std::f64::consts::TAU;
+
 use palpa_fem::Supports;
 use palpa_mesh::{CutFace, LayeredBody, Surface, Vec3};
 
-/// Sectors in a turn.
-pub(crate) const N_SECTORS: f64 = 6.0;
-const ANGLE: f64 = std::f64::consts::TAU / N_SECTORS;
+/// What a sector is cut from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outline {
+    /// A disc: a sixth of it.
+    Round,
+    /// A square: an eighth of it, from the middle of a side to a corner.
+    Square,
+}
+
+impl Outline {
+    /// Sectors in a turn.
+    pub(crate) fn n_sectors(self) -> f64 {
+        match self {
+            Self::Round => 6.0,
+            Self::Square => 8.0,
+        }
+    }
+
+    fn angle(self) -> f64 {
+        TAU / self.n_sectors()
+    }
+}
 
 /// Where the disc is finest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +57,7 @@ impl Finest {
     }
 }
 
-/// A sixth of a disc of layers on a rigid base.
+/// A sector of a stack of layers on a rigid base.
 pub(crate) struct Sector {
     pub(crate) body: LayeredBody,
     pub(crate) supports: Supports,
@@ -47,8 +68,10 @@ pub(crate) struct Sector {
 }
 
 impl Sector {
-    /// With an inner disc of radius `ring` whose rim has `n` edges, and layers of the given thicknesses, m.
+    /// With an inner disc of radius `ring` whose rim has edges of about a `n`th of that, and layers of the given
+    /// thicknesses, m. `width` is the radius of the whole body, or half the side of the square.
     pub(crate) fn new(
+        outline: Outline,
         ring: f64,
         n: usize,
         finest: Finest,
@@ -60,32 +83,39 @@ impl Sector {
             points: vec![Vec3::zeros()],
             triangles: Vec::new(),
         };
-        let angle = ANGLE / n as f64;
-        let equal_area = (angle / angle.sin()).sqrt();
+        let angle = outline.angle();
+        // Six edges to a turn for each of the radius, so that rings of equal steps are a lattice of equilateral triangles.
+        let edges = |r: f64, h: f64| (6.0 / outline.n_sectors() * r / h).round() as usize;
+        let on_rim = edges(ring, h);
+        let step = angle / on_rim as f64;
+        let equal_area = (step / step.sin()).sqrt();
         let mut inner = Ring { first: 0, n: 0 };
         let grading = Grading {
             h,
             reach: finest.reach() * ring,
         };
-        // An angle of a radian, so that n rings of equal steps are a lattice of nearly equilateral triangles.
-        let n_at = |r: f64| (r / grading.spacing((r - ring).abs())).round() as usize;
+        let edges_at = |r: f64| edges(r, grading.spacing((r - ring).abs()));
         let inside = match finest {
             Finest::Rim => grading.divide(0.0, ring, 1),
             Finest::Inside | Finest::Around => (0..=n).map(|i| i as f64 * h).collect(),
         };
         for x in inside[1..inside.len() - 1].iter().rev() {
             let r = ring - x;
-            let edges = match finest {
-                Finest::Rim => n_at(r),
-                Finest::Inside | Finest::Around => (r / h).round() as usize,
+            let n = match finest {
+                Finest::Rim => edges_at(r),
+                Finest::Inside | Finest::Around => edges(r, h),
             };
-            inner = add_ring(&mut skin, inner, r, edges.max(1));
+            inner = add_ring(&mut skin, inner, n.max(1), angle, |_| r);
         }
-        inner = add_ring(&mut skin, inner, ring * equal_area, n);
+        inner = add_ring(&mut skin, inner, on_rim, angle, |_| ring * equal_area);
         let patch = (0..skin.points.len() as u32).collect();
         for x in &grading.divide(0.0, width - ring, 1)[1..] {
-            let r = ring + x;
-            inner = add_ring(&mut skin, inner, r, n_at(r).max(3));
+            let share = x / (width - ring);
+            let radius = |angle: f64| match outline {
+                Outline::Round => ring + x,
+                Outline::Square => ring + share * (width / angle.cos() - ring),
+            };
+            inner = add_ring(&mut skin, inner, edges_at(ring + x).max(3), angle, radius);
         }
         let mut depths = vec![0.0];
         let mut interval_layer = Vec::new();
@@ -105,7 +135,7 @@ impl Sector {
             n_levels: depths.len(),
             interval_layer,
             layer_names: (1..=thicknesses.len()).map(|l| format!("layer {l}")).collect(),
-            cut_faces: sides(&skin),
+            cut_faces: sides(&skin, angle),
             skin,
         };
         let mut supports = Supports::on_base(&body);
@@ -166,15 +196,22 @@ struct Ring {
     n: usize,
 }
 
-/// Adds an arc of `n` edges, and the triangles between it and the one inside.
-fn add_ring(skin: &mut Surface, inner: Ring, radius: f64, n: usize) -> Ring {
+/// Adds an arc of `n` edges and a radius for every angle, and the triangles between it and the one inside.
+fn add_ring(
+    skin: &mut Surface,
+    inner: Ring,
+    n: usize,
+    angle: f64,
+    radius: impl Fn(f64) -> f64,
+) -> Ring {
     let outer = Ring {
         first: skin.points.len(),
         n,
     };
     for k in 0..=n {
-        let (sin, cos) = (ANGLE * k as f64 / n as f64).sin_cos();
-        skin.points.push(Vec3::new(cos, sin, 0.0) * radius);
+        let at = angle * k as f64 / n as f64;
+        let (sin, cos) = at.sin_cos();
+        skin.points.push(Vec3::new(cos, sin, 0.0) * radius(at));
     }
     let (mut i, mut j) = (0, 0);
     while i < inner.n || j < n {
@@ -192,8 +229,8 @@ fn add_ring(skin: &mut Surface, inner: Ring, radius: f64, n: usize) -> Ring {
 }
 
 /// The straight sides.
-fn sides(skin: &Surface) -> Vec<CutFace> {
-    [0.0, ANGLE]
+fn sides(skin: &Surface, angle: f64) -> Vec<CutFace> {
+    [0.0, angle]
         .map(|angle: f64| {
             let (sin, cos) = angle.sin_cos();
             let along = Vec3::new(cos, sin, 0.0);

@@ -7,7 +7,7 @@ use palpa_mesh::Vec3;
 
 use crate::VerifyError;
 use crate::press::Pressed;
-use crate::sector::{Finest, N_SECTORS, Sector};
+use crate::sector::{Finest, Outline, Sector};
 
 /// Balance of forces, as a share of those that hold the body. Rounding over a wide body is worse than over a small one.
 const TOLERANCE: f64 = 1e-4;
@@ -21,6 +21,9 @@ const INSIDE: usize = 10;
 const AROUND: usize = 8;
 /// Sizes of the meshes on which errors are studied, over the one on which results are quoted.
 pub(crate) const STUDIED: [f64; 4] = [2.0, 1.5, 1.0, 0.75];
+
+/// All that is measured is that of a sixth.
+const N_SECTORS: f64 = 6.0;
 
 /// A layer: thickness (m), Young's modulus (Pa) and Poisson's ratio.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +64,7 @@ impl Stack {
         };
         let n = (n as f64 / size).round() as usize;
         Self {
-            sector: Sector::new(ring, n, finest, width, &thicknesses),
+            sector: Sector::new(Outline::Round, ring, n, finest, width, &thicknesses),
             layers: layers.to_vec(),
         }
     }

@@ -6,8 +6,8 @@ use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
 use palpa_mesh::growth::{ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
-    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface, SurfaceIndex, Vec3,
-    grow, read_surface, repair,
+    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface,
+    SurfaceIndex, Vec3, grow, read_surface, repair,
 };
 use palpa_tissue::{
     Generator, LengthUnit, LumpPlace, Scene, Skin, Target, Thickness, read_thickness,
@@ -105,9 +105,7 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     };
     let lump_places = (scene.lumps.iter().zip(lumps_at))
         .map(|(lump, at)| match &lump.place {
-            LumpPlace::Below { target, .. } if *target == scene.press.target => {
-                Some(press_at)
-            }
+            LumpPlace::Below { target, .. } if *target == scene.press.target => Some(press_at),
             LumpPlace::Below { .. } => {
                 Some(at.unwrap_or_else(|| on_body.points[nearest(on_body, area_centroid(on_body))]))
             }

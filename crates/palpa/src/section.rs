@@ -11,7 +11,7 @@ use palpa_mesh::{LayeredBody, Surface, Vec3};
 
 mod draw;
 
-pub use draw::{Panel, ToolOutline, draw};
+pub use draw::{Panel, Shades, ToolOutline, draw};
 
 /// A point in the plane, in metres along its axes.
 pub type Point2 = [f64; 2];
@@ -47,6 +47,11 @@ impl Plane {
         (point - self.origin).dot(&self.normal)
     }
 
+    /// The place in space of a point of the plane. m
+    pub fn place(&self, [right, up]: Point2) -> Vec3 {
+        self.origin + self.right * right + self.up * up
+    }
+
     /// A point, projected onto the plane.
     pub fn project(&self, point: &Vec3) -> Point2 {
         let p = point - self.origin;
@@ -59,6 +64,8 @@ impl Plane {
 pub struct Section {
     /// The outlines of the cut prisms, each with its layer. Their vertices run either way round.
     pub cells: Vec<(usize, Vec<Point2>)>,
+    /// For each of them the prism it is cut from: that of triangle t in interval i is `t (n_levels − 1) + i`.
+    pub prisms: Vec<usize>,
     /// The lines where the section meets the skin and the borders between layers; the last point of a closed one is its
     /// first.
     pub borders: Vec<Vec<Point2>>,
@@ -78,7 +85,7 @@ type Edge = [usize; 2];
 pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Section {
     assert_eq!(positions.len(), body.n_nodes(), "one position per node");
     let cut = Cut::new(positions, plane);
-    let mut cells = Vec::new();
+    let (mut cells, mut prisms) = (Vec::new(), Vec::new());
     let mut border_segments = Vec::new();
     let mut base_segments = Vec::new();
     let n_intervals = body.n_levels - 1;
@@ -108,10 +115,12 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
                     .filter(|chain| chain.is_closed)
                     .map(|chain| (layer, cut.points(&chain.edges))),
             );
+            prisms.resize(cells.len(), t * n_intervals + i);
         }
     }
     Section {
         cells,
+        prisms,
         borders: cut.lines(&border_segments),
         base: cut.lines(&base_segments),
         layer_names: body.layer_names.clone(),

@@ -1,7 +1,5 @@
 //! The cases by formula pass, and the table of tolerances is the one that was promised.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use palpa_verify::{Case, Options, VerifyError, cases, tolerance};
 
 /// Cases that take long without optimisation; `make test-data` runs all.
@@ -33,7 +31,7 @@ fn errors_fall_as_the_mesh_becomes_finer() {
     let case = cases().iter().find(|case| case.name == "lame").unwrap();
     let study = case.run(&Options::default()).unwrap().study;
     let mut n_curves = 0;
-    for first in study.iter().filter(|p| p.h == 0.25) {
+    for first in study.iter().filter(|p| p.h > 0.2) {
         let errors: Vec<f64> = (study.iter())
             .filter(|p| p.series == first.series)
             .map(|p| p.error.abs())

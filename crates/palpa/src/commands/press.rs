@@ -1,5 +1,6 @@
 //! `palpa press`: a scripted indentation, as table, plots, pictures and a series for ParaView.
 
+mod cut;
 mod files;
 mod reference;
 mod tissue;

@@ -96,7 +96,11 @@ pub fn lump_surface(
         middle + axes * direction * border(lump, &middle, &(axes * direction), 2.0 * reach)
     };
     let mut points = vec![point(0, 0)];
-    points.extend((1..UPWARD).flat_map(|j| (0..AROUND).map(move |i| (j, i))).map(|(j, i)| point(j, i)));
+    points.extend(
+        (1..UPWARD)
+            .flat_map(|j| (0..AROUND).map(move |i| (j, i)))
+            .map(|(j, i)| point(j, i)),
+    );
     points.push(point(UPWARD, 0));
     let last = points.len() as u32 - 1;
     let at = |j: usize, i: usize| match j {
@@ -155,7 +159,9 @@ impl Embedded {
                 let corners = prism.map(|n| body.positions[n]);
                 let (lo, hi) = corners
                     .iter()
-                    .fold((corners[0], corners[0]), |(lo, hi), c| (lo.inf(c), hi.sup(c)));
+                    .fold((corners[0], corners[0]), |(lo, hi), c| {
+                        (lo.inf(c), hi.sup(c))
+                    });
                 if (0..3).any(|k| hi[k] < bounds.0[k] || lo[k] > bounds.1[k]) {
                     continue;
                 }
@@ -191,7 +197,11 @@ impl Embedded {
     /// How far each point moves with the nodes. m
     pub fn displacements(&self, of_nodes: &[Vec3]) -> Vec<Vec3> {
         (self.nodes.iter().zip(&self.weights))
-            .map(|(nodes, weights)| (nodes.iter().zip(weights)).map(|(&n, &w)| of_nodes[n] * w).sum())
+            .map(|(nodes, weights)| {
+                (nodes.iter().zip(weights))
+                    .map(|(&n, &w)| of_nodes[n] * w)
+                    .sum()
+            })
             .collect()
     }
 }
@@ -233,7 +243,11 @@ mod tests {
         // All prisms of the block are alike.
         let each = 0.04 * 0.04 * 0.02 / body.n_prisms() as f64;
         let volume = shares.iter().sum::<f64>() * each;
-        assert!((volume / lump.volume() - 1.0).abs() < 0.05, "{volume} of {}", lump.volume());
+        assert!(
+            (volume / lump.volume() - 1.0).abs() < 0.05,
+            "{volume} of {}",
+            lump.volume()
+        );
     }
 
     #[test]

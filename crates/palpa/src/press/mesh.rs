@@ -295,7 +295,11 @@ fn split_near(
     let growth = scene.mesh.growth;
     let mut parts = vec![1; body.n_levels - 1];
     let mut wish = |depths: &[f64], depth: f64, radius: f64, h: f64| {
-        let (wanted, is_met) = parts_for(depths, near_depth(depth, radius, SPARED * h, growth), MOST_LEVELS);
+        let (wanted, is_met) = parts_for(
+            depths,
+            near_depth(depth, radius, SPARED * h, growth),
+            MOST_LEVELS,
+        );
         for (n, wanted) in parts.iter_mut().zip(wanted) {
             *n = wanted.max(*n);
         }
@@ -372,7 +376,11 @@ fn bond(
     let area = seen_area(body, &triangles, &place.direction);
     let patch = Patch {
         // Vertices that hang on edges or stand alone have no area.
-        areas: areas_of(body, &triangles, nodes.iter().map(|node| node / body.n_levels)),
+        areas: areas_of(
+            body,
+            &triangles,
+            nodes.iter().map(|node| node / body.n_levels),
+        ),
         vertices: nodes.iter().map(|node| node / body.n_levels).collect(),
         radius: (area / std::f64::consts::PI).sqrt(),
     };

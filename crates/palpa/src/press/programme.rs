@@ -77,9 +77,15 @@ mod tests {
         // Five steps, none larger than asked for: 6 + 2 + 5 samples, then one less.
         assert_eq!(path.len(), 13 + 12);
         assert!(path.windows(2).all(|w| w[1].time > w[0].time));
-        assert!(path.windows(2).all(|w| (w[1].depth - w[0].depth).abs() < 0.7e-3));
+        assert!(
+            path.windows(2)
+                .all(|w| (w[1].depth - w[0].depth).abs() < 0.7e-3)
+        );
         let last = path.last().unwrap();
-        assert_eq!((last.phase, last.cycle, last.depth), (Phase::Retract, 1, 0.0));
+        assert_eq!(
+            (last.phase, last.cycle, last.depth),
+            (Phase::Retract, 1, 0.0)
+        );
         assert!((last.time - 2.0 * (0.6 + 0.5)).abs() < 1e-12);
     }
 }

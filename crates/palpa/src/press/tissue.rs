@@ -4,15 +4,15 @@ use anyhow::bail;
 use palpa_fem::lump::Lump;
 use palpa_fem::shape::{Pose, Tool as RigidTool};
 use palpa_fem::{
-    Dynamics, Load, Materials, Model, ModelParams, Outcome, PosedTool,
-    SolveParams, State, StepReport, Workspace, advance, equilibrate, prism_fields,
+    Dynamics, Load, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State,
+    StepReport, Workspace, advance, equilibrate, prism_fields,
 };
 use palpa_mesh::Vec3;
 use palpa_tissue::{Scene, Tool};
 use serde::Serialize;
 
-use super::mesh::{Patch, PressedBody};
 use super::lump::lump_shares;
+use super::mesh::{Patch, PressedBody};
 use super::{Phase, Place, Waypoint, tidy, waypoints};
 use crate::build::{BuiltBody, in_mm};
 use crate::continuum;
@@ -64,10 +64,7 @@ pub struct Indentation {
 #[derive(Debug)]
 enum Grip {
     /// These nodes are bonded to it, and stand for areas of skin (m²), if it has any.
-    Bond {
-        nodes: Vec<usize>,
-        areas: Vec<f64>,
-    },
+    Bond { nodes: Vec<usize>, areas: Vec<f64> },
     /// It touches; posed with its tip at the place at rest.
     Contact { tool: RigidTool, pose: Pose },
 }
@@ -301,7 +298,10 @@ impl Indentation {
             }),
         };
         if speeds.len() > 1 && !is_viscous && dynamics.is_none() {
-            notes.push("no tissue relaxes and nothing has mass here: every speed gives the same force".into());
+            notes.push(
+                "no tissue relaxes and nothing has mass here: every speed gives the same force"
+                    .into(),
+            );
         }
         Ok(Self {
             borders: borders(&body.interval_layer),
@@ -516,7 +516,10 @@ impl Run<'_> {
             } else {
                 REST_TOLERANCE
             };
-            let params = SolveParams { tolerance, ..*params };
+            let params = SolveParams {
+                tolerance,
+                ..*params
+            };
             let workspace = &mut self.workspace;
             let report = equilibrate(model, &mut self.state, workspace, &load, &params);
             if report.outcome == Outcome::Converged {
@@ -611,7 +614,8 @@ fn word(outcome: &Outcome) -> &'static str {
 /// The level at which each layer begins, and the deepest.
 fn borders(interval_layer: &[usize]) -> Vec<usize> {
     let mut borders = vec![0];
-    borders.extend((1..interval_layer.len()).filter(|&i| interval_layer[i] != interval_layer[i - 1]));
+    borders
+        .extend((1..interval_layer.len()).filter(|&i| interval_layer[i] != interval_layer[i - 1]));
     borders.push(interval_layer.len());
     borders
 }
@@ -622,7 +626,12 @@ fn grip(scene: &Scene, mesh: &PressedBody, place: &Place, model: &Model) -> anyh
             let (tool, pose) = continuum::tool(given, place.direction.into_inner(), place.at)?;
             Grip::Contact { tool, pose }
         }
-        (_, Some(Patch { vertices, areas, .. })) => Grip::Bond {
+        (
+            _,
+            Some(Patch {
+                vertices, areas, ..
+            }),
+        ) => Grip::Bond {
             nodes: vertices.iter().map(|&v| mesh.body.node(v, 0)).collect(),
             areas: areas.clone(),
         },
@@ -644,14 +653,7 @@ fn rest(scene: &Scene, model: &Model, params: &SolveParams) -> anyhow::Result<St
         duration: f64::INFINITY,
         ..Load::default()
     };
-    let report = advance(
-        model,
-        &mut state,
-        &mut ws,
-        &Load::default(),
-        &load,
-        params,
-    );
+    let report = advance(model, &mut state, &mut ws, &Load::default(), &load, params);
     if report.outcome != Outcome::Converged {
         bail!(
             "the body finds no rest under the tension of its layers: {}; make `prestress` smaller, or hold the body with \
@@ -680,13 +682,7 @@ pub fn told(outcome: &Outcome) -> String {
 
 /// How far the tool can go along its way from `pose` until it touches the skin: 0 where its tip touches first, less where
 /// the skin beside it is higher. m
-fn first_touch(
-    model: &Model,
-    rest: &State,
-    tool: &RigidTool,
-    pose: &Pose,
-    place: &Place,
-) -> f64 {
+fn first_touch(model: &Model, rest: &State, tool: &RigidTool, pose: &Pose, place: &Place) -> f64 {
     const HALVINGS: usize = 60;
     let body = model.body();
     let direction = place.direction.into_inner();
@@ -702,7 +698,10 @@ fn first_touch(
         .map(x)
         .collect();
     let gap = |s: f64| {
-        let at = Pose::from_parts((pose.translation.vector + direction * s).into(), pose.rotation);
+        let at = Pose::from_parts(
+            (pose.translation.vector + direction * s).into(),
+            pose.rotation,
+        );
         facing
             .iter()
             .map(|x| tool.distance_at(&at, x).distance)

@@ -24,9 +24,9 @@ const POISSON: f64 = 0.45;
 const ALPHA: f64 = 0.8;
 /// Radius of the block, m: twice its depth, so that its free side is hardly felt.
 const HALF_WIDTH: f64 = 0.24;
-/// A layer counts as felt from where the body is this many times as stiff (force over push) as the uniform one. Differences of stiffness of 4
-/// to 10 % are told apart in the best of conditions (Gurari, Okamura & Kuchenbecker 2017, PLoS ONE 12:e0178605), of 8 to
-/// 23 % in older work: the first for the attentive, the second for everyone.
+/// A layer counts as felt from where the body is this many times as stiff (force over push) as the uniform one.
+/// Differences of stiffness of 4 to 10 % are told apart in the best of conditions (Gurari, Okamura & Kuchenbecker 2017,
+/// doi 10.1371/journal.pone.0178605), of 8 to 23 % in older work: the first for the attentive, the second for everyone.
 pub const FELT_RATIOS: [f64; 2] = [1.1, 1.23];
 
 /// A disc, and how deep it is pushed.

@@ -18,6 +18,16 @@ const LAYERS: [Color; 6] = [
 const BONE: Color = Color::rgb(0xd8, 0xd4, 0xc8);
 /// What the columns end on and what does not move, as far as it is no bone.
 const CORE: Color = Color::rgb(0xf3, 0xf2, 0xee);
+const LUMP: Color = Color::rgb(0x3d, 0x6e, 0x8a);
+/// Shades from the least value to the largest: dark on white, in equal steps of lightness.
+const SHADES: [Color; 6] = [
+    Color::rgb(0xfc, 0xf7, 0xea),
+    Color::rgb(0xf8, 0xd5, 0x9c),
+    Color::rgb(0xf0, 0x9c, 0x5c),
+    Color::rgb(0xd1, 0x57, 0x4f),
+    Color::rgb(0x8c, 0x2a, 0x5c),
+    Color::rgb(0x3b, 0x12, 0x48),
+];
 const TOOL: Color = Color::rgb(0x33, 0x3f, 0x4d);
 
 const WIDTH: f64 = 960.0;
@@ -29,7 +39,7 @@ const FOOTER: f64 = 56.0;
 const PLATE_THICKNESS: f64 = 2e-3;
 
 /// One state of the body in the picture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Panel<'a> {
     /// What the panel shows: "at rest".
     pub title: &'a str,
@@ -37,15 +47,45 @@ pub struct Panel<'a> {
     pub section: &'a Section,
     /// The cut bones, from [`cut_surface`](super::cut_surface).
     pub bones: &'a [Vec<Point2>],
+    /// The cut lumps, likewise.
+    pub lumps: &'a [Vec<Point2>],
+    /// What the cells are shaded by; without it they have the colours of their layers.
+    pub shades: Option<Shades<'a>>,
     /// The tool, if it is there.
     pub tool: Option<ToolOutline>,
 }
 
+/// Values that cells are shaded by.
+#[derive(Debug, Clone, Copy)]
+pub struct Shades<'a> {
+    /// What they are, with their unit: "von Mises stress, kPa".
+    pub name: &'a str,
+    /// One for each prism of the body.
+    pub values: &'a [f64],
+    /// The value of the darkest shade.
+    pub most: f64,
+}
+
+impl Shades<'_> {
+    fn color(&self, prism: usize) -> Color {
+        shade_of((self.values[prism] / self.most).clamp(0.0, 1.0))
+    }
+}
+
+/// The shade at a share of the way from the least to the most.
+fn shade_of(share: f64) -> Color {
+    let at = share * (SHADES.len() - 1) as f64;
+    let first = (at as usize).min(SHADES.len() - 2);
+    SHADES[first].mixed(SHADES[first + 1], at - first as f64)
+}
+
 /// What the plane shows of a tool.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum ToolOutline {
     /// A thin plate, corner by corner.
     Plate([Point2; 4]),
+    /// A convex shape, round its rim.
+    Shape(Vec<Point2>),
     /// A single node.
     Node(Point2),
 }
@@ -80,8 +120,31 @@ impl ToolOutline {
         Self::Node(plane.project(at))
     }
 
+    /// A convex shape, given by the distance of a point from it (m, negative inside) and a point inside, in the plane; what
+    /// lies farther than `most` from there is left out.
+    pub fn shape(plane: &Plane, inside: &Vec3, most: f64, distance: impl Fn(&Vec3) -> f64) -> Self {
+        const RAYS: u32 = 240;
+        let [x, y] = plane.project(inside);
+        let rim = (0..RAYS).map(|i| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(RAYS)).sin_cos();
+            let at = |r: f64| [x + r * cos, y + r * sin];
+            let (mut near, mut far) = (0.0, most);
+            for _ in 0..40 {
+                let half = f64::midpoint(near, far);
+                if distance(&plane.place(at(half))) < 0.0 {
+                    near = half;
+                } else {
+                    far = half;
+                }
+            }
+            at(far)
+        });
+        Self::Shape(rim.collect())
+    }
+
     fn points(&self) -> &[Point2] {
         match self {
+            Self::Shape(rim) => rim,
             Self::Plate(corners) => corners,
             Self::Node(at) => std::slice::from_ref(at),
         }
@@ -139,20 +202,33 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
     for bone in &bones {
         canvas.polygon(&[bone], BONE, Some(Stroke::new(MUTED, 1.0)));
     }
-    for (layer, cell) in &panel.section.cells {
-        let color = LAYERS[layer % LAYERS.len()];
+    for ((layer, cell), &prism) in panel.section.cells.iter().zip(&panel.section.prisms) {
+        let color = match &panel.shades {
+            Some(shades) => shades.color(prism),
+            None => LAYERS[layer % LAYERS.len()],
+        };
         // The edge is a shade of the layer: it shows the elements and closes the seams between them.
         let edge = Stroke::new(shade(color), 0.45);
         canvas.polygon(&[&seen(cell)], color, Some(edge));
     }
+    for lump in panel.lumps.iter().map(|lump| seen(lump)) {
+        if panel.shades.is_none() {
+            canvas.polygon(&[&lump], LUMP, Some(Stroke::new(INK, 1.1)));
+        } else {
+            canvas.polyline(&lump, Stroke::new(INK, 1.1));
+        }
+    }
     for border in panel.section.borders.iter().chain(&panel.section.base) {
         canvas.polyline(&seen(border), Stroke::new(INK, 1.1));
     }
-    match panel.tool {
+    match &panel.tool {
+        Some(ToolOutline::Shape(rim)) => {
+            canvas.polygon(&[&seen(rim)], TOOL, Some(Stroke::new(TOOL, 1.0)));
+        }
         Some(ToolOutline::Plate(corners)) => {
             canvas.polygon(&[&corners.map(view)], TOOL, Some(Stroke::new(TOOL, 1.0)));
         }
-        Some(ToolOutline::Node(at)) => canvas.circle(view(at), 5.0, TOOL, Stroke::new(WHITE, 1.5)),
+        Some(ToolOutline::Node(at)) => canvas.circle(view(*at), 5.0, TOOL, Stroke::new(WHITE, 1.5)),
         None => {}
     }
 }
@@ -172,9 +248,24 @@ fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
         canvas.text([x + 22.0, y], text, name);
         y += 22.0;
     };
-    let layers = panels.first().map_or(&[][..], |p| &p.section.layer_names);
-    for (layer, name) in layers.iter().enumerate() {
-        entry(LAYERS[layer % LAYERS.len()], name);
+    let shades = panels.iter().find_map(|panel| panel.shades);
+    if let Some(shades) = shades {
+        for i in (0..=5).rev() {
+            let share = f64::from(i) / 5.0;
+            let least = if i == 5 { "≥ " } else { "" };
+            entry(
+                shade_of(share),
+                &format!("{least}{}", rounded(share * shades.most)),
+            );
+        }
+    } else {
+        let layers = panels.first().map_or(&[][..], |p| &p.section.layer_names);
+        for (layer, name) in layers.iter().enumerate() {
+            entry(LAYERS[layer % LAYERS.len()], name);
+        }
+        if panels.iter().any(|panel| !panel.lumps.is_empty()) {
+            entry(LUMP, "lump");
+        }
     }
     let base = panels.iter().flat_map(|panel| &panel.section.base);
     if base.into_iter().any(|line| is_closed(line)) {
@@ -186,6 +277,22 @@ fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
     if panels.iter().any(|panel| panel.tool.is_some()) {
         entry(TOOL, "tool");
     }
+    if let Some(shades) = shades {
+        canvas.text(
+            [x, y + 4.0],
+            shades.name,
+            Font::new(11.5, MUTED, Anchor::Start),
+        );
+    }
+}
+
+/// A value with three digits.
+fn rounded(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$}")
 }
 
 /// A bar of a round length, about a quarter of the section's width.

@@ -8,6 +8,7 @@ mod export;
 mod output;
 mod plot;
 mod press;
+mod press_tissue;
 mod section;
 mod verify;
 mod vtu;

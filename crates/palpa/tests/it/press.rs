@@ -1,4 +1,4 @@
-//! `palpa press` as a person runs it: results, refusals, Ctrl-C.
+//! `palpa press` with the reference method as a person runs it: results, refusals, Ctrl-C.
 
 use std::fs;
 use std::path::Path;
@@ -28,32 +28,38 @@ step = "0.5 mm"
 hold = "0.2 s"
 "#;
 
-struct Bench {
-    folder: TempDir,
+pub(crate) struct Bench {
+    pub(crate) folder: TempDir,
+    model: &'static str,
 }
 
 impl Bench {
     fn new() -> Self {
+        Self::of("reference")
+    }
+
+    pub(crate) fn of(model: &'static str) -> Self {
         Self {
             folder: TempDir::new().unwrap(),
+            model,
         }
     }
 
-    fn file(&self, name: &str, text: &str) -> String {
+    pub(crate) fn file(&self, name: &str, text: &str) -> String {
         fs::write(self.folder.path().join(name), text).unwrap();
         name.to_owned()
     }
 
-    fn press(&self, args: &[&str]) -> Output {
+    pub(crate) fn press(&self, args: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_palpa"))
             .current_dir(self.folder.path())
-            .arg("press")
+            .args(["press", "--model", self.model])
             .args(args)
             .output()
             .unwrap()
     }
 
-    fn report(&self, args: &[&str]) -> Value {
+    pub(crate) fn report(&self, args: &[&str]) -> Value {
         let output = self.press(args);
         assert!(
             output.status.success(),
@@ -70,7 +76,7 @@ impl Bench {
         String::from_utf8(output.stderr).unwrap()
     }
 
-    fn refusal(&self, args: &[&str]) -> String {
+    pub(crate) fn refusal(&self, args: &[&str]) -> String {
         let output = self.press(args);
         let text = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
@@ -375,7 +381,14 @@ fn a_reader_that_leaves_does_not_keep_the_work_from_being_done() {
     bench.file("block.toml", BLOCK);
     let mut child = Command::new(env!("CARGO_BIN_EXE_palpa"))
         .current_dir(bench.folder.path())
-        .args(["press", "block.toml", "--frames", "0"])
+        .args([
+            "press",
+            "--model",
+            "reference",
+            "block.toml",
+            "--frames",
+            "0",
+        ])
         .stdout(std::process::Stdio::piped())
         .spawn()
         .unwrap();
@@ -388,17 +401,23 @@ fn a_reader_that_leaves_does_not_keep_the_work_from_being_done() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_leaves_a_valid_table_of_what_was_done() {
+    interrupt("reference", "4 mm");
+    interrupt("tissue", "10 mm");
+}
+
+#[cfg(unix)]
+fn interrupt(model: &str, spacing: &str) {
     let bench = Bench::new();
     // Hundreds of steps, of which a few are done when the interrupt comes.
     let scene = bench.file(
         "long.toml",
         &BLOCK
-            .replace("spacing = \"10 mm\"", "spacing = \"4 mm\"")
+            .replace("10 mm\" }", &format!("{spacing}\" }}"))
             .replace("step = \"0.5 mm\"", "step = \"0.005 mm\""),
     );
     let mut child = Command::new(env!("CARGO_BIN_EXE_palpa"))
         .current_dir(bench.folder.path())
-        .args(["press", &scene, "--frames", "200"])
+        .args(["press", "--model", model, &scene, "--frames", "200"])
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped())
         .spawn()

@@ -244,6 +244,8 @@ fn the_picture_shows_rest_and_pressed_side_by_side() {
         title,
         section,
         bones: &bones,
+        lumps: &[],
+        shades: None,
         tool: Some(tool(z)),
     };
     let picture = draw(

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 fn verify(folder: &Path, args: &[&str]) -> (i32, String, String) {
@@ -90,20 +90,48 @@ fn the_json_is_a_list_of_figures() {
     }
 }
 
-/// A table that no model of the block could meet: the force on it is a million times too large.
+/// A patch of 16 wedges in a cube of 1 m, with stresses that no law has.
+fn wrong_patch() -> Value {
+    let mut nodes = Vec::new();
+    for level in 0..3 {
+        for j in 0..3 {
+            for i in 0..3 {
+                nodes.push([i, j, level].map(|n: i32| 0.5 * f64::from(n)));
+            }
+        }
+    }
+    let mut wedges = Vec::new();
+    for below in [0, 9] {
+        for corner in [0, 1, 3, 4] {
+            for [a, b, c] in [[0, 1, 4], [0, 4, 3]] {
+                let lower = [a, b, c].map(|n| below + corner + n);
+                wedges.push([lower, lower.map(|n| n + 9)].concat());
+            }
+        }
+    }
+    let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    json!({
+        "nodes": nodes,
+        "wedges": wedges,
+        "E": 30e3,
+        "nu": 0.45,
+        "grad_u_small": [[1e-3, 0.0, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 1e-3]],
+        "sigma_small": unit,
+        "F_large": [[1.2, 0.1, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 1.1]],
+        "PK1_large": unit,
+    })
+}
+
 #[test]
 fn a_figure_out_of_tolerance_is_exit_code_1() {
     let folder = TempDir::new().unwrap();
-    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    put(
-        "B1_homogeneous_block.csv",
-        "depth_m,F_N_extrapolated\n1e-6,1000\n",
-    );
-    put("B1_surface_profile_F2.csv", "depth_m,X_m,uz_m\n");
-    let (code, stdout, stderr) = verify(folder.path(), &["B1", "--reference", "."]);
+    let table = folder.path().join("V_wedge_patch_test.json");
+    fs::write(table, wrong_patch().to_string()).unwrap();
+    let (code, stdout, stderr) = verify(folder.path(), &["v-patch", "--reference", "."]);
     assert_eq!((code, stderr.as_str()), (1, ""), "{stdout}");
-    assert!(stdout.contains("FAIL"), "{stdout}");
-    assert!(stdout.ends_with("0 of 1 within tolerance\n"), "{stdout}");
+    // Two against the stresses given; the others need none.
+    assert_eq!(stdout.matches("FAIL").count(), 2, "{stdout}");
+    assert!(stdout.ends_with("4 of 6 within tolerance\n"), "{stdout}");
 }
 
 #[test]

@@ -33,14 +33,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         .cloned()
         .collect();
     let materials = scene.material_status();
-    announce(
-        context,
-        scene_name,
-        scene,
-        &built,
-        &indentation,
-        &materials,
-    )?;
+    announce(context, scene_name, scene, &built, &indentation, &materials)?;
 
     context.begin_recording();
     remove_older(out.path())?;

@@ -37,7 +37,12 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     context.begin_recording();
     remove_older(out.path())?;
     let recorded = record(job, &built, &indentation)?;
-    let result = result_of(&indentation, &recorded, &materials, context.is_interrupted());
+    let result = result_of(
+        &indentation,
+        &recorded,
+        &materials,
+        context.is_interrupted(),
+    );
     let notes: Vec<String> = (built.notes.iter())
         .chain(&indentation.notes)
         .chain(&result.notes)

@@ -1,5 +1,7 @@
 //! Errors against the size of the mesh, a panel for each case.
 
+use std::fmt::Write as _;
+
 use palpa_verify::{Findings, StudyPoint};
 
 use super::report::share;
@@ -40,6 +42,30 @@ impl Curve<'_> {
     }
 }
 
+/// The order of the root of the mean square over all curves, if they are on the same meshes: of single curves it is rough
+/// where an error comes near zero or near that of the reference.
+fn mean_order(curves: &[Curve<'_>]) -> Option<f64> {
+    let placed: Vec<Vec<[f64; 2]>> = curves.iter().map(Curve::placed).collect();
+    let sizes: Vec<f64> = placed.first()?.iter().map(|p| p[0]).collect();
+    let is_same = |other: &Vec<[f64; 2]>| {
+        other.len() == sizes.len()
+            && other
+                .iter()
+                .zip(&sizes)
+                .all(|(p, h)| p[0].to_bits() == h.to_bits())
+    };
+    if placed.len() < 2 || !placed.iter().all(is_same) {
+        return None;
+    }
+    let logs: Vec<[f64; 2]> = (sizes.iter().enumerate())
+        .map(|(i, h)| {
+            let squares: f64 = placed.iter().map(|c| c[i][1].powi(2)).sum();
+            [h.ln(), 0.5 * (squares / placed.len() as f64).ln()]
+        })
+        .collect();
+    line(&logs).map(|l| l.slope)
+}
+
 /// Draws the study of all cases that have one.
 pub(super) fn draw(found: &Findings) -> Picture {
     let mut names: Vec<&str> = Vec::new();
@@ -60,6 +86,7 @@ pub(super) fn draw(found: &Findings) -> Picture {
 fn panel(case: &str, found: &Findings) -> Chart {
     let curves = curves(case, found);
     let n_all = curves.len();
+    let mean_order = mean_order(&curves);
     let shown = spread(curves, MOST_CURVES);
     let tolerances = tolerances(case, found, &shown);
     let errors = || shown.iter().flat_map(Curve::placed).map(|p| p[1]);
@@ -73,11 +100,14 @@ fn panel(case: &str, found: &Findings) -> Chart {
         .fold(low, f64::max);
     let nodes = || shown.iter().flat_map(|c| &c.points).map(|p| p.nodes);
     let [fewest, most] = [nodes().min(), nodes().max()].map(Option::unwrap_or_default);
-    let title = if n_all > shown.len() {
-        format!("{case}, {} of {n_all} curves", shown.len())
-    } else {
-        case.to_owned()
-    };
+    let mut title = case.to_owned();
+    if let Some(order) = mean_order {
+        let order = format!("{order:.1}").replace('-', "−");
+        let _ = write!(title, ": order {order} in the mean");
+    }
+    if n_all > shown.len() {
+        let _ = write!(title, ", {} of {n_all} curves", shown.len());
+    }
     let what = palpa_verify::cases().iter().find(|c| c.name == case);
     let mut chart = Chart::new(
         Axis::log(format!(
@@ -139,7 +169,8 @@ fn spread<T>(items: Vec<T>, n: usize) -> Vec<T> {
 fn tolerances(case: &str, found: &Findings, curves: &[Curve<'_>]) -> Vec<f64> {
     let is_end = |error: f64| {
         let ends = curves.iter().filter_map(|c| c.points.last());
-        ends.into_iter().any(|end| end.error == error)
+        ends.into_iter()
+            .any(|end| end.error.to_bits() == error.to_bits())
     };
     let of_case = || found.rows.iter().filter(|row| row.case == case);
     let mut tolerances: Vec<f64> = of_case()
@@ -162,7 +193,7 @@ mod tests {
         let point = |i: usize| StudyPoint {
             case: "lame",
             series: "r 12 mm".into(),
-            h: 0.25 / 2.0_f64.powi(i as i32),
+            h: 0.25 / f64::from(1_u32 << i),
             nodes: 10 << (2 * i),
             error: errors[i],
         };
@@ -179,6 +210,20 @@ mod tests {
         assert!((order - 2.0).abs() < 1e-9, "{order}");
         let svg = draw(&found).svg().to_owned();
         assert!(svg.contains("r 12 mm: 2.0"), "{svg}");
+    }
+
+    #[test]
+    fn the_mean_order_needs_the_same_meshes() {
+        let mut found = study([-0.08, -0.02, -0.005, -0.00125]);
+        let mut other = study([0.04, 0.01, 0.0025, 0.000625]).study;
+        for point in &mut other {
+            point.series = "r 35 mm".into();
+        }
+        found.study.extend(other);
+        let order = mean_order(&curves("lame", &found)).unwrap();
+        assert!((order - 2.0).abs() < 1e-9, "{order}");
+        found.study.pop();
+        assert_eq!(mean_order(&curves("lame", &found)), None);
     }
 
     #[test]

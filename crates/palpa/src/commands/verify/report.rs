@@ -6,7 +6,7 @@ use crate::cli::Context;
 use crate::table::Table;
 
 /// Up to this many figures a case is shown in full.
-const SHOWN_IN_FULL: usize = 16;
+const SHOWN_IN_FULL: usize = 24;
 /// More figures than this that differ in numbers only are shown as one.
 const MOST_ALIKE: usize = 3;
 
@@ -160,8 +160,8 @@ mod tests {
 
     #[test]
     fn a_short_case_is_shown_in_full() {
-        let rows: Vec<Row> = (0..16).map(|i| row(&format!("at {i} mm"), 0.0)).collect();
-        assert_eq!(condensed(&rows).len(), 16);
+        let rows: Vec<Row> = (0..24).map(|i| row(&format!("at {i} mm"), 0.0)).collect();
+        assert_eq!(condensed(&rows).len(), 24);
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use palpa_mesh::{Surface, Vec3};
+use palpa_mesh::Vec3;
 use palpa_tissue::{Scene, Tool};
 
+use super::super::cut;
 use super::record::Recorded;
 use super::report::PressResult;
 use crate::build::{BuiltBody, in_mm};
@@ -12,7 +13,7 @@ use crate::output::OutDir;
 use crate::plot::{Axis, Chart, Guide};
 use crate::press::Phase;
 use crate::press::reference::{Indentation, Sample};
-use crate::section::{Panel, Plane, ToolOutline, cut_body, cut_surface, draw};
+use crate::section::{Panel, ToolOutline, cut_body, draw};
 
 pub(super) fn draw_pictures(
     out: &OutDir,
@@ -89,27 +90,8 @@ fn section_picture(
 ) -> Option<crate::plot::Picture> {
     let body = &built.growth.body;
     let direction = indentation.place.direction.into_inner();
-    // Across the limb where it has an end; else along the longest way.
-    let across = body
-        .cut_faces
-        .iter()
-        .find(|f| f.is_flat && f.normal.dot(&direction).abs() < 0.9)
-        .map(|f| f.normal);
-    let other = if direction.x.abs() < 0.7 {
-        Vec3::x()
-    } else {
-        Vec3::y()
-    };
-    let plane = Plane::new(
-        indentation.place.at,
-        across.unwrap_or(other).cross(&direction).cross(&direction),
-        -direction,
-    )?;
-    let bones: Vec<_> = built
-        .bones
-        .iter()
-        .flat_map(|b: &Surface| cut_surface(b, &plane))
-        .collect();
+    let plane = cut::plane(body, &indentation.place)?;
+    let bones = cut::lines(&built.bones, &plane);
     let tool = |at: Vec3| match scene.tool {
         Tool::Disc { radius } => ToolOutline::disc(&plane, &at, &direction, radius),
         Tool::Node | Tool::Contact(_) => ToolOutline::node(&plane, &at),
@@ -125,12 +107,16 @@ fn section_picture(
             title: "at rest",
             section: &rest,
             bones: &bones,
+            lumps: &[],
+            shades: None,
             tool: Some(tool(indentation.place.at)),
         },
         Panel {
             title: &pressed_title,
             section: &pressed,
             bones: &bones,
+            lumps: &[],
+            shades: None,
             tool: Some(tool(indentation.place.at + direction * (depth * 1e-3))),
         },
     ];

@@ -52,7 +52,7 @@ pub(super) fn record(
             depth_mm: 0.0,
             displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
             level_forces: Vec::new(),
-            von_mises: Vec::new(),
+            von_mises: vec![0.0; indentation.mesh.body.n_prisms()],
         },
     };
     let n_runs = indentation.speeds.len();

@@ -144,7 +144,17 @@ pub(super) fn conclude(
             line += &format!("; relaxes by {:.1} % at rest", 100.0 * relaxed);
         }
         if let [first, ..] = run.hysteresis[..] {
-            line += &format!("; {:.1} % of the work is lost on the way back", 100.0 * first);
+            line += &format!(
+                "; {:.1} % of the work is lost on the way back",
+                100.0 * first
+            );
+        }
+        if let Some(left) = (run.force_after_retract_n).filter(|f| f.abs() > 0.02 * run.max_force_n)
+        {
+            line += &format!("; back at the start {left:.3} N");
+            if left < 0.0 {
+                line += ", the pull of bonded skin that has not come back yet";
+            }
         }
         context.say(line)?;
     }

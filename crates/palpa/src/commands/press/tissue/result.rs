@@ -86,7 +86,7 @@ pub(super) fn result_of(
     let runs: Vec<RunResult> = (0..indentation.speeds.len())
         .filter_map(|index| {
             let samples: Vec<&Sample> = good.iter().copied().filter(|s| s.run == index).collect();
-            run_result(&samples)
+            run_result(&samples, indentation.is_viscous)
         })
         .collect();
     let layers = layers(indentation, recorded);
@@ -111,7 +111,7 @@ pub(super) fn result_of(
     }
 }
 
-fn run_result(samples: &[&Sample]) -> Option<RunResult> {
+fn run_result(samples: &[&Sample], is_viscous: bool) -> Option<RunResult> {
     let peak = (samples.iter()).max_by(|a, b| a.force_n.total_cmp(&b.force_n))?;
     let n_cycles = samples.last()?.cycle + 1;
     let first: Vec<&&Sample> = samples.iter().filter(|s| s.cycle == 0).collect();
@@ -123,8 +123,11 @@ fn run_result(samples: &[&Sample]) -> Option<RunResult> {
         max_force_n: peak.force_n,
         at_depth_mm: peak.depth_mm,
         secant_stiffness_n_per_mm: (peak.depth_mm > 0.0).then(|| peak.force_n / peak.depth_mm),
-        hysteresis: (0..n_cycles).filter_map(|cycle| loss(samples, cycle)).collect(),
-        relaxation: relaxation.map(|(top, rested)| 1.0 - rested.force_n / top.force_n),
+        hysteresis: (0..n_cycles)
+            .filter_map(|cycle| loss(samples, cycle))
+            .collect(),
+        relaxation: (relaxation.filter(|_| is_viscous))
+            .map(|(top, rested)| 1.0 - rested.force_n / top.force_n),
         force_after_retract_n: is_back(last).then_some(last.force_n),
     })
 }
@@ -157,7 +160,10 @@ fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
         return Vec::new();
     };
     let direction = &indentation.place.direction;
-    let thicknesses = rest.layer_thickness_mm.iter().zip(&pressed.layer_thickness_mm);
+    let thicknesses = rest
+        .layer_thickness_mm
+        .iter()
+        .zip(&pressed.layer_thickness_mm);
     let names = &indentation.mesh.body.layer_names;
     (names.iter().zip(thicknesses).zip(&indentation.borders[1..]))
         .map(|((name, (at_rest, pressed)), &below)| LayerResult {
