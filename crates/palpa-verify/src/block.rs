@@ -157,16 +157,22 @@ fn profiles(
 ) -> Result<(), VerifyError> {
     let table = Table::read(options, disc.profile, &["depth_m", "X_m", "uz_m"])?;
     let thicknesses: Vec<f64> = disc.layers.iter().map(|l| l.0).collect();
-    let rim = std::env::var("RIM").map_or(16, |s| s.parse().unwrap());
-    let sector = Sector::new(Outline::Square, RADIUS, rim, Finest::Rim, 0.05, &thicknesses);
+    let rim = 16;
+    let sector = Sector::new(
+        Outline::Square,
+        RADIUS,
+        rim,
+        Finest::Rim,
+        0.05,
+        &thicknesses,
+    );
     let materials = Materials::of_layers(disc.layers.iter().map(|l| l.1.clone()).collect());
     let mut pressed = Pressed::new(&sector.body, &materials, &sector.supports)?;
     let nodes = pressed.nodes();
     let mut errors = Vec::new();
-    let f = disc_forces(&mut pressed, &sector.patch, depths, |pressed, i| {
+    disc_forces(&mut pressed, &sector.patch, depths, |pressed, i| {
         errors.extend(profile_error(pressed, &table, depths[i]));
     })?;
-    println!("{:?}", f.iter().map(|f| f * 8.0).collect::<Vec<_>>());
     for (depth, error) in errors {
         findings.rows.push(Row::with_error(
             disc.case,

@@ -4,8 +4,8 @@
 //! displacement under a point force to P/(E r): for each Poisson's ratio the factors are solved for once, and every row of
 //! the tables is compared with them.
 
-use crate::small_strain::{self, Layer, Measured, STUDIED, Stack};
 use crate::sector::Finest;
+use crate::small_strain::{self, Layer, Measured, STUDIED, Stack};
 use crate::table::Table;
 use crate::tolerance::SMALL_STRAIN;
 use crate::{Findings, Options, Row, StudyPoint, VerifyError};
@@ -47,7 +47,13 @@ pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
     let punch = Table::read(
         options,
         "A1_flat_punch.csv",
-        &["E_Pa", "nu", "a_m", "k_frictionless_N_per_m", "k_bonded_N_per_m"],
+        &[
+            "E_Pa",
+            "nu",
+            "a_m",
+            "k_frictionless_N_per_m",
+            "k_bonded_N_per_m",
+        ],
     )?;
     let sphere = Table::read(
         options,
@@ -156,8 +162,7 @@ fn point_force(options: &Options, findings: &mut Findings) -> Result<(), VerifyE
     let stack = unit(nu, 1.0, Finest::Around);
     let (pressed, _) = stack.under_pressure()?;
     for (row, distance) in (0..table.len()).zip(DISTANCES.into_iter().cycle()) {
-        let [young, _, force, r, down, outward] =
-            columns.map(|column| table.number(row, column));
+        let [young, _, force, r, down, outward] = columns.map(|column| table.number(row, column));
         // u E r/P at the ring of vertices next to the distance.
         let (at, factors) = stack.ring_displacement(&pressed, distance * RADIUS);
         let [u_r, u_z] = factors.map(|u| u * at * force / (young * r));

@@ -1,7 +1,12 @@
 //! A layer on a rigid base (A2) and stacks of layers (A3), by formula.
 
-use crate::small_strain::{Layer, STUDIED, Stack, TOUCHED};
+#![expect(
+    clippy::float_cmp,
+    reason = "numbers of a table are compared as they stand there"
+)]
+
 use crate::sector::Finest;
+use crate::small_strain::{Layer, STUDIED, Stack, TOUCHED};
 use crate::table::Table;
 use crate::tolerance::SMALL_STRAIN;
 use crate::{Findings, Options, Row, StudyPoint, VerifyError};
@@ -56,13 +61,19 @@ pub(crate) fn one(options: &Options) -> Result<Findings, VerifyError> {
         };
         let unit = 4.0 * a / (1.0 - nu);
         let punch = |size: f64| for_disc(a, size, &[layer]).punch();
-        let paraboloid = |size: f64| for_sphere(a, size, &[layer]).paraboloid(1.0, a * a / chi, SHALLOW);
+        let paraboloid =
+            |size: f64| for_sphere(a, size, &[layer]).paraboloid(1.0, a * a / chi, SHALLOW);
         let force_unit = unit * a * a / chi;
         let k = punch(1.0)?;
         let force = paraboloid(1.0)?;
         for (quantity, reference, value, nodes) in [
             ("flat punch: kappa", flat, k.value / unit, k.nodes),
-            ("sphere: kappa", sphere, force.value / force_unit, force.nodes),
+            (
+                "sphere: kappa",
+                sphere,
+                force.value / force_unit,
+                force.nodes,
+            ),
         ] {
             findings.rows.push(Row::ratio(
                 CASE,
@@ -78,7 +89,11 @@ pub(crate) fn one(options: &Options) -> Result<Findings, VerifyError> {
                 let (k, force) = (punch(size)?, paraboloid(size)?);
                 for (series, nodes, error) in [
                     ("flat punch", k.nodes, k.value / unit / flat - 1.0),
-                    ("sphere", force.nodes, force.value / force_unit / sphere - 1.0),
+                    (
+                        "sphere",
+                        force.nodes,
+                        force.value / force_unit / sphere - 1.0,
+                    ),
                 ] {
                     findings.study.push(StudyPoint {
                         case: CASE,

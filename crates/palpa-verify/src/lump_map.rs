@@ -1,5 +1,10 @@
 //! A hard ball in a soft block under a small pressure that moves across it (A4).
 
+#![expect(
+    clippy::float_cmp,
+    reason = "numbers of a table are compared as they stand there"
+)]
+
 use palpa_fem::law::Linear;
 use palpa_fem::lump::{Lump, LumpShape};
 use palpa_fem::shape::{Pose, Sphere};
@@ -58,7 +63,10 @@ fn graded(from: f64, to: f64, fine: &[Fine]) -> Vec<f64> {
     let mut points: Vec<f64> = (0..=n)
         .map(|k| {
             let wanted = total * k as f64 / n as f64;
-            let i = count.partition_point(|&c| c < wanted).clamp(1, count.len() - 1) - 1;
+            let i = count
+                .partition_point(|&c| c < wanted)
+                .clamp(1, count.len() - 1)
+                - 1;
             let share = (wanted - count[i]) / (count[i + 1] - count[i]);
             from + (i as f64 + share) * step
         })
@@ -70,7 +78,10 @@ fn graded(from: f64, to: f64, fine: &[Fine]) -> Vec<f64> {
 
 /// Half of the block, y ≥ 0, fine where pressures and a ball are; `size` 1 is what results are quoted for.
 fn body(ball: &Ball, size: f64) -> LayeredBody {
-    let Ball { depth: z, radius: r } = *ball;
+    let Ball {
+        depth: z,
+        radius: r,
+    } = *ball;
     let h = size * LOAD_EDGE;
     let n = PER_RADIUS / size;
     let ball = |middle: f64| Fine {
@@ -79,7 +90,11 @@ fn body(ball: &Ball, size: f64) -> LayeredBody {
         h: (r / n).min(h),
     };
     let load = |from: f64, to: f64| Fine { from, to, h };
-    let xs = graded(-HALF_WIDTH, HALF_WIDTH, &[ball(0.0), load(-0.005, FARTHEST + 0.005)]);
+    let xs = graded(
+        -HALF_WIDTH,
+        HALF_WIDTH,
+        &[ball(0.0), load(-0.005, FARTHEST + 0.005)],
+    );
     let ys = graded(0.0, HALF_WIDTH, &[ball(0.0), load(0.0, 0.005)]);
     let depths = graded(0.0, THICKNESS, &[ball(z), load(0.0, 0.0)]);
     let levels = LevelStack {
@@ -92,7 +107,11 @@ fn body(ball: &Ball, size: f64) -> LayeredBody {
         jitter: None,
     };
     let at = |points: &[f64], u: f64| points[(u * (points.len() - 1) as f64).round() as usize];
-    mapped_grid(&grid, |u, v| Vec3::new(at(&xs, u), at(&ys, v), 0.0), &levels)
+    mapped_grid(
+        &grid,
+        |u, v| Vec3::new(at(&xs, u), at(&ys, v), 0.0),
+        &levels,
+    )
 }
 
 /// Forces of 1 N (on the whole block) under the pressure 2/(πa²) (1 − ρ²/a²) round (x, 0).
@@ -174,7 +193,9 @@ impl Blocks {
         let symmetry = &body.cut_faces[2];
         for &v in &symmetry.vertices {
             let nodes = (0..body.n_levels).map(|l| body.node(v as usize, l));
-            supports.planes.extend(nodes.map(|node| (node, symmetry.normal)));
+            supports
+                .planes
+                .extend(nodes.map(|node| (node, symmetry.normal)));
         }
         let material = |name: &str, young: f64| {
             let law = Linear::from_young(young, moduli.nu).expect("valid constants");
@@ -185,7 +206,9 @@ impl Blocks {
         materials.materials.push(material("hard", moduli.hard));
         let shape = LumpShape::Sphere(Sphere::new(ball.radius).expect("valid size"));
         let pose = Pose::translation(0.0, 0.0, -ball.depth);
-        materials.lumps.push(Lump::new(shape, pose, 0.0, 1).expect("a valid lump"));
+        materials
+            .lumps
+            .push(Lump::new(shape, pose, 0.0, 1).expect("a valid lump"));
         let with = Pressed::new(&body, &materials, &supports)?;
         Ok(Self {
             ball,

@@ -3,8 +3,8 @@
 
 use palpa_fem::law::{Linear, NeoHookean};
 use palpa_fem::{
-    Kinematics, Law, Load, Mat3, Material, Materials, Model, ModelParams, SolveParams, State, Supports,
-    Workspace, equilibrate, prism_fields,
+    Kinematics, Law, Load, Mat3, Material, Materials, Model, ModelParams, SolveParams, State,
+    Supports, Workspace, equilibrate, prism_fields,
 };
 use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
 use palpa_mesh::{CutFace, LayeredBody, Surface, Vec3};
@@ -34,7 +34,15 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
         ("irregular", Diagonal::Random(5)),
     ] {
         let body = distorted(diagonal);
-        uniform(&mut findings, CASE, &body, linear, "small strain", mesh, &small)?;
+        uniform(
+            &mut findings,
+            CASE,
+            &body,
+            linear,
+            "small strain",
+            mesh,
+            &small,
+        )?;
         uniform(
             &mut findings,
             CASE,
@@ -159,7 +167,11 @@ fn stress_error(
     prism_fields(model, state, ws)
         .iter()
         .map(|field| {
-            let ours = if is_small { field.cauchy } else { field.cauchy * pull_back };
+            let ours = if is_small {
+                field.cauchy
+            } else {
+                field.cauchy * pull_back
+            };
             (ours - exact).norm() / exact.norm()
         })
         .fold(0.0, f64::max)
@@ -168,7 +180,10 @@ fn stress_error(
 /// The patch of the reference folder: its own 16 wedges, its own stresses.
 pub(crate) fn of_reference(options: &Options) -> Result<Findings, VerifyError> {
     const CASE: &str = "V patch";
-    let folder = options.reference.as_deref().ok_or(VerifyError::NoReference)?;
+    let folder = options
+        .reference
+        .as_deref()
+        .ok_or(VerifyError::NoReference)?;
     let path = folder.join("V_wedge_patch_test.json");
     let fail = |reason: String| VerifyError::Table {
         path: path.clone(),
@@ -176,7 +191,9 @@ pub(crate) fn of_reference(options: &Options) -> Result<Findings, VerifyError> {
     };
     let text = std::fs::read_to_string(&path).map_err(|e| fail(e.to_string()))?;
     let patch: Patch = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
-    let body = patch.body().ok_or_else(|| fail("not three layers of nine nodes".to_owned()))?;
+    let body = patch
+        .body()
+        .ok_or_else(|| fail("not three layers of nine nodes".to_owned()))?;
     let matrix = |rows: [[f64; 3]; 3]| Mat3::from_fn(|i, j| rows[i][j]);
     let invalid = |e: palpa_fem::law::LawError| fail(e.to_string());
     let linear = Law::from(Linear::from_young(patch.young, patch.nu).map_err(invalid)?);
@@ -184,11 +201,32 @@ pub(crate) fn of_reference(options: &Options) -> Result<Findings, VerifyError> {
     let small = matrix(patch.grad_u_small);
     let large = matrix(patch.f_large) - Mat3::identity();
     let mut findings = Findings::default();
-    uniform(&mut findings, CASE, &body, linear, "small strain", "16 wedges", &small)?;
-    uniform(&mut findings, CASE, &body, finite, "large strain", "16 wedges", &large)?;
+    uniform(
+        &mut findings,
+        CASE,
+        &body,
+        linear,
+        "small strain",
+        "16 wedges",
+        &small,
+    )?;
+    uniform(
+        &mut findings,
+        CASE,
+        &body,
+        finite,
+        "large strain",
+        "16 wedges",
+        &large,
+    )?;
     for (what, law, gradient, reference) in [
         ("small strain: stress", linear, small, patch.sigma_small),
-        ("large strain: first Piola–Kirchhoff stress", finite, large, patch.pk1_large),
+        (
+            "large strain: first Piola–Kirchhoff stress",
+            finite,
+            large,
+            patch.pk1_large,
+        ),
     ] {
         let reference = matrix(reference);
         let error = (exact_stress(&law, &gradient) - reference).norm() / reference.norm();
@@ -227,9 +265,11 @@ impl Patch {
             return None;
         }
         let at = |v: usize, l: usize| Vec3::from(self.nodes[9 * (2 - l) + v]);
-        let triangles = self.wedges.iter().filter(|w| w[3] >= 18).map(|w| {
-            [w[3], w[4], w[5]].map(|n| n as u32 - 18)
-        });
+        let triangles = self
+            .wedges
+            .iter()
+            .filter(|w| w[3] >= 18)
+            .map(|w| [w[3], w[4], w[5]].map(|n| n as u32 - 18));
         let skin = Surface {
             points: (0..9).map(|v| at(v, 0)).collect(),
             triangles: triangles.collect(),

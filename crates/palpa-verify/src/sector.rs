@@ -134,7 +134,9 @@ impl Sector {
                 .collect(),
             n_levels: depths.len(),
             interval_layer,
-            layer_names: (1..=thicknesses.len()).map(|l| format!("layer {l}")).collect(),
+            layer_names: (1..=thicknesses.len())
+                .map(|l| format!("layer {l}"))
+                .collect(),
             cut_faces: sides(&skin, angle),
             skin,
         };
@@ -142,7 +144,9 @@ impl Sector {
         for side in &body.cut_faces {
             for &v in &side.vertices {
                 let nodes = (0..body.n_levels).map(|l| body.node(v as usize, l));
-                supports.planes.extend(nodes.map(|node| (node, side.normal)));
+                supports
+                    .planes
+                    .extend(nodes.map(|node| (node, side.normal)));
             }
         }
         Self {

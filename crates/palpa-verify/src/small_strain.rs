@@ -114,7 +114,7 @@ impl Stack {
             .skin
             .points
             .iter()
-            .map(|p| p.norm())
+            .map(palpa_mesh::Vec3::norm)
             .min_by(|a, b| (a - radius).abs().total_cmp(&(b - radius).abs()))
             .expect("there are vertices");
         let (mut sum, mut n) = ([0.0; 2], 0.0);
@@ -163,7 +163,12 @@ impl Stack {
     /// Force on a paraboloid r²/2R whose tip is `depth` below the plane, N. It should touch nearly all of the disc, see
     /// [`TOUCHED`]. It is solved for a depth of `shallow` radii of the disc: so little that vertices hardly slide along the
     /// sphere. Linear material has no scale of its own, and the force is carried over to the depth that is asked for.
-    pub(crate) fn paraboloid(&self, radius: f64, depth: f64, shallow: f64) -> Result<Measured, VerifyError> {
+    pub(crate) fn paraboloid(
+        &self,
+        radius: f64,
+        depth: f64,
+        shallow: f64,
+    ) -> Result<Measured, VerifyError> {
         let Sector { body, ring, .. } = &self.sector;
         let mut pressed = self.pressed()?;
         // So shallow a sphere is a paraboloid that touches the same place; the force is smaller by the scale.

@@ -224,7 +224,7 @@ mod tests {
             name: "all".into(),
             thickness: Some(palpa_mesh::growth::Thickness::Constant(0.02)),
             n_levels: 4,
-            min_thickness: 0.0,
+            min_thickness: 1e-3,
         };
         let params = palpa_mesh::GrowthParams {
             layers: vec![layer],

@@ -8,7 +8,6 @@ mod awkward;
 mod ccx;
 mod manifest;
 mod real;
-mod verify;
 
 use std::path::PathBuf;
 
