@@ -28,6 +28,9 @@ const SLACK: f64 = 1.4;
 /// An interval that is too high by less than this factor is not worth another level in the whole body.
 const SPARED: f64 = 1.05;
 
+/// The least edge length wanted in a part of a triangle of the grown skin, given its corners. m
+type Wish = Box<dyn Fn(u32, &[Vec3; 3]) -> f64>;
+
 /// A body fit to be pressed.
 #[derive(Debug)]
 pub struct PressedBody {
@@ -127,7 +130,7 @@ fn refine_near(
         return refine(body, &params, |_, _| f64::INFINITY);
     }
     let growth = scene.mesh.growth;
-    let mut wishes: Vec<Box<dyn Fn(u32, &[Vec3; 3]) -> f64>> = Vec::new();
+    let mut wishes: Vec<Wish> = Vec::new();
     if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
         let (points, radius) = footprint(scene, built.press_at, &place.direction);
         wishes.push(Box::new(near_points(&points, radius, SLACK * h, growth)));

@@ -201,7 +201,7 @@ fn check_series(folder: &std::path::Path) {
     );
     assert!(cells("volume_ratio").iter().all(|j| (0.5..1.5).contains(j)));
     assert!(cells("strain_energy").iter().all(|w| *w >= -1e-9));
-    let is_layer = |l: &f64| *l == 0.0 || *l == 1.0;
+    let is_layer = |l: &f64| [0.0, 1.0].contains(l);
     assert!(cells("layer").iter().all(is_layer));
     // The pressure on the skin is the force, as far as skin is under the disc.
     let contact = points("contact_pressure");

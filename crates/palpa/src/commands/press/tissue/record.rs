@@ -20,6 +20,8 @@ pub(super) struct Recorded {
 
 /// The body where it is pressed deepest.
 pub(super) struct Deepest {
+    /// Its number among the samples.
+    pub(super) sample: usize,
     pub(super) depth_mm: f64,
     pub(super) displacements: Vec<Vec3>,
     /// For each level the force on it of the tissue below. N `[n_levels]`
@@ -49,6 +51,7 @@ pub(super) fn record(
         samples: Vec::new(),
         failures: Vec::new(),
         deepest: Deepest {
+            sample: 0,
             depth_mm: 0.0,
             displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
             level_forces: Vec::new(),
@@ -67,7 +70,7 @@ pub(super) fn record(
                     series.push(out, sample.time_s, &grid(indentation, &run))?;
                 }
                 if sample.depth_mm > recorded.deepest.depth_mm {
-                    recorded.deepest = deepest(indentation, &run, sample.depth_mm);
+                    recorded.deepest = deepest(indentation, &run, number, sample.depth_mm);
                 }
             }
             recorded.samples.push(sample);
@@ -84,9 +87,10 @@ pub(super) fn record(
     Ok(recorded)
 }
 
-fn deepest(indentation: &Indentation, run: &Run<'_>, depth_mm: f64) -> Deepest {
+fn deepest(indentation: &Indentation, run: &Run<'_>, sample: usize, depth_mm: f64) -> Deepest {
     let (model, state, ws) = (&indentation.model, &run.state, &run.workspace);
     Deepest {
+        sample,
         depth_mm,
         displacements: state.displacements.clone(),
         level_forces: level_forces(model, state, ws),

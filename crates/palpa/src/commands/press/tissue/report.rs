@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::super::Job;
 use super::super::words::say_layers;
-use super::result::PressResult;
+use super::result::{PressResult, RunResult};
 use crate::build::{BuiltBody, in_mm};
 use crate::press::Phase;
 use crate::press::tissue::{Indentation, Sample};
@@ -133,30 +133,7 @@ pub(super) fn conclude(
     say_table(job, indentation, report.samples)?;
     let r = &report.result;
     for run in &r.runs {
-        let mut line = format!(
-            "{} mm/s: largest force {:.3} N at {:.2} mm",
-            run.speed_mm_s, run.max_force_n, run.at_depth_mm
-        );
-        if let Some(k) = run.secant_stiffness_n_per_mm {
-            line += &format!(" ({k:.3} N/mm on average)");
-        }
-        if let Some(relaxed) = run.relaxation {
-            line += &format!("; relaxes by {:.1} % at rest", 100.0 * relaxed);
-        }
-        if let [first, ..] = run.hysteresis[..] {
-            line += &format!(
-                "; {:.1} % of the work is lost on the way back",
-                100.0 * first
-            );
-        }
-        if let Some(left) = (run.force_after_retract_n).filter(|f| f.abs() > 0.02 * run.max_force_n)
-        {
-            line += &format!("; back at the start {left:.3} N");
-            if left < 0.0 {
-                line += ", the pull of bonded skin that has not come back yet";
-            }
-        }
-        context.say(line)?;
+        context.say(run_in_words(run))?;
     }
     say_forces(job, r)?;
     let w = &r.worst;
@@ -183,6 +160,37 @@ pub(super) fn conclude(
         context.say(format!("force against depth: {}", picture.display()))?;
     }
     Ok(())
+}
+
+/// What came out at one speed.
+fn run_in_words(run: &RunResult) -> String {
+    let mut parts = vec![format!(
+        "{} mm/s: largest force {:.3} N at {:.2} mm{}",
+        run.speed_mm_s,
+        run.max_force_n,
+        run.at_depth_mm,
+        run.secant_stiffness_n_per_mm
+            .map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
+    )];
+    parts
+        .extend((run.relaxation).map(|share| format!("relaxes by {:.1} % at rest", 100.0 * share)));
+    parts.extend(run.hysteresis.first().map(|share| {
+        let percent = (1000.0 * share).round() / 10.0 + 0.0;
+        format!("{percent:.1} % of the work is lost on the way back")
+    }));
+    let left = run.force_after_retract_n;
+    parts.extend(
+        left.filter(|f| f.abs() > 0.02 * run.max_force_n)
+            .map(|left| {
+                let why = if left < 0.0 {
+                    ", the pull of bonded skin that has not come back yet"
+                } else {
+                    ""
+                };
+                format!("back at the start {left:.3} N{why}")
+            }),
+    );
+    parts.join("; ")
 }
 
 /// The way down of the first run.

@@ -143,8 +143,8 @@ fn loss(samples: &[&Sample], cycle: u32) -> Option<f64> {
     let deepest = of_cycle().rfind(|s| s.phase == Phase::Load)?;
     // A cycle begins where the last one has ended.
     let begin = cycle.checked_sub(1).map_or(0.0, |before| {
-        let ends = samples.iter().filter(|s| s.cycle == before && is_back(s));
-        ends.last().map_or(0.0, |s| s.work_mj)
+        let mut ends = samples.iter().filter(|s| s.cycle == before && is_back(s));
+        ends.next_back().map_or(0.0, |s| s.work_mj)
     });
     let (down, lost) = (deepest.work_mj - begin, back.work_mj - begin);
     (down > 0.0).then(|| lost / down)
@@ -152,11 +152,8 @@ fn loss(samples: &[&Sample], cycle: u32) -> Option<f64> {
 
 fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
     let deepest = &recorded.deepest;
-    let of_depth = |s: &&Sample| s.outcome == "converged" && s.run == 0;
-    let mut samples = recorded.samples.iter().filter(of_depth);
-    let rest = samples.clone().next();
-    let pressed = samples.find(|s| s.depth_mm == deepest.depth_mm);
-    let (Some(rest), Some(pressed)) = (rest, pressed) else {
+    let samples = &recorded.samples;
+    let (Some(rest), Some(pressed)) = (samples.first(), samples.get(deepest.sample)) else {
         return Vec::new();
     };
     let direction = &indentation.place.direction;
