@@ -1,6 +1,6 @@
 //! A scripted indentation: the tool goes down, rests and comes back, and the force is kept.
 //!
-//! [`reference`] does it with the network of bars of 2009, [`tissue`] with the continuum; where and when is common to both.
+//! [`mod@reference`] does it with the network of bars of 2009, [`tissue`] with the continuum; where and when is common to both.
 
 pub mod lump;
 pub mod mesh;
