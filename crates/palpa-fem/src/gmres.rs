@@ -1,9 +1,15 @@
-//! GMRES, for the systems that friction makes unsymmetric.
+//! GMRES, for systems of which the factor is only a guess: friction makes them unsymmetric, or the factor is an older one.
 
 use palpa_mesh::Vec3;
 
-/// Longest basis; a solve that needs more goes on with what it has.
-const MOST_VECTORS: usize = 40;
+/// What a solve came to.
+#[derive(Debug)]
+pub(crate) struct Solution {
+    /// `M x`.
+    pub(crate) vector: Vec<Vec3>,
+    /// Norm of what is left of the right side, as a share of it.
+    pub(crate) residual: f64,
+}
 
 fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
@@ -14,23 +20,27 @@ fn norm(a: &[Vec3]) -> f64 {
 }
 
 /// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad & Schultz 1986). Stops when the
-/// residual is `tolerance` of `b`.
+/// residual is `tolerance` of `b`, or with what there is when the basis has `most` vectors.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,
+    most: usize,
     mut apply: impl FnMut(&[Vec3], &mut Vec<Vec3>),
-) -> Vec<Vec3> {
+) -> Solution {
     let size = norm(b);
     let mut solution = vec![Vec3::zeros(); b.len()];
     if size == 0.0 {
-        return solution;
+        return Solution {
+            vector: solution,
+            residual: 0.0,
+        };
     }
     let mut basis: Vec<Vec<Vec3>> = vec![b.iter().map(|x| x / size).collect()];
     // Columns of the triangular factor, rotations (cosine, sine), and the rotated right side.
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut rotations: Vec<(f64, f64)> = Vec::new();
     let mut right = vec![size];
-    while columns.len() < MOST_VECTORS {
+    while columns.len() < most {
         let j = columns.len();
         let mut next = Vec::new();
         apply(&basis[j], &mut next);
@@ -78,7 +88,10 @@ pub(crate) fn gmres(
             *x += v * weight;
         }
     }
-    solution
+    Solution {
+        vector: solution,
+        residual: right[n].abs() / size,
+    }
 }
 
 #[cfg(test)]
@@ -97,8 +110,19 @@ mod tests {
             let share = dot(&c, x);
             x.iter().zip(&a).map(|(x, a)| x + a * share).collect()
         };
-        let x = gmres(&b, 1e-12, |x, out| *out = apply(x));
+        let Solution {
+            vector: x,
+            residual,
+        } = gmres(&b, 1e-12, 40, |x, out| *out = apply(x));
+        assert!(residual < 1e-12);
+        let one = gmres(&b, 1e-12, 1, |x, out| *out = apply(x));
         let error: f64 = apply(&x).iter().zip(&b).map(|(x, b)| (x - b).norm()).sum();
         assert!(error < 1e-10, "{error}");
+        let left: f64 = apply(&one.vector)
+            .iter()
+            .zip(&b)
+            .map(|(x, b)| (x - b).norm_squared())
+            .sum();
+        assert!((left.sqrt() / norm(&b) - one.residual).abs() < 1e-12);
     }
 }

@@ -22,8 +22,16 @@ const NO_FORCE: f64 = 1e-9;
 const LEAST_SUBSTEP: f64 = 1.0 / 128.0;
 /// A sliding vertex may leave the tool's surface in an iteration by this share of the surface's radius of curvature.
 const NEAR_SURFACE: f64 = 0.05;
+/// Residual below which tools press and rub by present forces instead of predicted ones.
+const NEAR_EQUILIBRIUM: f64 = 1e-3;
 /// Residual of a linear system with friction, relative to its right side.
 const GMRES_TOLERANCE: f64 = 1e-6;
+/// Longest basis for it.
+const GMRES_VECTORS: usize = 40;
+/// The same with the factor of an earlier iteration: more would save no iteration, and beyond that many vectors a new
+/// factor is the cheaper way.
+const STALE_TOLERANCE: f64 = 1e-3;
+const STALE_VECTORS: usize = 16;
 /// Slips over which friction is smoothed, one after the other, where the exact law does not converge at once, m.
 const SMOOTHING: [f64; 4] = [1e-3, 2e-4, 4e-5, 1e-5];
 /// Smoothing that is small enough to be an answer where the exact law has none within reach, m.
@@ -61,6 +69,9 @@ pub struct SolveParams {
     pub gap_tolerance: f64,
     /// Newton iterations of one load step.
     pub max_iterations: usize,
+    /// Nodes from which on a factor is kept over iterations and steps, as the preconditioner of the next systems, until that
+    /// no longer pays. The cost of a factor grows faster with the body than that of its use.
+    pub keep_factor_from: usize,
 }
 
 impl Default for SolveParams {
@@ -69,6 +80,7 @@ impl Default for SolveParams {
             tolerance: 1e-7,
             gap_tolerance: 1e-8,
             max_iterations: 40,
+            keep_factor_from: 10_000,
         }
     }
 }
@@ -125,7 +137,7 @@ pub struct StepReport {
     pub shift: f64,
 }
 
-/// Scratch of the solver, meaningless between calls.
+/// Scratch of the solver. Between calls it keeps nothing that a result depends on by more than the tolerance.
 #[derive(Debug)]
 pub struct Workspace {
     system: LinearSystem,
@@ -135,6 +147,10 @@ pub struct Workspace {
     right_side: Vec<Vec3>,
     demand: Vec<Vec3>,
     delta: Vec<Vec3>,
+    /// Forces on nodes as the linear system has them after the step that was taken.
+    predicted: Vec<Vec3>,
+    /// Those of them, or of the present ones, that tools press and rub by.
+    contact_forces: Vec<Vec3>,
     trial: Vec<Vec3>,
     given: Vec<Hold>,
     holds: Vec<Hold>,
@@ -155,6 +171,8 @@ impl Workspace {
             right_side: zeros(),
             demand: zeros(),
             delta: zeros(),
+            predicted: zeros(),
+            contact_forces: zeros(),
             trial: zeros(),
             given: model.supports.clone(),
             holds: model.supports.clone(),
@@ -358,6 +376,22 @@ fn couple(sliding: &[(usize, Vec3, Vec3)], forces: &mut [Vec3]) {
     }
 }
 
+/// Takes from every vector its part in held directions.
+fn keep_free(holds: &[Hold], vectors: &mut [Vec3]) {
+    for (vector, hold) in vectors.iter_mut().zip(holds) {
+        *vector = hold.free_part(vector);
+    }
+}
+
+/// By which forces touches are judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Forces {
+    /// Those where the body is now: right in equilibrium. After a large step they may be many times too large, and pull.
+    Present,
+    /// Those to which the linear system leads, as if they were unknowns of their own.
+    Predicted,
+}
+
 struct Newton<'a> {
     model: &'a Model,
     load: &'a Load<'a>,
@@ -395,19 +429,28 @@ impl Newton<'_> {
             }
             ws.added.clear();
             self.add_loads(state, ws, true);
-            if self.iterations > 0 {
-                self.revise(state, ws);
+            if self.iterations > 0 && n_new == 0 {
+                self.revise(state, ws, Forces::Predicted);
             }
-            let (mut free, mut demand) = self.put_constraints(state, ws);
+            let was_far = self.iterations > 0 && self.residual > NEAR_EQUILIBRIUM;
+            let by = if was_far {
+                Forces::Predicted
+            } else {
+                Forces::Present
+            };
+            let (mut free, mut demand) = self.put_constraints(state, ws, by);
+            if was_far && self.residual <= NEAR_EQUILIBRIUM {
+                (free, demand) = self.put_constraints(state, ws, Forces::Present);
+            }
             let is_settled = self.residual <= self.params.tolerance
                 && demand <= self.params.gap_tolerance
                 && n_new == 0;
             if is_settled {
                 // Forces are right for these touches; are the touches right for these forces?
-                if self.iterations == 0 || self.revise(state, ws) == 0 {
+                if self.iterations == 0 || self.revise(state, ws, Forces::Present) == 0 {
                     return Outcome::Converged;
                 }
-                (free, demand) = self.put_constraints(state, ws);
+                (free, demand) = self.put_constraints(state, ws, Forces::Present);
             }
             if self.iterations > 0 && self.residual < 0.7 * best.0 {
                 best = (self.residual, self.iterations);
@@ -419,13 +462,22 @@ impl Newton<'_> {
                 };
             }
             self.iterations += 1;
-            match ws.system.refactor(&model.structure, &ws.holds) {
-                Ok(shift) => self.shift = self.shift.max(shift),
-                Err(_) => return Outcome::Singular,
+            let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
+            let is_kept = is_large && ws.system.is_factored;
+            if !(is_kept && self.solve(ws, true)) {
+                match ws.system.refactor(&model.structure, &ws.holds) {
+                    Ok(shift) => self.shift = self.shift.max(shift),
+                    Err(_) => return Outcome::Singular,
+                }
+                self.solve(ws, false);
             }
-            self.solve(ws);
-            if let Err(Inverted { at }) = self.search(state, ws, free, demand) {
-                return Outcome::Inverted { at: at.into() };
+            match self.search(state, ws, free, demand) {
+                Ok(share) => {
+                    for (predicted, force) in ws.predicted.iter_mut().zip(&ws.forces) {
+                        *predicted = force + *predicted * share;
+                    }
+                }
+                Err(Inverted { at }) => return Outcome::Inverted { at: at.into() },
             }
         }
     }
@@ -509,12 +561,16 @@ impl Newton<'_> {
 
     /// Lets go what would be pulled, and turns sticking to sliding and back; late in a solve only the one vertex of which
     /// that is least in doubt, so that touches cannot chatter.
-    fn revise(&self, state: &mut State, ws: &mut Workspace) -> usize {
+    fn revise(&self, state: &mut State, ws: &mut Workspace, by: Forces) -> usize {
+        let forces = match by {
+            Forces::Present => &ws.forces,
+            Forces::Predicted => &ws.predicted,
+        };
         let largest = ws
             .contacts
             .active
             .iter()
-            .map(|c| ws.forces[c.node].norm())
+            .map(|c| forces[c.node].norm())
             .fold(0.0, f64::max);
         let least = NO_FORCE * largest.max(self.floor());
         let changes = ws
@@ -523,7 +579,7 @@ impl Newton<'_> {
             .iter()
             .enumerate()
             .filter_map(|(i, contact)| {
-                let force = &ws.forces[contact.node];
+                let force = &forces[contact.node];
                 let (touch, doubt) = contact.revised(force, least)?;
                 Some((i, touch, doubt))
             });
@@ -543,7 +599,7 @@ impl Newton<'_> {
 
     /// Collects what is held and which moves that demands; puts friction and the tools' curvature into the system.
     /// Returns the norm of the free forces, N, and the largest demand, m.
-    fn put_constraints(&mut self, state: &State, ws: &mut Workspace) -> (f64, f64) {
+    fn put_constraints(&mut self, state: &State, ws: &mut Workspace, by: Forces) -> (f64, f64) {
         // What contact has put on since the last assembly comes off first.
         for (block, stiffness) in ws.added.drain(..) {
             ws.system.blocks[block] -= stiffness;
@@ -551,6 +607,10 @@ impl Newton<'_> {
         ws.holds.copy_from_slice(&ws.given);
         ws.demand.fill(Vec3::zeros());
         ws.right_side.copy_from_slice(&ws.forces);
+        ws.contact_forces.copy_from_slice(match by {
+            Forces::Present => &ws.forces,
+            Forces::Predicted => &ws.predicted,
+        });
         let mut largest = 0.0_f64;
         for &(node, target) in self.load.held {
             let demand = target - state.displacements[node];
@@ -568,7 +628,7 @@ impl Newton<'_> {
             ws.holds[node] = hold;
             ws.demand[node] = demand;
             largest = largest.max(demand.norm());
-            let force = ws.forces[node];
+            let force = ws.contact_forces[node];
             let mut stiffness = contact.geometric(&force);
             if let Touch::Slip { .. } = contact.touch {
                 let (friction, slope) = contact.friction(&force);
@@ -604,57 +664,70 @@ impl Newton<'_> {
         worst.map_or(Vec3::zeros(), |n| self.model.body.positions[n])
     }
 
-    /// `δ = demand` in held directions, and in free ones what balances the linearised forces.
+    /// `δ = demand` in held directions, and in free ones what balances the linearised forces. Says whether it does, which an
+    /// old factor may not manage.
     ///
     /// Friction at a sliding vertex grows with its pressure, which makes the stiffness unsymmetric,
-    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good guess for GMRES.
-    fn solve(&self, ws: &mut Workspace) {
+    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good guess for GMRES, as is that of a
+    /// stiffness which has changed little, under constraints of which few have changed.
+    fn solve(&self, ws: &mut Workspace, is_stale: bool) -> bool {
         let structure = &self.model.structure;
         let Workspace {
             system,
-            forces,
+            contact_forces,
             right_side,
             demand,
             delta,
+            predicted,
             holds,
             contacts,
             ..
         } = ws;
+        predicted.fill(Vec3::zeros());
         let mut carried = vec![Vec3::zeros(); right_side.len()];
         structure.multiply(&system.blocks, demand, &mut carried);
-        let sliding = contacts.sliding(forces);
+        let sliding = contacts.sliding(contact_forces);
         couple(&sliding, &mut carried);
-        for ((force, carried), hold) in right_side.iter_mut().zip(&carried).zip(holds.iter()) {
-            *force = hold.free_part(&-(*force + carried));
+        for ((force, carried), hold) in right_side.iter().zip(&mut carried).zip(holds.iter()) {
+            *carried = hold.free_part(&-(*force + *carried));
         }
-        if sliding.is_empty() {
-            system.solve(structure, right_side, delta);
+        let mut is_solved = true;
+        if sliding.is_empty() && !is_stale {
+            system.solve(structure, &carried, delta);
         } else {
-            let guess = gmres(right_side, GMRES_TOLERANCE, |x, out| {
+            let (tolerance, most) = if is_stale {
+                (STALE_TOLERANCE, STALE_VECTORS)
+            } else {
+                (GMRES_TOLERANCE, GMRES_VECTORS)
+            };
+            let solution = gmres(&carried, tolerance, most, |x, out| {
                 system.solve(structure, x, delta);
+                keep_free(holds, delta);
                 out.clear();
                 out.resize(x.len(), Vec3::zeros());
                 structure.multiply(&system.blocks, delta, out);
                 couple(&sliding, out);
-                for (y, hold) in out.iter_mut().zip(holds.iter()) {
-                    *y = hold.free_part(y);
-                }
+                keep_free(holds, out);
             });
-            system.solve(structure, &guess, delta);
+            is_solved = solution.residual <= tolerance;
+            system.solve(structure, &solution.vector, delta);
+            keep_free(holds, delta);
         }
         for (delta, demand) in delta.iter_mut().zip(demand.iter()) {
             *delta += demand;
         }
+        structure.multiply(&system.blocks, delta, predicted);
+        is_solved
     }
 
-    /// Goes along `δ` as far as no prism inverts and forces do not grow.
+    /// Goes along `δ` as far as no prism inverts and forces do not grow; gives the share of it.
     fn search(
         &self,
         state: &mut State,
         ws: &mut Workspace,
         free_before: f64,
         demand: f64,
-    ) -> Result<(), Inverted> {
+    ) -> Result<f64, Inverted> {
         let mut share = 1.0;
         let mut last = None;
         // While the tool still has to be met, forces must grow.
@@ -679,7 +752,7 @@ impl Newton<'_> {
                         && (!must_fall || self.is_better(ws, energy, free_before));
                     if is_good {
                         std::mem::swap(&mut state.displacements, &mut ws.trial);
-                        return Ok(());
+                        return Ok(share);
                     }
                     last = None;
                 }
@@ -691,7 +764,7 @@ impl Newton<'_> {
         }
         // Rounding, or a bad model of the forces: the shortest move, and the iterations decide.
         std::mem::swap(&mut state.displacements, &mut ws.trial);
-        Ok(())
+        Ok(2.0 * share)
     }
 
     /// Whether sliding vertices stay near the tool's surface, whose bend the linear step does not see.
@@ -712,14 +785,6 @@ impl Newton<'_> {
         }
         if let Some(inertia) = &self.inertia {
             inertia.add(self.model, &ws.trial, &mut forces, None);
-        }
-        for contact in &ws.contacts.active {
-            if let Touch::Slip { .. } = contact.touch {
-                let x = self.model.body.positions[contact.node] + ws.trial[contact.node];
-                let moved = contact.moved(self.load.tools, &x);
-                let (friction, _) = moved.friction(&ws.forces[contact.node]);
-                forces[contact.node] -= friction;
-            }
         }
         let free_sq: f64 = forces
             .iter()

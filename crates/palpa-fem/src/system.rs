@@ -103,7 +103,10 @@ pub(crate) struct LinearSystem {
     diagonal: Vec<usize>,
     right_side: Vec<f64>,
     factor: Factor,
+    /// The constraints it was factored under.
     holds: Vec<Hold>,
+    /// Whether there is a factor at all.
+    pub(crate) is_factored: bool,
 }
 
 impl LinearSystem {
@@ -118,6 +121,7 @@ impl LinearSystem {
             right_side: vec![0.0; n],
             factor: Factor::new(pattern),
             holds: vec![Hold::free(); n_nodes],
+            is_factored: false,
         }
     }
 
@@ -129,6 +133,7 @@ impl LinearSystem {
         holds: &[Hold],
     ) -> Result<f64, Singular> {
         self.holds.copy_from_slice(holds);
+        self.is_factored = false;
         self.fill(structure);
         let mut shift = 0.0;
         for attempt in 0..=MOST_SHIFTS {
@@ -139,6 +144,7 @@ impl LinearSystem {
                 SINGULAR_PIVOT,
             );
             if result.is_ok() {
+                self.is_factored = true;
                 return Ok(shift);
             }
             let next = if attempt == 0 {
@@ -188,7 +194,8 @@ impl LinearSystem {
         }
     }
 
-    /// Solves for the free directions: `solution = K⁻¹ right_side` there, and zero in held ones. Node-major.
+    /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A direction that was held is a spring by itself, so
+    /// that no force leads to no displacement there, and a factor from before it was let go is still a guess.
     pub(crate) fn solve(
         &mut self,
         structure: &Structure,
@@ -201,14 +208,11 @@ impl LinearSystem {
             }
             let hold = &self.holds[node];
             let dof = structure.dof(node);
-            let mut local = if hold.n == 0 {
+            let local = if hold.n == 0 {
                 *force
             } else {
                 hold.frame.tr_mul(force)
             };
-            for c in 0..usize::from(hold.n) {
-                local[c] = 0.0;
-            }
             self.right_side[dof..dof + 3].copy_from_slice(local.as_slice());
         }
         self.factor

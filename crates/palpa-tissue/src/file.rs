@@ -290,7 +290,7 @@ pub(crate) struct MeshTable {
     /// smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_lumps: Option<Length>,
-    /// By which share of the distance from tool or lump the wanted length grows, 0.02 to 5. Default: 0.3.
+    /// By which share of the distance from tool or lump the wanted length grows, 0.02 to 5. Default: 0.5.
     pub(crate) growth: f64,
     /// Most skin vertices that refinement may lead to, 100 to 500000; then the body stays as fine as they allow.
     /// Default: 20000.
@@ -303,7 +303,7 @@ impl Default for MeshTable {
             refine: true,
             near_tool: None,
             near_lumps: None,
-            growth: 0.3,
+            growth: 0.5,
             max_vertices: 20_000,
         }
     }

@@ -5,7 +5,9 @@ use palpa_fem::lump::{Lump, LumpShape};
 use palpa_fem::shape::{Pose, Sphere};
 use palpa_fem::{Material, Materials, Supports};
 use palpa_mesh::generate::{GradedBlock, LevelStack, Outline, graded_block};
-use palpa_mesh::refine::{RefineParams, near_depth, near_points, parts_for, refine, split_levels};
+use palpa_mesh::refine::{
+    RefineParams, along, near_depth, near_points, parts_for, refine, split_levels,
+};
 use palpa_mesh::{LayeredBody, Vec3};
 
 use crate::press::Pressed;
@@ -76,15 +78,15 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
             let above = Vec3::new(middle.x, middle.y, 0.0);
             let size = near_points(&[above], 1.2 * LUMP, h, 1.0);
             let surface = refine(&coarse, &RefineParams::default(), size).body;
-            let near = near_depth(depth, 1.2 * LUMP, h, 1.0);
-            split_levels(&surface, &parts_for(&LEVELS, near, 60).0).body
+            let near = along(LEVELS.to_vec(), near_depth(depth, 1.2 * LUMP, h, 1.0));
+            split_levels(&surface, &parts_for(LEVELS.len() - 1, near, 60).0).body
         };
         let held = |body: &LayeredBody| inside(body, &coarse, &block);
-        let fine = refined(1.5e-3);
+        let fine = refined(LUMP / 4.0);
         let (reference, _) = ratio(&fine, &held(&fine), &middle)?;
         for (mesh, body) in [
             ("under one triangle", coarse.clone()),
-            ("refined round it", refined(3e-3)),
+            ("refined round it", refined(LUMP / 2.0)),
         ] {
             let (ours, nodes) = ratio(&body, &held(&body), &middle)?;
             findings.rows.push(Row::with_error(

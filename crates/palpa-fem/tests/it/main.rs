@@ -8,3 +8,4 @@ mod lump;
 mod pairing;
 mod robust;
 mod shape;
+mod statics;

@@ -54,21 +54,29 @@ where
         .collect()
 }
 
-/// Divides each interval into that many equal parts in all columns; they stay in the interval's layer.
+/// Divides each interval in all columns into parts of these heights, as shares of it; they stay in the interval's layer.
 ///
 /// # Panics
-/// Unless there is a positive number of parts for each interval.
-pub fn split_levels(body: &LayeredBody, parts: &[usize]) -> LevelSplit {
+/// Unless there are parts for each interval, of positive heights that add up to 1.
+pub fn split_levels(body: &LayeredBody, parts: &[Vec<f64>]) -> LevelSplit {
+    let is_whole = |heights: &Vec<f64>| {
+        heights.iter().all(|&height| height > 0.0)
+            && (heights.iter().sum::<f64>() - 1.0).abs() < 1e-9
+    };
     assert!(
-        parts.len() + 1 == body.n_levels && parts.iter().all(|&n| n > 0),
-        "a positive number of parts for each of {} intervals, not {parts:?}",
+        parts.len() + 1 == body.n_levels && parts.iter().all(is_whole),
+        "shares of each of {} intervals, not {parts:?}",
         body.n_levels - 1
     );
     let mut origins = Vec::new();
     let mut interval_layer = Vec::new();
-    for (i, &n) in parts.iter().enumerate() {
-        origins.extend((0..n).map(|k| (i, k as f64 / n as f64)));
-        interval_layer.extend(std::iter::repeat_n(body.interval_layer[i], n));
+    for (i, heights) in parts.iter().enumerate() {
+        let mut share = 0.0;
+        for height in heights {
+            origins.push((i, share));
+            interval_layer.push(body.interval_layer[i]);
+            share += height;
+        }
     }
     origins.push((body.n_levels - 1, 0.0));
     let split = LayeredBody {
@@ -83,7 +91,7 @@ pub fn split_levels(body: &LayeredBody, parts: &[usize]) -> LevelSplit {
         PrismShape::of(&body.prism(t, i).map(|n| body.positions[n])).is_valid()
     };
     let n_invalid = (0..split.n_levels - 1)
-        .filter(|&i| parts[origins[i].0] > 1)
+        .filter(|&i| parts[origins[i].0].len() > 1)
         .flat_map(|i| (0..split.skin.triangles.len()).map(move |t| (t, i)))
         .filter(|&(t, i)| !is_valid(&split, t, i) && is_valid(body, t, origins[i].0))
         .count();
@@ -115,7 +123,7 @@ pub fn mean_depths(body: &LayeredBody, vertices: &[u32]) -> Vec<f64> {
 }
 
 /// Wants intervals of height `h` within `radius` of `depth`, and higher ones outside: by `growth` times the distance
-/// beyond. Lengths in metres; for [`parts_for`].
+/// beyond. Given the depths of top and bottom; lengths in metres. For [`along`].
 pub fn near_depth(depth: f64, radius: f64, h: f64, growth: f64) -> impl Fn(f64, f64) -> f64 {
     move |top, bottom| {
         let distance = (top - depth).max(depth - bottom).max(0.0);
@@ -123,42 +131,88 @@ pub fn near_depth(depth: f64, radius: f64, h: f64, growth: f64) -> impl Fn(f64, 
     }
 }
 
-/// Into how many parts each interval between levels at `depths` (ascending, m) has to be divided so that none is higher than
-/// `wanted` says, given the depths of its top and bottom; and whether that took no more than `max_levels` levels.
-/// If not, the parts farthest from what is wanted have been divided first. NaN is no wish.
+/// A wish for heights (m) along a column whose levels are at `depths` (ascending, m), for [`parts_for`].
+pub fn along(
+    depths: Vec<f64>,
+    wanted: impl Fn(f64, f64) -> f64,
+) -> impl Fn(usize, f64, f64) -> f64 {
+    move |i, from, to| {
+        let (top, height) = (depths[i], depths[i + 1] - depths[i]);
+        wanted(top + height * from, top + height * to) / height
+    }
+}
+
+/// Divides each of `n` intervals so that no part is higher than `wanted` says, but for a few per cent that come from whole
+/// numbers of parts. `wanted` gives, for an interval and where in it a part
+/// begins and ends, as shares of it, the greatest height, as a share too. Also says whether that took no more than
+/// `max_levels` levels; if not, all parts are higher than wanted by the same factor. NaN is no wish.
 ///
 /// ```text
-/// let depths = mean_depths(&body, &below_the_tool);
-/// let (parts, is_resolved) = parts_for(&depths, near_depth(14e-3, 6e-3, 1e-3, 0.3), 30);
+/// let wanted = along(mean_depths(&body, &below_the_tool), near_depth(14e-3, 6e-3, 1e-3, 0.3));
+/// let (parts, is_resolved) = parts_for(body.n_levels - 1, wanted, 30);
 /// let body = split_levels(&body, &parts).body;
 /// ```
 pub fn parts_for(
-    depths: &[f64],
-    wanted: impl Fn(f64, f64) -> f64,
+    n: usize,
+    wanted: impl Fn(usize, f64, f64) -> f64,
     max_levels: usize,
-) -> (Vec<usize>, bool) {
-    // By how much each interval is too high, when it is not divided.
-    let excess: Vec<f64> = depths
-        .windows(2)
-        .map(|d| (d[1] - d[0]) / wanted(d[0], d[1]))
-        .collect();
-    let mut parts = vec![1_usize; excess.len()];
-    let mut n_levels = depths.len();
+) -> (Vec<Vec<f64>>, bool) {
+    /// Factor between two tries at fewer levels, and where they end.
+    const COARSER: f64 = 1.05;
+    const COARSEST: f64 = 1e6;
+    let least = 1.0 / max_levels as f64;
+    let mut factor = 1.0;
     loop {
-        let worst = (0..parts.len())
-            .map(|i| (i, excess[i] / parts[i] as f64))
-            // Rounding must not cost a level.
-            .filter(|(_, ratio)| *ratio > 1.0 + 1e-9)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((i, _)) = worst else {
-            return (parts, true);
-        };
-        if n_levels >= max_levels {
-            return (parts, false);
+        let parts: Vec<Vec<f64>> = (0..n)
+            .map(|i| {
+                divide(|from, to| match factor * wanted(i, from, to) {
+                    height if height.is_nan() => f64::INFINITY,
+                    height => height.max(least),
+                })
+            })
+            .collect();
+        let n_levels = 1 + parts.iter().map(Vec::len).sum::<usize>();
+        // Where a part had to be as high as `least`, there are too many already.
+        if n_levels <= max_levels {
+            return (parts, factor == 1.0);
         }
-        parts[i] += 1;
-        n_levels += 1;
+        if factor > COARSEST {
+            return (vec![vec![1.0]; n], false);
+        }
+        factor *= COARSER;
     }
+}
+
+/// Heights of parts from 0 to 1 that are no higher than wanted between where they begin and end.
+fn divide(wanted: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    /// Rounding must not cost a level.
+    const ROUNDING: f64 = 1e-9;
+    const HALVINGS: usize = 40;
+    let mut heights = Vec::new();
+    let mut from = 0.0;
+    while from < 1.0 - ROUNDING {
+        let is_too_high = |height: f64| wanted(from, (from + height).min(1.0)) < height;
+        let (mut good, mut bad) = (0.0, 1.0);
+        if !is_too_high(bad) {
+            good = bad;
+        }
+        for _ in 0..HALVINGS {
+            if good == bad {
+                break;
+            }
+            let middle = f64::midpoint(good, bad);
+            if is_too_high(middle) {
+                bad = middle;
+            } else {
+                good = middle;
+            }
+        }
+        heights.push(good);
+        from += good;
+    }
+    // The last one reaches beyond the end: all of them are made lower alike.
+    let sum: f64 = heights.iter().sum();
+    heights.iter().map(|height| height / sum).collect()
 }
 
 #[cfg(test)]
@@ -168,26 +222,42 @@ mod tests {
     use crate::generate::patch::patch;
 
     #[test]
-    fn intervals_near_the_wanted_depth_are_divided_first() {
-        let depths = [0.0, 2e-3, 12e-3, 40e-3];
-        let wanted = near_depth(8e-3, 2e-3, 2e-3, 0.5);
-        let (parts, is_resolved) = parts_for(&depths, &wanted, 100);
-        // 2 mm at up to 4 mm above: 4 mm wanted; 28 mm from 4 mm below on: 3 mm.
-        assert_eq!((parts, is_resolved), (vec![1, 5, 10], true));
-        let (parts, is_resolved) = parts_for(&depths, &wanted, 8);
-        assert_eq!((parts.iter().sum::<usize>(), is_resolved), (7, false));
-        assert!(parts_for(&depths, |_, _| f64::NAN, 100).1);
-        assert!(!parts_for(&depths, |_, _| 0.0, 100).1);
+    fn parts_are_lowest_near_the_wanted_depth() {
+        let depths = vec![0.0, 2e-3, 12e-3, 40e-3];
+        let near = || near_depth(8e-3, 2e-3, 2e-3, 0.5);
+        let wanted = along(depths.clone(), near());
+        let (parts, is_resolved) = parts_for(3, &wanted, 100);
+        // 2 mm at up to 4 mm above: 4 mm wanted. Then 2 mm. From 2 mm below on 3 mm, 4.5 mm, 6.75 mm, 10.1 mm, and some.
+        let n: Vec<usize> = parts.iter().map(Vec::len).collect();
+        assert_eq!((n, is_resolved), (vec![1, 5, 5], true));
+        assert!(parts[2].windows(2).all(|pair| pair[1] > 1.2 * pair[0]));
+        for (i, heights) in parts.iter().enumerate() {
+            let mut from = 0.0;
+            for height in heights {
+                let most = wanted(i, from, from + height);
+                assert!(*height <= most * 1.1, "{i}: {from} {height} {most}");
+                from += height;
+            }
+            assert!((from - 1.0).abs() < 1e-12);
+        }
+        let (parts, is_resolved) = parts_for(3, &wanted, 8);
+        assert!(parts.iter().map(Vec::len).sum::<usize>() < 8 && !is_resolved);
+        assert_eq!(
+            parts_for(3, |_, _, _| f64::NAN, 100),
+            (vec![vec![1.0]; 3], true)
+        );
+        assert!(!parts_for(3, |_, _, _| 0.0, 100).1);
+        assert!(!parts_for(3, |_, _, _| -1.0, 3).1);
     }
 
     #[test]
-    fn parts_are_equal_and_keep_their_layer() {
+    fn parts_keep_their_layer() {
         let body = patch(3, 3, 0.01, &[0.0, 0.01, 0.03], &[0, 1]);
-        let split = split_levels(&body, &[1, 4]);
-        assert_eq!(split.body.interval_layer, [0, 1, 1, 1, 1]);
+        let split = split_levels(&body, &[vec![1.0], vec![0.25, 0.25, 0.5]]);
+        assert_eq!(split.body.interval_layer, [0, 1, 1, 1]);
         assert_eq!(split.n_invalid, 0);
         let depths = mean_depths(&split.body, &[0, 4]);
-        for (depth, expected) in depths.iter().zip([0.0, 0.01, 0.015, 0.02, 0.025, 0.03]) {
+        for (depth, expected) in depths.iter().zip([0.0, 0.01, 0.015, 0.02, 0.03]) {
             assert!((depth - expected).abs() < 1e-15, "{depths:?}");
         }
         let z: Vec<f64> = body.positions.iter().map(|p| p.z).collect();

@@ -27,7 +27,7 @@ use crate::{CutFace, LayeredBody, Surface, Vec3};
 
 use forest::Forest;
 pub use imprint::{Circle, Imprint, ImprintError, imprint_circle};
-pub use levels::{LevelSplit, mean_depths, near_depth, parts_for, split_levels};
+pub use levels::{LevelSplit, along, mean_depths, near_depth, parts_for, split_levels};
 pub use origin::Origins;
 pub use size::near_points;
 

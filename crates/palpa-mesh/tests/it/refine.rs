@@ -7,7 +7,8 @@ use palpa_mesh::generate::{GradedBlock, LevelStack, Outline, cylinder, forearm, 
 use palpa_mesh::growth::Thickness;
 use palpa_mesh::quality::prism_volume;
 use palpa_mesh::refine::{
-    RefineParams, Refined, mean_depths, near_depth, near_points, parts_for, refine, split_levels,
+    RefineParams, Refined, along, mean_depths, near_depth, near_points, parts_for, refine,
+    split_levels,
 };
 use palpa_mesh::{GrowthParams, LayerSpec, LayeredBody, Surface, Vec3, grow};
 use proptest::prelude::*;
@@ -171,7 +172,8 @@ fn a_level_split_divides_the_same_body() {
     let body = grown(&arm, &bones);
     let place = [(body.n_vertices() / 2) as u32];
     let depths = mean_depths(&body, &place);
-    let (parts, is_resolved) = parts_for(&depths, near_depth(8e-3, 3e-3, 1e-3, 0.3), 40);
+    let wanted = along(depths, near_depth(8e-3, 3e-3, 1e-3, 0.3));
+    let (parts, is_resolved) = parts_for(body.n_levels - 1, wanted, 40);
     assert!(is_resolved);
     let split = split_levels(&body, &parts);
     assert_sound(&split.body);

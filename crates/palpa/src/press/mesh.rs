@@ -3,8 +3,8 @@
 use nalgebra::Unit;
 use palpa_fem::lump::{Lump, LumpShape};
 use palpa_mesh::refine::{
-    Circle, RefineParams, Refined, imprint_circle, mean_depths, near_depth, near_points, parts_for,
-    refine, split_levels,
+    Circle, RefineParams, Refined, along, imprint_circle, mean_depths, near_depth, near_points,
+    parts_for, refine, split_levels,
 };
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
 use palpa_tissue::{ContactShape, Scene, Target, Tool};
@@ -30,6 +30,9 @@ const SPARED: f64 = 1.05;
 
 /// The least edge length wanted in a part of a triangle of the grown skin, given its corners. m
 type Wish = Box<dyn Fn(u32, &[Vec3; 3]) -> f64>;
+
+/// The greatest height wanted between two places of an interval, as shares of it.
+type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
 
 /// A body fit to be pressed.
 #[derive(Debug)]
@@ -296,22 +299,16 @@ fn split_near(
         return (body, true);
     }
     let growth = scene.mesh.growth;
-    let mut parts = vec![1; body.n_levels - 1];
-    let mut wish = |depths: &[f64], depth: f64, radius: f64, h: f64| {
-        let (wanted, is_met) = parts_for(
+    let mut wishes: Vec<LevelWish> = Vec::new();
+    let mut wish = |depths: Vec<f64>, depth: f64, radius: f64, h: f64| {
+        wishes.push(Box::new(along(
             depths,
             near_depth(depth, radius, SPARED * h, growth),
-            MOST_LEVELS,
-        );
-        for (n, wanted) in parts.iter_mut().zip(wanted) {
-            *n = wanted.max(*n);
-        }
-        is_met
+        )));
     };
-    let mut is_met = true;
     if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
         let depths = mean_depths(&body, &[place.vertex as u32]);
-        is_met &= wish(&depths, 0.0, 0.0, h);
+        wish(depths, 0.0, 0.0, h);
     }
     if !lumps.is_empty() {
         let shadows = Shadows::new(&body);
@@ -324,12 +321,18 @@ fn split_near(
                 let shadow = shadows.of(point);
                 let depths = mean_depths(&body, &body.skin.triangles[shadow.triangle]);
                 let depth = (point - shadow.on_skin).norm();
-                is_met &= wish(&depths, depth, radius, h);
+                wish(depths, depth, radius, h);
             }
         }
     }
-    is_met &= parts.iter().sum::<usize>() < MOST_LEVELS;
-    if parts.iter().all(|&n| n == 1) {
+    let wanted = |i: usize, from: f64, to: f64| {
+        wishes
+            .iter()
+            .map(|wish| wish(i, from, to))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let (parts, is_met) = parts_for(body.n_levels - 1, wanted, MOST_LEVELS);
+    if parts.iter().all(|heights| heights.len() == 1) {
         return (body, is_met);
     }
     (split_levels(&body, &parts).body, is_met)

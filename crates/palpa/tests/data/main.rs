@@ -8,6 +8,7 @@ mod awkward;
 mod ccx;
 mod manifest;
 mod real;
+mod verify;
 
 use std::path::PathBuf;
 
