@@ -103,6 +103,18 @@ impl Tool {
     }
 }
 
+impl ContactShape {
+    /// Radius of the rounding of a flat tool's edge in metres.
+    pub fn edge_radius(&self) -> Option<f64> {
+        match *self {
+            Self::FlatPunch { edge_radius, .. } | Self::Box { edge_radius, .. } => {
+                Some(edge_radius)
+            }
+            Self::Sphere { .. } | Self::Capsule { .. } | Self::Fingertip { .. } => None,
+        }
+    }
+}
+
 impl ContactTool {
     /// The tool's own axes, three unit vectors of a right-handed frame, where it moves along the unit vector `direction`:
     /// its length, its width, and out of the tissue, against `direction`.

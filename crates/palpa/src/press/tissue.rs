@@ -109,6 +109,9 @@ pub struct Sample {
     pub cone_n: f64,
     /// Largest share of a friction that does not oppose its slip.
     pub slip: f64,
+    /// Slip over which friction had to be smoothed: vertices that would be held creep by about as much. 0 for Coulomb's
+    /// exact law, which nearly every step obeys. µm
+    pub friction_smoothing_um: f64,
     /// Forces out of balance as a share of those that hold the body.
     pub residual: f64,
     /// Newton iterations.
@@ -132,7 +135,7 @@ pub struct Sample {
 
 impl Sample {
     /// The names of the fields in their order, but for the last, which is a list.
-    pub const COLUMNS: [&'static str; 26] = [
+    pub const COLUMNS: [&'static str; 27] = [
         "run",
         "speed_mm_s",
         "phase",
@@ -151,6 +154,7 @@ impl Sample {
         "tension_n",
         "cone_n",
         "slip",
+        "friction_smoothing_um",
         "residual",
         "iterations",
         "substeps",
@@ -586,6 +590,7 @@ impl Run<'_> {
             tension_n: contact.tension,
             cone_n: contact.cone,
             slip: contact.slip,
+            friction_smoothing_um: report.friction_smoothing * 1e6,
             residual: report.residual,
             iterations: report.iterations,
             substeps: report.substeps,
@@ -743,6 +748,19 @@ fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes: &mut Vec<S
              depends on the mesh; refine it with [mesh] near_tool",
             mesh.mesh_size * 1e3,
             radius * 1e3
+        ));
+    }
+    let edge = scene
+        .tool
+        .contact()
+        .and_then(|tool| tool.shape.edge_radius());
+    if let Some(edge) = edge.filter(|&edge| edge < FEWEST_EDGES * mesh.mesh_size) {
+        notes.push(format!(
+            "skin edges near the tool are {:.1} mm long, more than a third of its edge's radius of {:.1} mm: vertices find the \
+             rounded edge or miss it, so that there can be several balances of forces and the force depends on the steps; \
+             make the edge rounder, or refine the mesh with [mesh] near_tool",
+            mesh.mesh_size * 1e3,
+            edge * 1e3
         ));
     }
 }

@@ -69,6 +69,7 @@ pub(super) struct Worst {
     pub(super) tension_n: f64,
     pub(super) cone_n: f64,
     pub(super) slip: f64,
+    pub(super) friction_smoothing_um: f64,
     pub(super) residual: f64,
     pub(super) volume_ratio_min: f64,
     pub(super) volume_ratio_max: f64,
@@ -180,6 +181,7 @@ fn worst(good: &[&Sample]) -> Worst {
         tension_n: largest(|s| s.tension_n),
         cone_n: largest(|s| s.cone_n),
         slip: largest(|s| s.slip),
+        friction_smoothing_um: largest(|s| s.friction_smoothing_um),
         residual: largest(|s| s.residual),
         volume_ratio_min: (good.iter().map(|s| s.volume_ratio_min)).fold(f64::INFINITY, f64::min),
         volume_ratio_max: largest(|s| s.volume_ratio_max),
@@ -197,6 +199,17 @@ fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Ve
             )
         })
         .collect();
+    let smoothed = (good.iter())
+        .filter(|s| s.friction_smoothing_um > 0.0)
+        .count();
+    if smoothed > 0 {
+        notes.push(format!(
+            "friction had to be smoothed in {smoothed} of {} steps, over a slip of up to {:.0} µm: what would be held creeps by \
+             about as much",
+            good.len(),
+            worst(good).friction_smoothing_um
+        ));
+    }
     let widest = (good.iter()).max_by(|a, b| a.contact_area_mm2.total_cmp(&b.contact_area_mm2));
     if let Some(widest) = widest.filter(|_| !indentation.is_bonded()) {
         let radius = (widest.contact_area_mm2 / std::f64::consts::PI).sqrt();
