@@ -36,7 +36,7 @@ pub(crate) struct Contact {
     /// m, negative inside the tool.
     pub(crate) gap: f64,
     /// From the tool to the tissue.
-    pub(crate) normal: Vec3,
+    normal: Vec3,
     curvature: Mat3,
     /// Where the anchor is now, from the vertex, m.
     to_anchor: Vec3,
@@ -171,12 +171,22 @@ impl Contact {
         }
     }
 
-    /// What the tool demands: directions held, and the move along them.
-    pub(crate) fn demand(&self, hold: Hold) -> (Hold, Vec3) {
+    /// What the tool demands: directions held, and the move along them. `body_force` is what friction has held against.
+    ///
+    /// A vertex that is just released can only go against the friction that held it: that of a slip as short turns at once
+    /// to wherever the vertex goes, which is infinitely stiff across.
+    pub(crate) fn demand(&self, hold: Hold, body_force: &Vec3) -> (Hold, Vec3) {
         match self.touch {
-            Touch::Stick { .. } => (Hold::all(), self.to_anchor),
-            _ => (hold.and(&self.normal), -self.normal * self.gap),
+            Touch::Stick { .. } => return (Hold::all(), self.to_anchor),
+            Touch::Slip { .. } if self.is_just_released() => {
+                let across = self.normal.cross(&self.tangential(body_force));
+                let hold = hold.and(&self.normal);
+                let hold = across.try_normalize(0.0).map_or(hold, |a| hold.and(&a));
+                return (hold, -self.normal * self.gap);
+            }
+            _ => {}
         }
+        (hold.and(&self.normal), -self.normal * self.gap)
     }
 
     /// Pressing part of the tool's force on the vertex, which balances the body's force on it, N.

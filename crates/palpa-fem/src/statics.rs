@@ -432,7 +432,9 @@ impl Newton<'_> {
             if self.iterations > 0 && n_new == 0 {
                 self.revise(state, ws, Forces::Predicted);
             }
-            let was_far = self.iterations > 0 && self.residual > NEAR_EQUILIBRIUM;
+            let was_far = self.iterations > 0
+                && self.residual > NEAR_EQUILIBRIUM
+                && ws.contacts.smoothing == 0.0;
             let by = if was_far {
                 Forces::Predicted
             } else {
@@ -451,6 +453,7 @@ impl Newton<'_> {
                     return Outcome::Converged;
                 }
                 (free, demand) = self.put_constraints(state, ws, Forces::Present);
+                best = (f64::INFINITY, self.iterations);
             }
             if self.iterations > 0 && self.residual < 0.7 * best.0 {
                 best = (self.residual, self.iterations);
@@ -624,11 +627,11 @@ impl Newton<'_> {
         }
         for contact in &ws.contacts.active {
             let node = contact.node;
-            let (hold, demand) = contact.demand(ws.given[node]);
+            let force = ws.contact_forces[node];
+            let (hold, demand) = contact.demand(ws.given[node], &force);
             ws.holds[node] = hold;
             ws.demand[node] = demand;
             largest = largest.max(demand.norm());
-            let force = ws.contact_forces[node];
             let mut stiffness = contact.geometric(&force);
             if let Touch::Slip { .. } = contact.touch {
                 let (friction, slope) = contact.friction(&force);
@@ -681,6 +684,7 @@ impl Newton<'_> {
             predicted,
             holds,
             contacts,
+            added,
             ..
         } = ws;
         predicted.fill(Vec3::zeros());
@@ -717,6 +721,10 @@ impl Newton<'_> {
             *delta += demand;
         }
         structure.multiply(&system.blocks, delta, predicted);
+        // What contact has put on the stiffness is none of the body's.
+        for (contact, (_, stiffness)) in contacts.active.iter().zip(added.iter()) {
+            predicted[contact.node] -= stiffness * delta[contact.node];
+        }
         is_solved
     }
 
