@@ -14,16 +14,20 @@ use crate::tolerance::{BLOCK, BLOCK_LUMP, BONDED, BONDED_DEEP, PROFILE};
 use crate::{Findings, Options, Row, StudyPoint, VerifyError};
 
 /// Radius of the bonded disc and of the sphere, m.
-const RADIUS: f64 = 0.01;
+pub(crate) const RADIUS: f64 = 0.01;
+/// Radius within which the mesh under the sphere is not graded, m.
+const SPHERE_RING: f64 = 0.8 * RADIUS;
 /// Thickness of the block, m.
 const THICKNESS: f64 = 0.04;
 
-/// A mesh, by a name for pictures: edges under the tool, and how many intervals.
-struct Mesh {
-    spacing: f64,
-    growth: f64,
-    /// First height and growth of each layer's levels.
-    levels: Vec<(f64, f64)>,
+/// A mesh that is fine under the tool.
+pub(crate) struct Mesh {
+    /// Length of edges under the tool, m.
+    pub(crate) spacing: f64,
+    /// By how much edges lengthen per metre beyond it.
+    pub(crate) growth: f64,
+    /// First height (m) and growth of each layer's levels.
+    pub(crate) levels: Vec<(f64, f64)>,
 }
 
 fn material(young: f64, nu: f64) -> Material {
@@ -32,7 +36,7 @@ fn material(young: f64, nu: f64) -> Material {
 }
 
 /// Skin, fat and muscle.
-fn layered(nu: f64) -> Vec<(f64, Material)> {
+pub(crate) fn layered(nu: f64) -> Vec<(f64, Material)> {
     vec![
         (0.002, material(100e3, nu)),
         (0.010, material(5e3, nu)),
@@ -44,7 +48,7 @@ fn homogeneous() -> Vec<(f64, Material)> {
     vec![(THICKNESS, material(30e3, 0.45))]
 }
 
-fn block(mesh: &Mesh, ring: f64) -> GradedBlock {
+pub(crate) fn block(mesh: &Mesh, ring: f64) -> GradedBlock {
     GradedBlock {
         outline: generate::Outline::Square,
         half_width: 0.05,
@@ -70,17 +74,21 @@ fn body(block: &GradedBlock, mesh: &Mesh, layers: &[(f64, Material)]) -> Layered
     graded_block(block, &LevelStack::graded(&graded))
 }
 
-/// Presses a bonded disc through the depths, in steps of 1 mm; gives the force at each.
+/// The longest step of a bonded disc, m.
+const STEP: f64 = 1e-3;
+
+/// Presses a bonded disc through the depths, in steps of `longest` at most; gives the force at each.
 fn disc_forces(
     pressed: &mut Pressed,
     patch: &[u32],
     depths: &[f64],
+    longest: f64,
     mut at_depth: impl FnMut(&Pressed, usize),
 ) -> Result<Vec<f64>, VerifyError> {
     let mut forces = Vec::new();
     let mut depth = 0.0;
     for (i, &target) in depths.iter().enumerate() {
-        let n = ((target - depth) / 1e-3_f64).ceil().max(1.0) as usize;
+        let n = ((target - depth) / longest - 1e-9).ceil().max(1.0) as usize;
         let mut force = 0.0;
         for step in 1..=n {
             let next = depth + (target - depth) * step as f64 / n as f64;
@@ -91,6 +99,40 @@ fn disc_forces(
         at_depth(pressed, i);
     }
     Ok(forces)
+}
+
+/// Presses a bonded disc, the ring of the block, through the depths in steps of `longest_step` at most; gives the force at each, and the nodes that can move.
+pub(crate) fn press_disc(
+    block: &GradedBlock,
+    mesh: &Mesh,
+    layers: &[(f64, Material)],
+    depths: &[f64],
+    longest_step: f64,
+) -> Result<(Vec<f64>, usize), VerifyError> {
+    let body = body(block, mesh, layers);
+    let patch = block.patch_vertices(&body);
+    let materials = layers.iter().map(|l| l.1.clone()).collect();
+    let mut pressed = Pressed::layered(&body, materials)?;
+    let forces = disc_forces(&mut pressed, &patch, depths, longest_step, |_, _| {})?;
+    Ok((forces, pressed.nodes()))
+}
+
+/// Depths to `deepest` and the forces there, of a table of a bonded disc.
+pub(crate) fn known_disc_forces(
+    options: &Options,
+    name: &str,
+    deepest: f64,
+) -> Result<Vec<(f64, f64)>, VerifyError> {
+    let table = Table::read(options, name, &["depth_m", "F_N_extrapolated"])?;
+    let known = (0..table.len()).map(|row| {
+        (
+            table.number(row, "depth_m"),
+            table.number(row, "F_N_extrapolated"),
+        )
+    });
+    Ok(known
+        .filter(|(depth, force)| *depth <= deepest + 1e-9 && force.is_finite())
+        .collect())
 }
 
 /// One table of a bonded disc: forces on several meshes, rows from the finest, and the surface's profile.
@@ -105,26 +147,12 @@ struct Disc<'a> {
 }
 
 fn disc(options: &Options, disc: &Disc<'_>, findings: &mut Findings) -> Result<(), VerifyError> {
-    let table = Table::read(options, disc.table, &["depth_m", "F_N_extrapolated"])?;
-    let wanted: Vec<(f64, f64)> = (0..table.len())
-        .map(|row| {
-            (
-                table.number(row, "depth_m"),
-                table.number(row, "F_N_extrapolated"),
-            )
-        })
-        .filter(|(depth, force)| *depth <= disc.deepest + 1e-9 && force.is_finite())
-        .collect();
+    let wanted = known_disc_forces(options, disc.table, disc.deepest)?;
     let depths: Vec<f64> = wanted.iter().map(|w| w.0).collect();
     for (m, mesh) in disc.meshes.iter().enumerate() {
-        let block = block(mesh, RADIUS);
-        let body = body(&block, mesh, &disc.layers);
-        let patch = block.patch_vertices(&body);
-        let materials = disc.layers.iter().map(|l| l.1.clone()).collect();
-        let mut pressed = Pressed::layered(&body, materials)?;
         let is_finest = m + 1 == disc.meshes.len();
-        let forces = disc_forces(&mut pressed, &patch, &depths, |_, _| {})?;
-        let nodes = pressed.nodes();
+        let block = block(mesh, RADIUS);
+        let (forces, nodes) = press_disc(&block, mesh, &disc.layers, &depths, STEP)?;
         for (&(depth, reference), force) in wanted.iter().zip(forces) {
             findings.study.push(StudyPoint {
                 case: disc.case,
@@ -170,7 +198,7 @@ fn profiles(
     let mut pressed = Pressed::new(&sector.body, &materials, &sector.supports)?;
     let nodes = pressed.nodes();
     let mut errors = Vec::new();
-    disc_forces(&mut pressed, &sector.patch, depths, |pressed, i| {
+    disc_forces(&mut pressed, &sector.patch, depths, STEP, |pressed, i| {
         errors.extend(profile_error(pressed, &table, depths[i]));
     })?;
     for (depth, error) in errors {
@@ -301,7 +329,7 @@ pub(crate) fn b3c(options: &Options) -> Result<Findings, VerifyError> {
                 materials.lumps.push(lump.expect("a valid lump"));
             }
             let mut pressed = Pressed::new(&body, &materials, &Supports::on_base(&body))?;
-            let forces = disc_forces(&mut pressed, &patch, &depths, |_, _| {})?;
+            let forces = disc_forces(&mut pressed, &patch, &depths, STEP, |_, _| {})?;
             Ok((forces, pressed.nodes()))
         };
         let ((with, nodes), (without, _)) = (forces(true)?, forces(false)?);
@@ -336,12 +364,8 @@ pub(crate) fn b3c(options: &Options) -> Result<Findings, VerifyError> {
 
 pub(crate) fn b4(options: &Options) -> Result<Findings, VerifyError> {
     const CASE: &str = "B4";
-    const COLUMNS: [&str; 3] = [
-        "depth_m",
-        "F_N_calculix_block_C3D10",
-        "F_N_own_axisym_cyl_R50_h0.65",
-    ];
-    let table = Table::read(options, "B4_sphere_frictionless_homogeneous.csv", &COLUMNS)?;
+    let wanted = known_sphere_forces(options)?;
+    let depths: Vec<f64> = wanted.iter().map(|w| w.0).collect();
     let profile = Table::read(
         options,
         "B4_hom_surface_profile.csv",
@@ -359,24 +383,15 @@ pub(crate) fn b4(options: &Options) -> Result<Findings, VerifyError> {
         levels: vec![(first, level_growth)],
     })
     .collect();
-    let tool = Tool::new(Sphere::new(RADIUS).expect("valid size"), 0.0).expect("no friction");
     let mut findings = Findings::default();
     for (m, mesh) in meshes.iter().enumerate() {
-        let body = body(&block(mesh, 0.8 * RADIUS), mesh, &homogeneous());
-        let materials = homogeneous().into_iter().map(|l| l.1).collect();
-        let mut pressed = Pressed::layered(&body, materials)?;
-        let nodes = pressed.nodes();
-        for row in 0..table.len() {
-            let depth = table.number(row, COLUMNS[0]);
-            // The block where it was run, else the cylinder of equal thickness.
-            let block = table.number(row, COLUMNS[1]);
-            let reference = if block.is_finite() {
-                block
-            } else {
-                table.number(row, COLUMNS[2])
-            };
-            let report = pressed.press(tool, [0.0; 2], depth)?;
-            let force = report.tool_forces[0].z;
+        let is_finest = m + 1 == meshes.len();
+        let block = block(mesh, SPHERE_RING);
+        let mut profiles = Vec::new();
+        let (forces, nodes) = press_sphere(&block, mesh, [0.0; 2], &depths, |pressed, i| {
+            profiles.push(profile_error(pressed, &profile, depths[i]));
+        })?;
+        for ((&(depth, reference), force), profile) in wanted.iter().zip(forces).zip(profiles) {
             let mm = depth * 1e3;
             findings.study.push(StudyPoint {
                 case: CASE,
@@ -385,29 +400,67 @@ pub(crate) fn b4(options: &Options) -> Result<Findings, VerifyError> {
                 nodes,
                 error: force / reference - 1.0,
             });
-            if m + 1 == meshes.len() {
-                findings.rows.push(Row::ratio(
+            if !is_finest {
+                continue;
+            }
+            findings.rows.push(Row::ratio(
+                CASE,
+                format!("force at {mm} mm, N"),
+                reference,
+                force,
+                BLOCK,
+                nodes,
+            ));
+            if let Some((_, error)) = profile {
+                findings.rows.push(Row::with_error(
                     CASE,
-                    format!("force at {mm} mm, N"),
-                    reference,
-                    force,
-                    BLOCK,
+                    format!("profile at {mm} mm: largest error over peak"),
+                    [0.0, error],
+                    error,
+                    PROFILE,
                     nodes,
                 ));
-                if let Some((_, error)) = profile_error(&pressed, &profile, depth) {
-                    findings.rows.push(Row::with_error(
-                        CASE,
-                        format!("profile at {mm} mm: largest error over peak"),
-                        [0.0, error],
-                        error,
-                        PROFILE,
-                        nodes,
-                    ));
-                }
             }
         }
     }
     Ok(findings)
+}
+
+/// Presses the frictionless sphere over (x, y) of the homogeneous block through the depths; gives the force at each, and the
+/// nodes that can move.
+pub(crate) fn press_sphere(
+    block: &GradedBlock,
+    mesh: &Mesh,
+    at: [f64; 2],
+    depths: &[f64],
+    mut at_depth: impl FnMut(&Pressed, usize),
+) -> Result<(Vec<f64>, usize), VerifyError> {
+    let tool = Tool::new(Sphere::new(RADIUS).expect("valid size"), 0.0).expect("no friction");
+    let body = body(block, mesh, &homogeneous());
+    let materials = homogeneous().into_iter().map(|l| l.1).collect();
+    let mut pressed = Pressed::layered(&body, materials)?;
+    let mut forces = Vec::new();
+    for (i, &depth) in depths.iter().enumerate() {
+        let report = pressed.press(tool, at, depth)?;
+        forces.push(report.tool_forces[0].z);
+        at_depth(&pressed, i);
+    }
+    Ok((forces, pressed.nodes()))
+}
+
+/// Depths and forces of the sphere: those of the block where it was run, else of the cylinder of equal thickness.
+pub(crate) fn known_sphere_forces(options: &Options) -> Result<Vec<(f64, f64)>, VerifyError> {
+    const COLUMNS: [&str; 3] = [
+        "depth_m",
+        "F_N_calculix_block_C3D10",
+        "F_N_own_axisym_cyl_R50_h0.65",
+    ];
+    let table = Table::read(options, "B4_sphere_frictionless_homogeneous.csv", &COLUMNS)?;
+    let known = (0..table.len()).map(|row| {
+        let [depth, block, cylinder] = COLUMNS.map(|column| table.number(row, column));
+        (depth, if block.is_finite() { block } else { cylinder })
+    });
+    Ok(known.collect())
 }
 
 /// The cylinder of radius 20 mm and height 40 mm between bonded plates.
@@ -448,7 +501,7 @@ pub(crate) fn b5(options: &Options) -> Result<Findings, VerifyError> {
         let body = graded_block(&block, &levels);
         let mut pressed = Pressed::layered(&body, vec![material(30e3, 0.45)])?;
         let top: Vec<u32> = (0..body.n_vertices() as u32).collect();
-        let forces = disc_forces(&mut pressed, &top, &depths, |_, _| {})?;
+        let forces = disc_forces(&mut pressed, &top, &depths, STEP, |_, _| {})?;
         for (row, force) in forces.into_iter().enumerate() {
             let reference = table.number(row, "F_N_extrapolated");
             let mm = depths[row] * 1e3;

@@ -15,6 +15,7 @@
 mod block;
 mod columns;
 mod contact;
+mod economy;
 mod half_space;
 mod layer;
 mod lump_map;
@@ -304,5 +305,12 @@ static CASES: &[Case] = &[
         source: "CalculiX, extrapolated, and an axisymmetric code",
         needs_reference: true,
         run: block::b5,
+    },
+    Case {
+        name: "economy",
+        title: "how few nodes are enough for B2 and B4: the worst over depths and meshes that are alike",
+        source: "CalculiX, as B2 and B4",
+        needs_reference: true,
+        run: economy::run,
     },
 ];

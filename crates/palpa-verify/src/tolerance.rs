@@ -20,6 +20,12 @@ pub const LUMP: f64 = 0.10;
 pub const LUMP_LEAST: f64 = 0.02;
 /// Force of blocks at large strain (B1, B2, B4).
 pub const BLOCK: f64 = 0.03;
+/// The same on few nodes that are graded toward the tool: the worst over depths and meshes that are alike.
+pub const ECONOMY: f64 = 0.02;
+/// Under a disc on irregular triangles.
+pub const ECONOMY_IRREGULAR: f64 = 0.025;
+/// Under a sphere on the finer of those meshes.
+pub const ECONOMY_FINE: f64 = 0.01;
 /// What a lump adds to the force at large strain (B3c).
 pub const BLOCK_LUMP: f64 = 0.15;
 /// Surface profiles, as a share of their peak.

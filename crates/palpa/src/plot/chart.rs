@@ -114,6 +114,7 @@ impl Band {
 pub struct Guide {
     at: f64,
     is_vertical: bool,
+    is_named_right: bool,
     name: String,
 }
 
@@ -123,6 +124,7 @@ impl Guide {
         Self {
             at,
             is_vertical: true,
+            is_named_right: false,
             name: name.into(),
         }
     }
@@ -133,6 +135,13 @@ impl Guide {
             is_vertical: false,
             ..Self::x(at, name)
         }
+    }
+
+    /// Puts the name of a horizontal line at its right end: for curves that fall through it from the left.
+    #[must_use]
+    pub fn named_right(mut self) -> Self {
+        self.is_named_right = true;
+        self
     }
 }
 
@@ -371,7 +380,12 @@ impl Chart {
             } else if !guide.is_vertical && (0.0..=1.0).contains(&view.y.place(guide.at)) {
                 let y = view.y_of(guide.at);
                 canvas.line([plot.x, y], [plot.right(), y], GUIDE_LINE);
-                canvas.text([plot.x + 6.0, y - 9.0], &guide.name, REMARK);
+                let (x, anchor) = if guide.is_named_right {
+                    (plot.right() - 6.0, Anchor::End)
+                } else {
+                    (plot.x + 6.0, Anchor::Start)
+                };
+                canvas.text([x, y - 9.0], &guide.name, Font { anchor, ..REMARK });
             }
         }
     }

@@ -8,10 +8,12 @@ use super::report::share;
 use crate::plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 use crate::reproduce::fit::line;
 
-/// As many curves as can be told apart in a panel.
-const MOST_CURVES: usize = 6;
-/// Errors further below the tolerance than this share of it are not looked at.
-const LEAST_SHARE: f64 = 1e-3;
+/// Up to this many curves are told apart by name; of more, what counts is shown: the worst and the mean.
+const MOST_NAMED: usize = 4;
+/// Errors further below the lowest curve with a name than this share of it are not looked at.
+const LEAST_SHARE: f64 = 0.3;
+/// How much of the ink a curve without a name has.
+const FAINT: f64 = 0.3;
 
 /// One curve of a study: errors on meshes, from coarse to fine.
 struct Curve<'a> {
@@ -20,50 +22,73 @@ struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Sizes relative to the coarsest mesh's, and errors without their sign.
-    fn placed(&self) -> Vec<[f64; 2]> {
-        let coarsest = self.points.iter().map(|p| p.h).fold(0.0, f64::max);
+    /// Sizes of the meshes, numbers of nodes, and errors without their sign.
+    fn placed(&self) -> Vec<Placed> {
         (self.points.iter())
-            .map(|p| [p.h / coarsest, p.error.abs()])
+            .map(|p| Placed {
+                h: p.h,
+                nodes: p.nodes as f64,
+                error: p.error.abs(),
+            })
             .collect()
-    }
-
-    /// The power of the mesh's size that the error falls with, by least squares over all meshes. An error that changes its
-    /// sign on the way has none: where it passes zero says nothing of how it falls.
-    fn order(&self) -> Option<f64> {
-        let is_one_sided =
-            self.points.iter().all(|p| p.error > 0.0) || self.points.iter().all(|p| p.error < 0.0);
-        let logs: Vec<[f64; 2]> = self.placed().iter().map(|p| p.map(f64::ln)).collect();
-        if is_one_sided {
-            line(&logs).map(|l| l.slope)
-        } else {
-            None
-        }
     }
 }
 
-/// The order of the root of the mean square over all curves, if they are on the same meshes: of single curves it is rough
-/// where an error comes near zero or near that of the reference.
-fn mean_order(curves: &[Curve<'_>]) -> Option<f64> {
-    let placed: Vec<Vec<[f64; 2]>> = curves.iter().map(Curve::placed).collect();
-    let sizes: Vec<f64> = placed.first()?.iter().map(|p| p[0]).collect();
-    let is_same = |other: &Vec<[f64; 2]>| {
-        other.len() == sizes.len()
-            && other
-                .iter()
-                .zip(&sizes)
-                .all(|(p, h)| p[0].to_bits() == h.to_bits())
-    };
-    if placed.len() < 2 || !placed.iter().all(is_same) {
+/// An error without its sign, on a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Placed {
+    h: f64,
+    nodes: f64,
+    error: f64,
+}
+
+/// The power of the mesh's size that an error falls with, by least squares over all meshes. One that does not fall from each
+/// mesh to the next has none: it passes zero on the way, or has come down to the accuracy of the reference.
+fn order(points: &[Placed]) -> Option<f64> {
+    let falls = |p: &[Placed]| p[1].error < p[0].error && p[1].h < p[0].h;
+    if !points.windows(2).all(falls) {
         return None;
     }
-    let logs: Vec<[f64; 2]> = (sizes.iter().enumerate())
-        .map(|(i, h)| {
-            let squares: f64 = placed.iter().map(|c| c[i][1].powi(2)).sum();
-            [h.ln(), 0.5 * (squares / placed.len() as f64).ln()]
-        })
-        .collect();
+    let logs: Vec<[f64; 2]> = (points.iter()).map(|p| [p.h.ln(), p.error.ln()]).collect();
     line(&logs).map(|l| l.slope)
+}
+
+/// A curve's name, with its order if it has one.
+fn with_order(name: &str, points: &[Placed]) -> String {
+    order(points).map_or_else(
+        || name.to_owned(),
+        |order| format!("{name}: order {order:.1}"),
+    )
+}
+
+/// The largest error of the curves on each mesh and the root of their mean square, if they are on the same meshes.
+fn summary(curves: &[Curve<'_>]) -> Option<[Vec<Placed>; 2]> {
+    let placed: Vec<Vec<Placed>> = curves.iter().map(Curve::placed).collect();
+    let first = placed.first()?;
+    let is_same = |other: &Vec<Placed>| {
+        other.len() == first.len()
+            && (other.iter().zip(first)).all(|(a, b)| a.h.to_bits() == b.h.to_bits())
+    };
+    if !placed.iter().all(is_same) {
+        return None;
+    }
+    let over = |figure: &dyn Fn(&[f64]) -> f64| {
+        (first.iter().enumerate())
+            .map(|(i, p)| {
+                let errors: Vec<f64> = placed.iter().map(|curve| curve[i].error).collect();
+                Placed {
+                    error: figure(&errors),
+                    ..*p
+                }
+            })
+            .collect()
+    };
+    let worst = over(&|errors| errors.iter().copied().fold(0.0, f64::max));
+    let mean = over(&|errors| {
+        let squares: f64 = errors.iter().map(|e| e * e).sum();
+        (squares / errors.len() as f64).sqrt()
+    });
+    Some([worst, mean])
 }
 
 /// Draws the study of all cases that have one.
@@ -77,7 +102,7 @@ pub(super) fn draw(found: &Findings) -> Picture {
     let charts: Vec<Chart> = names.iter().map(|case| panel(case, found)).collect();
     let n_columns = if charts.len() <= 4 { 2 } else { 3 };
     panels(
-        "Errors against mesh size; beside each curve its observed order, ± where the error changes its sign",
+        "Errors of ever finer meshes (grey: single curves). Order in mesh size, where an error falls on every finer mesh",
         &charts,
         n_columns,
     )
@@ -85,54 +110,83 @@ pub(super) fn draw(found: &Findings) -> Picture {
 
 fn panel(case: &str, found: &Findings) -> Chart {
     let curves = curves(case, found);
-    let n_all = curves.len();
-    let mean_order = mean_order(&curves);
-    let shown = spread(curves, MOST_CURVES);
-    let tolerances = tolerances(case, found, &shown);
-    let errors = || shown.iter().flat_map(Curve::placed).map(|p| p[1]);
-    let strictest = tolerances.iter().copied().fold(f64::INFINITY, f64::min);
-    let low = errors()
+    let common = common_start(&curves);
+    let summary = if curves.len() > MOST_NAMED {
+        summary(&curves)
+    } else {
+        None
+    };
+    let named: Vec<(String, Vec<Placed>)> = match summary {
+        Some([worst, mean]) => vec![
+            (with_order("worst", &worst), worst),
+            (with_order("root mean square", &mean), mean),
+        ],
+        None => (curves.iter())
+            .map(|curve| {
+                let placed = curve.placed();
+                (with_order(&curve.name[common.len()..], &placed), placed)
+            })
+            .collect(),
+    };
+    let tolerances = tolerances(case, found, &curves);
+    let errors = || named.iter().flat_map(|(_, points)| points).map(|p| p.error);
+    let low = (errors().chain(tolerances.iter().copied()))
         .filter(|e| *e > 0.0)
-        .fold(strictest, f64::min)
-        .max(LEAST_SHARE * strictest);
+        .fold(f64::INFINITY, f64::min);
     let high = errors()
         .chain(tolerances.iter().copied())
         .fold(low, f64::max);
-    let nodes = || shown.iter().flat_map(|c| &c.points).map(|p| p.nodes);
-    let [fewest, most] = [nodes().min(), nodes().max()].map(Option::unwrap_or_default);
-    let mut title = case.to_owned();
-    if let Some(order) = mean_order {
-        let order = format!("{order:.1}").replace('-', "−");
-        let _ = write!(title, ": order {order} in the mean");
-    }
-    if n_all > shown.len() {
-        let _ = write!(title, ", {} of {n_all} curves", shown.len());
-    }
     let what = palpa_verify::cases().iter().find(|c| c.name == case);
     let mut chart = Chart::new(
-        Axis::log(format!(
-            "mesh size ÷ the coarsest ({fewest} to {most} nodes)"
-        )),
-        Axis::log("|error| [%]").with_range(low * 1e2, high * 1e2),
+        Axis::log("nodes that can move"),
+        Axis::log("|error| [%]").with_range(LEAST_SHARE * low * 1e2, high * 1e2),
     )
-    .title(title)
+    .title(title(case, common, curves.len(), named.len()))
     .subtitle(what.map_or("", |c| c.title));
-    for (i, curve) in shown.iter().enumerate() {
-        let name = match curve.order() {
-            Some(order) => format!("{}: {order:.1}", curve.name),
-            None => format!("{}: ±", curve.name),
-        };
-        let points = curve.placed().iter().map(|[h, e]| [*h, e * 1e2]).collect();
-        let series = Series::new(name, points).with_markers();
+    if named.len() < curves.len() {
+        for curve in &curves {
+            let series = Series::new("", in_percent(&curve.placed()));
+            chart = chart.series(series.with_color(PALETTE[6].tint(FAINT)));
+        }
+    }
+    for (i, (name, points)) in named.into_iter().enumerate() {
+        let series = Series::new(name, in_percent(&points)).with_markers();
         chart = chart.series(series.with_color(PALETTE[i % PALETTE.len()]));
     }
     for tolerance in tolerances {
-        chart = chart.guide(Guide::y(
-            tolerance * 1e2,
-            format!("tolerance {}", share(tolerance)),
-        ));
+        let name = format!("tolerance {}", share(tolerance));
+        chart = chart.guide(Guide::y(tolerance * 1e2, name).named_right());
     }
     chart
+}
+
+/// The name of the case, and what all its curves have in common.
+fn title(case: &str, common: &str, n_curves: usize, n_named: usize) -> String {
+    let common = common.trim_end_matches([' ', ':', ',']);
+    let mut title = case.to_owned();
+    if !common.is_empty() {
+        let _ = write!(title, ", {common}");
+    }
+    if n_named < n_curves {
+        let _ = write!(title, ", {n_curves} curves");
+    }
+    title
+}
+
+fn in_percent(points: &[Placed]) -> Vec<[f64; 2]> {
+    points.iter().map(|p| [p.nodes, p.error * 1e2]).collect()
+}
+
+/// What the names of all curves start with, up to the end of a phrase.
+fn common_start<'a>(curves: &[Curve<'a>]) -> &'a str {
+    let Some(first) = curves.first().filter(|_| curves.len() > 1) else {
+        return "";
+    };
+    let ends = first.name.match_indices([':', ',']).map(|(at, _)| at + 2);
+    ends.filter_map(|end| first.name.get(..end))
+        .take_while(|start| curves.iter().all(|c| c.name.starts_with(start)))
+        .last()
+        .unwrap_or("")
 }
 
 fn curves<'a>(case: &str, found: &'a Findings) -> Vec<Curve<'a>> {
@@ -147,22 +201,9 @@ fn curves<'a>(case: &str, found: &'a Findings) -> Vec<Curve<'a>> {
         }
     }
     for curve in &mut curves {
-        curve.points.sort_by(|a, b| b.h.total_cmp(&a.h));
+        curve.points.sort_by_key(|p| p.nodes);
     }
     curves
-}
-
-/// At most `n` of the items, evenly, the first and the last among them.
-fn spread<T>(items: Vec<T>, n: usize) -> Vec<T> {
-    let len = items.len();
-    if len <= n {
-        return items;
-    }
-    let wanted: Vec<usize> = (0..n).map(|i| i * (len - 1) / (n - 1)).collect();
-    let kept = items.into_iter().enumerate();
-    kept.filter(|(i, _)| wanted.contains(i))
-        .map(|(_, item)| item)
-        .collect()
 }
 
 /// The tolerances of the figures that the curves end in; those of the case if none of them is a figure.
@@ -206,35 +247,59 @@ mod tests {
     #[test]
     fn the_observed_order_is_that_of_the_errors() {
         let found = study([-0.08, -0.02, -0.005, -0.00125]);
-        let order = curves("lame", &found)[0].order().unwrap();
+        let order = order(&curves("lame", &found)[0].placed()).unwrap();
         assert!((order - 2.0).abs() < 1e-9, "{order}");
         let svg = draw(&found).svg().to_owned();
-        assert!(svg.contains("r 12 mm: 2.0"), "{svg}");
+        assert!(svg.contains("r 12 mm: order 2.0"), "{svg}");
     }
 
     #[test]
-    fn the_mean_order_needs_the_same_meshes() {
-        let mut found = study([-0.08, -0.02, -0.005, -0.00125]);
-        let mut other = study([0.04, 0.01, 0.0025, 0.000625]).study;
-        for point in &mut other {
-            point.series = "r 35 mm".into();
+    fn an_error_that_rises_on_a_finer_mesh_has_no_order() {
+        for errors in [[-0.08, -0.02, 0.005, 0.006], [-0.08, 0.01, -0.02, 0.004]] {
+            let found = study(errors);
+            assert_eq!(order(&curves("lame", &found)[0].placed()), None);
         }
-        found.study.extend(other);
-        let order = mean_order(&curves("lame", &found)).unwrap();
-        assert!((order - 2.0).abs() < 1e-9, "{order}");
+    }
+
+    /// Curves at five depths, the errors of each so many times the first's.
+    fn many(factors: [f64; 5]) -> Findings {
+        let mut found = Findings::default();
+        for (i, factor) in factors.into_iter().enumerate() {
+            let mut points = study([-0.08, -0.02, -0.005, -0.00125]).study;
+            for point in &mut points {
+                point.series = format!("nu 0.45: {i} mm");
+                point.error *= factor;
+            }
+            found.study.extend(points);
+        }
+        found
+    }
+
+    #[test]
+    fn of_many_curves_the_worst_and_the_mean_are_named() {
+        let mut found = many([1.0, -1.0, 1.0, -2.0, 1.0]);
+        let [worst, mean] = summary(&curves("lame", &found)).unwrap();
+        assert!((worst[1].error - 0.04).abs() < 1e-12, "{worst:?}");
+        // (4 · 1 + 4)/5 of the square.
+        assert!((mean[1].error - 0.02 * 1.6_f64.sqrt()).abs() < 1e-12);
+        let svg = draw(&found).svg().to_owned();
+        for text in [
+            "lame, nu 0.45, 5 curves",
+            "worst: order 2.0",
+            "root mean square: order 2.0",
+        ] {
+            assert!(svg.contains(text), "{svg}");
+        }
+        // On other meshes there is nothing to compare; the curves keep their names.
         found.study.pop();
-        assert_eq!(mean_order(&curves("lame", &found)), None);
+        assert!(summary(&curves("lame", &found)).is_none());
+        assert!(draw(&found).svg().contains("4 mm: order"));
     }
 
     #[test]
-    fn an_error_that_changes_its_sign_has_no_order() {
-        let found = study([-0.08, -0.02, 0.005, 0.004]);
-        assert_eq!(curves("lame", &found)[0].order(), None);
-    }
-
-    #[test]
-    fn of_many_curves_first_and_last_are_kept() {
-        assert_eq!(spread((0..14).collect(), 6), [0, 2, 5, 7, 10, 13]);
-        assert_eq!(spread(vec![1, 2], 6), [1, 2]);
+    fn what_names_have_in_common_is_said_once() {
+        let found = many([1.0; 5]);
+        assert_eq!(common_start(&curves("lame", &found)), "nu 0.45: ");
+        assert_eq!(common_start(&curves("lame", &study([1.0; 4]))), "");
     }
 }
