@@ -308,7 +308,7 @@ static CASES: &[Case] = &[
     },
     Case {
         name: "economy",
-        title: "how few nodes are enough for B2 and B4: the worst over depths and meshes that are alike",
+        title: "how few nodes are enough for B2 and B4, the worst of several meshes",
         source: "CalculiX, as B2 and B4",
         needs_reference: true,
         run: economy::run,

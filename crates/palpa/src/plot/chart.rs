@@ -23,6 +23,8 @@ const LINE_WIDTH: f64 = 2.0;
 const SAMPLE: f64 = 20.0;
 const GAP: f64 = 7.0;
 const NAME_HEIGHT: f64 = 18.0;
+/// Two guides that lie closer than this have no room for a name between them.
+const GUIDE_ROOM: f64 = 18.0;
 
 /// Values of the charts: `[x, y]`.
 type Point = [f64; 2];
@@ -385,7 +387,17 @@ impl Chart {
                 } else {
                     (plot.x + 6.0, Anchor::Start)
                 };
-                canvas.text([x, y - 9.0], &guide.name, Font { anchor, ..REMARK });
+                // Above the line, or below it where the name would run into the next line above.
+                let is_close = |other: &Guide| {
+                    let above = y - view.y_of(other.at);
+                    !other.is_vertical && above > 0.0 && above < GUIDE_ROOM
+                };
+                let drop = if self.guides.iter().any(is_close) {
+                    9.0
+                } else {
+                    -9.0
+                };
+                canvas.text([x, y + drop], &guide.name, Font { anchor, ..REMARK });
             }
         }
     }

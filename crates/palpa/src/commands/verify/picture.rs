@@ -12,6 +12,8 @@ use crate::reproduce::fit::line;
 const MOST_NAMED: usize = 4;
 /// Errors further below the lowest curve with a name than this share of it are not looked at.
 const LEAST_SHARE: f64 = 0.3;
+/// Over less than this ratio of mesh sizes an order would be chance.
+const LEAST_RANGE: f64 = 2.0;
 /// How much of the ink a curve without a name has.
 const FAINT: f64 = 0.3;
 
@@ -45,6 +47,9 @@ struct Placed {
 /// The power of the mesh's size that an error falls with, by least squares over all meshes. One that does not fall from each
 /// mesh to the next has none: it passes zero on the way, or has come down to the accuracy of the reference.
 fn order(points: &[Placed]) -> Option<f64> {
+    if points.first()?.h < LEAST_RANGE * points.last()?.h {
+        return None;
+    }
     let falls = |p: &[Placed]| p[1].error < p[0].error && p[1].h < p[0].h;
     if !points.windows(2).all(falls) {
         return None;
@@ -259,6 +264,15 @@ mod tests {
             let found = study(errors);
             assert_eq!(order(&curves("lame", &found)[0].placed()), None);
         }
+    }
+
+    #[test]
+    fn meshes_of_nearly_one_size_have_no_order() {
+        let mut found = study([-0.08, -0.02, -0.005, -0.00125]);
+        found.study.truncate(2);
+        assert!(order(&curves("lame", &found)[0].placed()).is_some());
+        found.study[1].h = 0.15;
+        assert_eq!(order(&curves("lame", &found)[0].placed()), None);
     }
 
     /// Curves at five depths, the errors of each so many times the first's.
