@@ -20,7 +20,7 @@ fn norm(a: &[Vec3]) -> f64 {
 }
 
 /// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad & Schultz 1986). Stops when the
-/// residual is `tolerance` of `b`, or with what there is when the basis has `most` vectors.
+/// residual is `tolerance` of `b`, or with what there is when the basis has `most` vectors or will not be enough with them.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,
@@ -68,7 +68,11 @@ pub(crate) fn gmres(
         right.push(-s * right[j]);
         right[j] *= c;
         columns.push(column);
-        if right[j + 1].abs() <= tolerance * size || rest <= f64::EPSILON * length {
+        let residual = right[j + 1].abs() / size;
+        // As fast as in the first third, would there be enough vectors?
+        let is_too_slow =
+            3 * (j + 1) >= most && residual.powf(most as f64 / (j + 1) as f64) > tolerance;
+        if residual <= tolerance || is_too_slow || rest <= f64::EPSILON * length {
             break;
         }
         for x in &mut next {
