@@ -161,7 +161,7 @@ pub fn parts_for(
     const COARSER: f64 = 1.05;
     const COARSEST: f64 = 1e6;
     let least = 1.0 / max_levels as f64;
-    let mut factor = 1.0;
+    let (mut factor, mut is_resolved) = (1.0, true);
     loop {
         let parts: Vec<Vec<f64>> = (0..n)
             .map(|i| {
@@ -174,12 +174,13 @@ pub fn parts_for(
         let n_levels = 1 + parts.iter().map(Vec::len).sum::<usize>();
         // Where a part had to be as high as `least`, there are too many already.
         if n_levels <= max_levels {
-            return (parts, factor == 1.0);
+            return (parts, is_resolved);
         }
         if factor > COARSEST {
             return (vec![vec![1.0]; n], false);
         }
         factor *= COARSER;
+        is_resolved = false;
     }
 }
 
@@ -192,14 +193,12 @@ fn divide(wanted: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     let mut from = 0.0;
     while from < 1.0 - ROUNDING {
         let is_too_high = |height: f64| wanted(from, (from + height).min(1.0)) < height;
-        let (mut good, mut bad) = (0.0, 1.0);
-        if !is_too_high(bad) {
-            good = bad;
+        if !is_too_high(1.0) {
+            heights.push(1.0);
+            break;
         }
+        let (mut good, mut bad) = (0.0, 1.0);
         for _ in 0..HALVINGS {
-            if good == bad {
-                break;
-            }
             let middle = f64::midpoint(good, bad);
             if is_too_high(middle) {
                 bad = middle;
