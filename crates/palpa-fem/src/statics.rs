@@ -466,7 +466,8 @@ impl Newton<'_> {
             }
             self.iterations += 1;
             let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
-            let is_kept = is_large && ws.system.is_factored;
+            // The first step of a load is the largest, and stiffness after it near that at the end.
+            let is_kept = is_large && ws.system.is_factored && self.iterations != 2;
             if !(is_kept && self.solve(ws, true)) {
                 match ws.system.refactor(&model.structure, &ws.holds) {
                     Ok(shift) => self.shift = self.shift.max(shift),

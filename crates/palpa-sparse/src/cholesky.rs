@@ -13,6 +13,9 @@ use crate::{NodePattern, Singular, TooLarge};
 /// small dense blocks already, and merging more of them than is usual saves 5–10 % of a step at 300–1,000 nodes.
 const RELAXATION: [(usize, f64); 4] = [(8, 1.0), (32, 0.8), (64, 0.3), (usize::MAX, 0.1)];
 
+/// Largest factor, in entries: 8 GiB. More than that is a mesh that is finer than it was meant to be.
+const MOST_ENTRIES: usize = 1 << 30;
+
 /// Where the entries of the lower triangle stand.
 #[derive(Debug)]
 pub struct Pattern(Kind);
@@ -37,7 +40,7 @@ impl Pattern {
     /// The pattern of nodes in their order of elimination; `unknowns` says a node's first unknown and how many it has.
     ///
     /// # Errors
-    /// When the factor does not fit the address space.
+    /// When the factor would take more than 8 GiB.
     pub fn sparse(
         nodes: &NodePattern,
         n_dofs: usize,
@@ -55,7 +58,9 @@ impl Pattern {
                 col_ptr.push(row_idx.len());
             }
         }
-        let symbolic = analyse(&col_ptr, &row_idx, n_dofs).ok_or(TooLarge { n_dofs })?;
+        let symbolic = analyse(&col_ptr, &row_idx, n_dofs)
+            .filter(|symbolic| symbolic.len_val() <= MOST_ENTRIES)
+            .ok_or(TooLarge { n_dofs })?;
         Ok(Self(Kind::Sparse {
             lower: SymbolicSparseColMat::new_checked(n_dofs, n_dofs, col_ptr, None, row_idx),
             symbolic: Box::new(symbolic),

@@ -16,7 +16,7 @@ pub type NodePattern = Vec<(usize, Vec<usize>)>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Singular;
 
-/// The factor of so many unknowns does not fit the address space.
+/// The factor of so many unknowns would take more than 8 GiB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooLarge {
     /// Number of unknowns.

@@ -86,9 +86,9 @@ pub enum SpringError {
         /// Most nodes.
         limit: usize,
     },
-    /// No memory or index range for the factor.
+    /// Too much memory for the factor.
     #[error(
-        "a system of {n_dofs} unknowns is too large to factorise here; make the mesh coarser or cut out a part"
+        "the factor of {n_dofs} unknowns would take more than 8 GiB; make the mesh coarser or cut out a part"
     )]
     TooLarge {
         /// Unknowns.

@@ -282,7 +282,7 @@ fn a_lump_is_felt_and_a_coarse_mesh_feels_it_as_a_fine_one_does() {
             let lump = format!(
                 "[[lump]]\nshape = \"sphere\"\nradius = \"5 mm\"\nbelow = [\"0 mm\", \"0 mm\", \"0 mm\"]\n\
                  depth = \"14 mm\"\ntissue = {{ name = \"lump\", young = \"{young}\", poisson = 0.45 }}\n\
-                 [mesh]\nnear_lumps = \"{near_lumps}\""
+                 [mesh]\ngrowth = 0.3\nnear_lumps = \"{near_lumps}\""
             );
             let once = BLOCK.replace("step = \"0.5 mm\"", "step = \"2 mm\"\nretract = false");
             let report = report(&bench, &once.replace("[mesh]", &lump));
