@@ -10,7 +10,6 @@ pub mod reference;
 pub mod tissue;
 
 pub use place::Place;
-pub(crate) use place::column_length;
 pub use programme::{Phase, Waypoint, waypoints};
 pub(crate) use reference::nodes_under_disc;
 

@@ -2,23 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
-use palpa_mesh::{LayeredBody, Vec3};
+use anyhow::bail;
+use palpa_tissue::Scene;
 use palpa_tissue::units::Length;
-use palpa_tissue::{Scene, Tool};
 use serde::Serialize;
 
 use super::Outcome;
-use crate::build::{BuiltBody, build, in_mm};
+use crate::build::{build, in_mm};
 use crate::cli::Context;
 use crate::continuum;
 use crate::export::{Deck, Element, Export, Section};
-use crate::press::{column_length, nodes_under_disc};
+use crate::press::mesh::PressedBody;
 
 /// Write a scene as an input deck for CalculiX, to check its forces with another solver
 ///
 /// Without a SCENE, a forearm made by formula is exported. Writes body.inp, in millimetres, newtons and megapascals; run
-/// it with `ccx body` in its folder. The forces on the way down are then in body.dat, the deformed body in body.frd.
+/// it with `ccx body` in its folder. Mesh, patch and way are those of `palpa press`. The forces on the way down are then in body.dat, the deformed body in body.frd.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Scene file (TOML); the embedded forearm if none is given
@@ -74,13 +73,20 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let spinner = context.progress(0, "growing the body");
     let built = build(&scene)?;
     drop(spinner);
-    let body = &built.growth.body;
     let mut notes = built.notes.clone();
     let materials = continuum::materials(&scene)?;
     let lumps = continuum::lumps(&scene, &built, &mut notes)?;
+    if scene.tool.contact().is_some() {
+        bail!(
+            "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
+             \"disc\" or \"node\"",
+            scene.tool
+        );
+    }
+    let pressed = PressedBody::build(&scene, &built, &lumps, &mut notes)?;
+    let (body, place) = (&pressed.body, &pressed.place);
     let supports = continuum::supports(scene.body.cut_faces, body, &mut notes);
-    let direction = direction(&scene, &built)?;
-    let patch = patch(&scene, &built, direction)?;
+    let patch = patch(&pressed);
     let scene_name = args
         .scene
         .as_deref()
@@ -94,7 +100,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         format!(
             "tool: {}, at ({}) mm, {:.3} mm deep",
             scene.tool,
-            in_mm(body.skin.points[built.press_vertex]),
+            in_mm(place.at),
             scene.press.depth * 1e3
         ),
     ];
@@ -104,7 +110,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         lumps: &lumps,
         supports: &supports,
         patch: &patch,
-        travel: direction * scene.press.depth,
+        travel: place.direction.into_inner() * scene.press.depth,
         n_results: (scene.press.depth / scene.press.step - 1e-9)
             .ceil()
             .max(1.0) as usize,
@@ -125,9 +131,12 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         n_nodes: deck.n_nodes(),
         n_elements: deck.n_elements(),
         n_patch_nodes: deck.n_patch_nodes(),
-        patch_radius_mm: patch_radius(body, &patch) * 1e3,
+        patch_radius_mm: pressed
+            .patch
+            .as_ref()
+            .map_or(0.0, |patch| patch.radius * 1e3),
         depth_mm: scene.press.depth * 1e3,
-        direction: direction.into(),
+        direction: place.direction.into_inner().into(),
         materials: deck.sections(),
         notes: &notes,
     };
@@ -147,10 +156,13 @@ fn conclude(context: &Context, out: &Path, report: &Report<'_>) -> anyhow::Resul
             material.name, material.n_elements, material.law
         ))?;
     }
-    context.say(format!(
-        "  {} nodes move {:.2} mm with the tool, a patch as large as a disc of radius {:.2} mm",
-        report.n_patch_nodes, report.depth_mm, report.patch_radius_mm
-    ))?;
+    context.say(match report.n_patch_nodes {
+        1 => format!("  one node moves {:.2} mm with the tool", report.depth_mm),
+        n => format!(
+            "  {n} nodes move {:.2} mm with the tool, a patch as large as a disc of radius {:.2} mm",
+            report.depth_mm, report.patch_radius_mm
+        ),
+    })?;
     for note in report.notes {
         context.say(format!("  note: {note}"))?;
     }
@@ -161,62 +173,13 @@ fn conclude(context: &Context, out: &Path, report: &Report<'_>) -> anyhow::Resul
     ))
 }
 
-/// The way the tool goes.
-fn direction(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Vec3> {
-    let body = &built.growth.body;
-    let vertex = built.press_vertex;
-    let at = in_mm(body.skin.points[vertex]);
-    let inward = -body.skin.vertex_normals()[vertex];
-    let direction = scene
-        .press
-        .direction
-        .map_or(inward, Vec3::from)
-        .try_normalize(f64::MIN_POSITIVE)
-        .with_context(|| {
-            format!("the skin has no normal at vertex {vertex} ({at}) mm; give a press direction")
-        })?;
-    if direction.dot(&inward) <= 0.0 {
-        bail!("the press direction points out of the skin at ({at}) mm; turn it, or leave it out");
-    }
-    let depth = column_length(body, vertex);
-    if scene.press.depth >= depth {
-        bail!(
-            "press depth {:.2} mm reaches beyond the body: at ({at}) mm the tissue is {:.2} mm deep; press less deep, or at \
-             another place",
-            scene.press.depth * 1e3,
-            depth * 1e3,
-        );
-    }
-    Ok(direction)
-}
-
 /// The nodes that move with the tool.
-fn patch(scene: &Scene, built: &BuiltBody, direction: Vec3) -> anyhow::Result<Vec<usize>> {
-    let body = &built.growth.body;
-    let vertex = built.press_vertex;
-    let at = body.skin.points[vertex];
-    match scene.tool {
-        Tool::Disc { radius } => Ok(nodes_under_disc(body, vertex, at, &direction, radius)),
-        Tool::Node => Ok(vec![body.node(vertex, 0)]),
-        Tool::Contact(_) => bail!(
-            "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
-             \"disc\" or \"node\"",
-            scene.tool
-        ),
+fn patch(pressed: &PressedBody) -> Vec<usize> {
+    let body = &pressed.body;
+    match &pressed.patch {
+        Some(patch) => (patch.vertices.iter()).map(|&v| body.node(v, 0)).collect(),
+        None => vec![body.node(pressed.place.vertex, 0)],
     }
-}
-
-/// Radius of the circle that has the area of the triangles between these nodes. m
-fn patch_radius(body: &LayeredBody, patch: &[usize]) -> f64 {
-    let mut is_in = vec![false; body.n_vertices()];
-    for &node in patch {
-        is_in[node / body.n_levels] = true;
-    }
-    let area: f64 = (body.skin.triangles.iter().enumerate())
-        .filter(|(_, triangle)| triangle.iter().all(|&v| is_in[v as usize]))
-        .map(|(t, _)| body.skin.area_vector(t).norm())
-        .sum();
-    (area / std::f64::consts::PI).sqrt()
 }
 
 /// Without what would end a comment.

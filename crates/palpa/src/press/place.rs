@@ -85,7 +85,7 @@ impl Place {
     }
 }
 
-pub(crate) fn column_length(body: &LayeredBody, v: usize) -> f64 {
+fn column_length(body: &LayeredBody, v: usize) -> f64 {
     let p = |l: usize| body.positions[body.node(v, l)];
     (1..body.n_levels).map(|l| (p(l) - p(l - 1)).norm()).sum()
 }

@@ -32,6 +32,8 @@ radius = "12 mm"
 at = ["0 mm", "0 mm", "0 mm"]
 depth = "3 mm"
 step = "1 mm"
+[mesh]
+refine = false
 "#;
 
 struct Bench {
@@ -423,4 +425,33 @@ fn a_lump_has_the_prisms_whose_middle_it_holds() {
             .unwrap()
             .contains("holds the middle of no prism")
     );
+}
+
+#[test]
+fn the_deck_has_the_mesh_and_the_patch_of_the_press() {
+    let refined = BLOCK
+        .replace("refine = false", "near_tool = \"4 mm\"")
+        .replace("TISSUE", ELASTIC);
+    let bench = Bench::with(&refined);
+    let report = bench.report(&["--element", "c3d6"]);
+    let press = Command::new(env!("CARGO_BIN_EXE_palpa"))
+        .current_dir(bench.folder.path())
+        .args([
+            "press",
+            "scene.toml",
+            "--json",
+            "--frames",
+            "0",
+            "--no-retract",
+        ])
+        .args(["--depth", "0.1 mm", "--step", "0.1 mm"])
+        .output()
+        .unwrap();
+    let press: Value = serde_json::from_slice(&press.stdout).unwrap();
+    let press = &press["press"];
+    assert_eq!(report["n_nodes"], press["n_nodes"]);
+    assert_eq!(report["n_elements"], press["n_prisms"]);
+    assert_eq!(report["n_patch_nodes"], press["n_operated_nodes"]);
+    let radius = report["patch_radius_mm"].as_f64().unwrap();
+    assert!((radius / 12.0 - 1.0).abs() < 1e-3, "{radius}");
 }
