@@ -38,6 +38,9 @@ const SMOOTHING: [f64; 4] = [1e-3, 2e-4, 4e-5, 1e-5];
 const FINE_SMOOTHING: f64 = 5e-5;
 /// Iterations without any progress after which a solve is given up.
 const PATIENCE: usize = 12;
+/// Residual that is near enough where it falls no further: a body about to buckle has no stiffness that could be factored
+/// without a shift, and is approached ever more slowly.
+const STALLED: f64 = 1e-6;
 /// Solves' worth of iterations after which a step that keeps failing is given up.
 const MOST_SOLVES: usize = 10;
 /// Newton iterations below which the next substep may be longer.
@@ -460,6 +463,12 @@ impl Newton<'_> {
             }
             let is_lost = self.iterations > best.1 + PATIENCE;
             if is_lost || self.iterations == self.params.max_iterations {
+                let is_near = self.residual <= self.params.tolerance.max(STALLED)
+                    && demand <= self.params.gap_tolerance
+                    && n_new == 0;
+                if is_near && self.revise(state, ws, Forces::Present) == 0 {
+                    return Outcome::Converged;
+                }
                 return Outcome::IterationLimit {
                     at: self.worst_node(ws).into(),
                 };

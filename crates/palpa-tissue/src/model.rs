@@ -72,10 +72,13 @@ impl Mesh {
     const COARSEST: f64 = 10e-3;
 
     /// Wanted length near `tool` in metres: as given, or else a quarter of its
-    /// [contact radius](Tool::contact_radius), 0.5 mm to 10 mm; `None` for a node, which has no size.
+    /// [contact radius](Tool::contact_radius), and no more than a third of the radius that its edge is rounded by, 0.5 mm to
+    /// 10 mm; `None` for a node, which has no size.
     pub fn near_tool_of(&self, tool: &Tool) -> Option<f64> {
         let radius = tool.contact_radius();
-        let automatic = (radius > 0.0).then(|| (radius / 4.0).clamp(Self::FINEST, Self::COARSEST));
+        let edge = tool.contact().and_then(|tool| tool.shape.edge_radius());
+        let wanted = edge.map_or(radius / 4.0, |edge| (radius / 4.0).min(edge / 3.0));
+        let automatic = (radius > 0.0).then(|| wanted.clamp(Self::FINEST, Self::COARSEST));
         self.near_tool.or(automatic)
     }
 

@@ -36,7 +36,7 @@ pub(crate) struct ToolTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) size: Option<[Length; 3]>,
     /// Flat punch and box: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the punch's radius or
-    /// half the box's smallest size. Default: a tenth of these.
+    /// half the box's smallest size. Default: 0.3 of these.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) edge_radius: Option<Length>,
     /// Capsule, box and fingertip: the direction that the tool's length points along, as nearly as it can lying across the

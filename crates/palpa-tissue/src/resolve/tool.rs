@@ -18,7 +18,7 @@ const SIZE: [f64; 3] = [16e-3; 3];
 /// (from memory, after Serina et al. 1998). m
 const FINGERTIP: [f64; 3] = [8e-3, 7e-3, 7e-3];
 /// Share of a punch's radius, or of half a box's smallest size, by which its edges are rounded.
-const EDGE: f64 = 0.1;
+const EDGE: f64 = 0.3;
 
 impl ToolShape {
     /// Its name in a sentence, and the keys it takes.
