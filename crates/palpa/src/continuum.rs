@@ -1,6 +1,6 @@
 //! From a scene to what the continuum model takes: materials, lumps, supports, tool.
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use nalgebra::{Rotation3, UnitQuaternion};
 use palpa_fem::law::{
     Fung, Law, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm,
@@ -17,6 +17,11 @@ use palpa_tissue::{
 };
 
 use crate::build::{BuiltBody, in_mm, mended, read_in_metres};
+use crate::press::lump::share_inside;
+
+/// A lump of which less lies in the tissue is an error; of which less than that, worth a note.
+const LEAST_SHARE: f64 = 0.01;
+const FULL_SHARE: f64 = 0.95;
 
 /// What the scene's tissues are: first those of the layers, then those of the lumps, each in its order.
 ///
@@ -93,7 +98,7 @@ fn law(elastic: &Elastic) -> Result<Law, LawError> {
 /// of the layers.
 ///
 /// # Errors
-/// When a mesh cannot be read or has no inside.
+/// When a mesh cannot be read or has no inside, or a lump lies outside the body.
 ///
 /// # Panics
 /// When `built` is not the scene's.
@@ -127,9 +132,42 @@ pub fn lumps(
         };
         let pose = Pose::from_parts(middle.into(), rotation);
         let material = scene.layers.len() + i;
-        lumps.push(Lump::new(shape, pose, lump.transition, material).with_context(of_lump)?);
+        let made = Lump::new(shape, pose, lump.transition, material).with_context(of_lump)?;
+        check_place(&made, &lump.name, &built.growth.body, notes)?;
+        lumps.push(made);
     }
     Ok(lumps)
+}
+
+/// Whether a lump lies in the tissue.
+fn check_place(
+    lump: &Lump,
+    name: &str,
+    body: &LayeredBody,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<()> {
+    let share = share_inside(body, lump);
+    let at = in_mm(lump.bounding_sphere().0);
+    if share < LEAST_SHARE {
+        let (lo, hi) = (body.positions.iter()).fold(
+            (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)),
+            |(lo, hi), p| (lo.inf(p), hi.sup(p)),
+        );
+        bail!(
+            "the lump \"{name}\" lies outside the tissue: its middle is at ({at}) mm, and the tissue is between ({}) and ({}) mm, \
+             round the bones; move it with `at`, or with `below` and `depth`, or check the `unit` of its file",
+            in_mm(lo),
+            in_mm(hi)
+        );
+    }
+    if share < FULL_SHARE {
+        notes.push(format!(
+            "{:.0} % of the lump \"{name}\" at ({at}) mm lies in the tissue; the rest, outside the skin or in the bone, does not \
+             count",
+            100.0 * share
+        ));
+    }
+    Ok(())
 }
 
 fn lump_shape(

@@ -9,6 +9,13 @@ use crate::build::{mended, read_in_metres};
 /// Samples along each side of a triangle, and over the height of a prism.
 const IN_PLANE: usize = 4;
 const IN_DEPTH: usize = 4;
+/// Fewest points in a lump that tell how much of it lies in the tissue, cells across it at first, and at most.
+const FEWEST_POINTS: usize = 500;
+const FIRST_CELLS: usize = 12;
+const MOST_CELLS: usize = 48;
+/// A point this far outside a tetrahedron, as a share of its height, is in it: neighbouring prisms may be cut along the
+/// other diagonal of a bent side.
+const OUTSIDE: f64 = 0.02;
 /// Corners round the surface of a lump of a simple shape, and from pole to pole.
 const AROUND: usize = 48;
 const UPWARD: usize = 24;
@@ -64,6 +71,36 @@ fn samples(corners: &[Vec3; 6]) -> impl Iterator<Item = Vec3> + '_ {
                 .sum()
         })
     })
+}
+
+/// Share of a lump's volume that lies in the body, sampled.
+pub fn share_inside(body: &LayeredBody, lump: &Lump) -> f64 {
+    let points = points_inside(lump);
+    if points.is_empty() {
+        return 1.0; // too thin to be sampled
+    }
+    let is_in_body = |embedded: &&[f64; 4]| embedded.iter().all(|w| *w >= -OUTSIDE);
+    let found = nearest_tetrahedra(body, &points);
+    let n_in_body = found.iter().map(|(_, weights)| weights).filter(is_in_body);
+    n_in_body.count() as f64 / points.len() as f64
+}
+
+/// Points spread evenly over the inside of a lump. m
+fn points_inside(lump: &Lump) -> Vec<Vec3> {
+    let (middle, reach) = lump.bounding_sphere();
+    let mut n = FIRST_CELLS;
+    loop {
+        let at = |i: usize| reach * ((2 * i + 1) as f64 / n as f64 - 1.0);
+        let cells = (0..n).flat_map(|i| (0..n).flat_map(move |j| (0..n).map(move |k| [i, j, k])));
+        let points: Vec<Vec3> = cells
+            .map(|cell| middle + Vec3::from(cell.map(at)))
+            .filter(|p| lump.signed_distance(p) < 0.0)
+            .collect();
+        if points.len() >= FEWEST_POINTS || n >= MOST_CELLS {
+            return points;
+        }
+        n *= 2;
+    }
 }
 
 /// The surface of a lump at rest. m
@@ -147,46 +184,13 @@ impl Embedded {
     /// Finds each of the points (m, at rest) among the tetrahedra that prisms divide into; one outside the body goes with the
     /// nearest.
     pub fn new(body: &LayeredBody, points: &[Vec3]) -> Self {
-        let mut found: Vec<(f64, [usize; 4], [f64; 4])> =
-            vec![(f64::NEG_INFINITY, [0; 4], [0.0; 4]); points.len()];
-        let bounds = points.iter().fold(
-            (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)),
-            |(lo, hi), p| (lo.inf(p), hi.sup(p)),
-        );
-        for t in 0..body.skin.triangles.len() {
-            for i in 0..body.n_levels - 1 {
-                let prism = body.prism(t, i);
-                let corners = prism.map(|n| body.positions[n]);
-                let (lo, hi) = corners
-                    .iter()
-                    .fold((corners[0], corners[0]), |(lo, hi), c| {
-                        (lo.inf(c), hi.sup(c))
-                    });
-                if (0..3).any(|k| hi[k] < bounds.0[k] || lo[k] > bounds.1[k]) {
-                    continue;
-                }
-                for tet in [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]] {
-                    let Some(inverse) = inverse(&tet.map(|k| corners[k])) else {
-                        continue;
-                    };
-                    for (point, best) in points.iter().zip(&mut found) {
-                        let w = inverse * (point - corners[tet[0]]);
-                        let weights = [1.0 - w.sum(), w.x, w.y, w.z];
-                        // Inside, the least weight is positive; the greatest least is the nearest.
-                        let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
-                        if least > best.0 {
-                            *best = (least, tet.map(|k| prism[k]), weights);
-                        }
-                    }
-                }
-            }
-        }
+        let found = nearest_tetrahedra(body, points);
         Self {
-            nodes: found.iter().map(|f| f.1).collect(),
+            nodes: found.iter().map(|f| f.0).collect(),
             weights: found
                 .iter()
                 .map(|f| {
-                    let inside = f.2.map(|w| w.max(0.0));
+                    let inside = f.1.map(|w| w.max(0.0));
                     let sum: f64 = inside.iter().sum();
                     inside.map(|w| if sum > 0.0 { w / sum } else { 0.0 })
                 })
@@ -204,6 +208,48 @@ impl Embedded {
             })
             .collect()
     }
+}
+
+/// For each of the points (m, at rest) the four nodes of the tetrahedron that it lies in or nearest to, of those that
+/// prisms divide into, and their weights there: one is negative outside. Without any nearby, all weights are.
+fn nearest_tetrahedra(body: &LayeredBody, points: &[Vec3]) -> Vec<([usize; 4], [f64; 4])> {
+    let far = f64::NEG_INFINITY;
+    let mut found = vec![([0; 4], [far; 4]); points.len()];
+    let mut least_of = vec![far; points.len()];
+    let bounds = points.iter().fold(
+        (Vec3::repeat(f64::INFINITY), Vec3::repeat(far)),
+        |(lo, hi), p| (lo.inf(p), hi.sup(p)),
+    );
+    for t in 0..body.skin.triangles.len() {
+        for i in 0..body.n_levels - 1 {
+            let prism = body.prism(t, i);
+            let corners = prism.map(|n| body.positions[n]);
+            let (lo, hi) = corners
+                .iter()
+                .fold((corners[0], corners[0]), |(lo, hi), c| {
+                    (lo.inf(c), hi.sup(c))
+                });
+            if (0..3).any(|k| hi[k] < bounds.0[k] || lo[k] > bounds.1[k]) {
+                continue;
+            }
+            for tet in [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]] {
+                let Some(inverse) = inverse(&tet.map(|k| corners[k])) else {
+                    continue;
+                };
+                for ((point, best), best_least) in points.iter().zip(&mut found).zip(&mut least_of)
+                {
+                    let w = inverse * (point - corners[tet[0]]);
+                    let weights = [1.0 - w.sum(), w.x, w.y, w.z];
+                    // Inside, the least weight is positive; the greatest least is the nearest.
+                    let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
+                    if least > *best_least {
+                        (*best_least, *best) = (least, (tet.map(|k| prism[k]), weights));
+                    }
+                }
+            }
+        }
+    }
+    found
 }
 
 /// The matrix that gives the weights of the last three corners; `None` for a flat tetrahedron.
@@ -248,6 +294,25 @@ mod tests {
             "{volume} of {}",
             lump.volume()
         );
+    }
+
+    #[test]
+    fn the_share_of_a_ball_in_the_body_is_that_of_its_volume() {
+        let body = block();
+        for (z, share) in [(-0.01, 1.0), (0.0, 0.5), (0.5, 0.0)] {
+            let pose = Pose::translation(0.001, 0.002, z);
+            let shape = LumpShape::Sphere(Sphere::new(0.006).unwrap());
+            let lump = Lump::new(shape, pose, 0.0, 1).unwrap();
+            let found = share_inside(&body, &lump);
+            assert!((found - share).abs() < 0.03, "{z}: {found}");
+        }
+    }
+
+    #[test]
+    fn points_fill_a_long_lump() {
+        let shape = LumpShape::Capsule(palpa_fem::shape::Capsule::new(0.001, 0.02).unwrap());
+        let lump = Lump::new(shape, Pose::identity(), 0.0, 1).unwrap();
+        assert!(points_inside(&lump).len() > 100);
     }
 
     #[test]

@@ -431,6 +431,35 @@ fn what_a_continuum_cannot_be_is_refused() {
     insta::assert_snapshot!(messages.join("\n"));
 }
 
+/// The notes of an indentation that is set up, or why it is not.
+fn set_up(scene: &str) -> Result<String, String> {
+    let scene = Scene::parse(scene, std::path::Path::new(".")).unwrap();
+    let built = palpa::build::build(&scene).unwrap();
+    match Indentation::build(&scene, &built) {
+        Ok(indentation) => Ok(indentation.notes.join("\n")),
+        Err(error) => Err(format!("{error:#}")),
+    }
+}
+
+#[test]
+fn a_lump_outside_the_tissue_is_refused_and_one_across_the_skin_noted() {
+    let with_lump = |z: &str| {
+        let lump = format!(
+            "[[lump]]\nname = \"stone\"\nshape = \"sphere\"\nradius = \"4 mm\"\nat = [\"0 mm\", \"0 mm\", \"{z}\"]\n\
+             tissue = {{ name = \"hard\", young = \"100 kPa\", poisson = 0.45 }}\n[mesh]\nnear_lumps = \"8 mm\""
+        );
+        set_up(&BLOCK.replace("[mesh]", &lump))
+    };
+    let refusal = with_lump("500 mm").unwrap_err();
+    for part in ["\"stone\"", "(0.0, 0.0, 500.0) mm", "outside the tissue"] {
+        assert!(refusal.contains(part), "{refusal}");
+    }
+    let half = with_lump("0 mm").unwrap();
+    assert!(half.contains("% of the lump \"stone\" at"), "{half}");
+    let inside = with_lump("-12 mm").unwrap();
+    assert!(!inside.contains("stone"), "{inside}");
+}
+
 #[test]
 fn the_shipped_scenes_without_files_can_be_set_up() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
