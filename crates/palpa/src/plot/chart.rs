@@ -526,19 +526,24 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
     const WIDTH: f64 = 530.0;
     const HEIGHT: f64 = 376.0;
     const MARGIN: f64 = 26.0;
+    const LINE: f64 = 24.0;
     let n_columns = n_columns.clamp(1, charts.len().max(1));
     let n_rows = charts.len().div_ceil(n_columns);
-    let header = if title.is_empty() { 0.0 } else { 38.0 };
+    let font = Font {
+        size: 19.0,
+        ..TITLE
+    };
+    let lines = wrapped(title, font, n_columns as f64 * WIDTH - MARGIN);
+    let header = match lines.len() {
+        0 => 0.0,
+        n => 38.0 + (n - 1) as f64 * LINE,
+    };
     let mut canvas = Canvas::new(
         n_columns as f64 * WIDTH + MARGIN,
         n_rows as f64 * HEIGHT + MARGIN + header,
     );
-    if !title.is_empty() {
-        let font = Font {
-            size: 19.0,
-            ..TITLE
-        };
-        canvas.text([MARGIN, MARGIN + 10.0], title, font);
+    for (i, line) in lines.iter().enumerate() {
+        canvas.text([MARGIN, MARGIN + 10.0 + i as f64 * LINE], line, font);
     }
     for (i, chart) in charts.iter().enumerate() {
         let frame = Frame {
@@ -550,6 +555,19 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
         chart.draw_in(&mut canvas, frame, PANEL_TITLE);
     }
     canvas.finish()
+}
+
+/// Words in lines no wider than `width`, where no single word is.
+fn wrapped(text: &str, font: Font, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        let longer = lines.last().map(|line| format!("{line} {word}"));
+        match (longer, lines.last_mut()) {
+            (Some(longer), Some(line)) if font.width(&longer) <= width => *line = longer,
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// Where values are drawn.

@@ -256,6 +256,8 @@ mod tests {
         assert!((order - 2.0).abs() < 1e-9, "{order}");
         let svg = draw(&found).svg().to_owned();
         assert!(svg.contains("r 12 mm: order 2.0"), "{svg}");
+        // Over a single panel the title has two lines.
+        assert!(!svg.contains("single curves). Order in mesh size, where an error falls on every"));
     }
 
     #[test]
