@@ -36,7 +36,7 @@ pub struct Args {
     /// Press at this vertex of the skin surface
     #[arg(long, value_name = "N", conflicts_with = "at")]
     vertex: Option<u32>,
-    /// How deep, with its unit: "8 mm"
+    /// How deep, with its unit: "8 mm"; the steps grow or shrink with it unless --step is given
     #[arg(long)]
     depth: Option<Length>,
     /// How fast, with its unit: "10 mm/s"
