@@ -202,7 +202,9 @@ pub(crate) fn nearest(skin: &Surface, point: Vec3) -> usize {
 
 /// A point in millimetres, for messages.
 pub fn in_mm(p: Vec3) -> String {
-    format!("{:.1}, {:.1}, {:.1}", p.x * 1e3, p.y * 1e3, p.z * 1e3)
+    // Plus zero: no place is at "minus nothing".
+    let [x, y, z] = [p.x, p.y, p.z].map(|c| (c * 1e4).round() / 10.0 + 0.0);
+    format!("{x:.1}, {y:.1}, {z:.1}")
 }
 
 fn area_centroid(surface: &Surface) -> Vec3 {

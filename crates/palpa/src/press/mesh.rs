@@ -446,5 +446,6 @@ fn areas_of(
 
 fn seen_area(body: &LayeredBody, triangles: &[u32], direction: &Unit<Vec3>) -> f64 {
     let seen = |&t: &u32| body.skin.area_vector(t as usize).dot(direction).abs();
-    triangles.iter().map(seen).sum()
+    // Plus zero: the sum of nothing is "minus nothing".
+    triangles.iter().map(seen).sum::<f64>() + 0.0
 }

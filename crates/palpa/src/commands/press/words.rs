@@ -30,6 +30,11 @@ pub(super) fn status_line(materials: &[MaterialStatus]) -> String {
     format!("stiffness {}", parts.join("; "))
 }
 
+/// How far a number is to be trusted, in a word.
+pub(super) fn status_word(status: Status) -> String {
+    format!("{status:?}").to_lowercase()
+}
+
 /// The layers as they were grown, and what growth had to give up.
 pub(super) fn say_layers(
     context: &Context,
@@ -54,7 +59,7 @@ pub(super) fn say_layers(
                 (_, Some(spring)) => format!("k {spring:.3e} N/m per bar"),
                 _ => String::new(),
             },
-            format!("{:?}", material.status).to_lowercase(),
+            status_word(material.status),
         ]);
     }
     context.say(table)?;

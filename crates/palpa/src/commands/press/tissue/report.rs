@@ -7,7 +7,7 @@ use palpa_tissue::{MaterialStatus, Scene};
 use serde::Serialize;
 
 use super::super::Job;
-use super::super::words::say_layers;
+use super::super::words::{say_layers, status_word};
 use super::result::{PressResult, RunResult};
 use crate::build::{BuiltBody, in_mm};
 use crate::press::Phase;
@@ -103,8 +103,10 @@ pub(super) fn announce(
     say_layers(context, scene, grown, materials)?;
     for (lump, material) in scene.lumps.iter().zip(&materials[scene.layers.len()..]) {
         context.say(format!(
-            "lump \"{}\": {}; {:?}",
-            lump.name, material.summary, material.status
+            "lump \"{}\": {}; {}",
+            lump.name,
+            material.summary,
+            status_word(material.status)
         ))?;
     }
     let hold = match facts.effective_radius_mm {
@@ -139,8 +141,11 @@ pub(super) fn conclude(
     let w = &r.worst;
     if !indentation.is_bonded() {
         context.say(format!(
-            "contact: gaps up to {:.1e} µm, penetration {:.1e} µm, pull {:.1e} N, beyond the friction cone {:.1e} N",
-            w.gap_um, w.penetration_um, w.tension_n, w.cone_n
+            "contact: gaps up to {} µm, penetration {} µm, pull {} N, beyond the friction cone {} N",
+            scientific(w.gap_um),
+            scientific(w.penetration_um),
+            scientific(w.tension_n),
+            scientific(w.cone_n)
         ))?;
     }
     context.say(format!(
@@ -160,6 +165,15 @@ pub(super) fn conclude(
         context.say(format!("force against depth: {}", picture.display()))?;
     }
     Ok(())
+}
+
+/// To two digits; nothing is 0.
+fn scientific(x: f64) -> String {
+    if x == 0.0 {
+        "0".to_owned()
+    } else {
+        format!("{x:.1e}")
+    }
 }
 
 /// What came out at one speed.
@@ -203,7 +217,7 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
         "depth mm",
         "force N",
         "contact mm²",
-        "pressure kPa",
+        "max kPa",
         &format!("thickness mm: {names}"),
     ]);
     let stride = loading.len().div_ceil(ROWS).max(1);
