@@ -1,7 +1,8 @@
 //! The runs themselves: every sample to the table, some of the bodies to the series for ParaView.
 
 use palpa_fem::{level_forces, prism_fields};
-use palpa_mesh::Vec3;
+use palpa_mesh::quality::prism_shapes;
+use palpa_mesh::{LayeredBody, Vec3};
 
 use super::super::Job;
 use super::super::files::Series;
@@ -28,6 +29,15 @@ pub(super) struct Deepest {
     pub(super) level_forces: Vec<Vec3>,
     /// Von Mises stress of every prism. Pa `[n_prisms]`
     pub(super) von_mises: Vec<f64>,
+    /// Prisms of which a corner is turned inside out.
+    pub(super) turned: Option<Turned>,
+}
+
+/// Prisms that are not valid where they are, though there is volume left at every point of integration.
+pub(super) struct Turned {
+    pub(super) n: usize,
+    /// The middle of the worst. m
+    pub(super) at: Vec3,
 }
 
 /// Runs the script at every speed; each sample goes to the table at once, so that an interrupted run leaves a valid one.
@@ -56,6 +66,7 @@ pub(super) fn record(
             displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
             level_forces: Vec::new(),
             von_mises: vec![0.0; indentation.mesh.body.n_prisms()],
+            turned: None,
         },
     };
     let n_runs = indentation.speeds.len();
@@ -98,7 +109,20 @@ fn deepest(indentation: &Indentation, run: &Run<'_>, sample: usize, depth_mm: f6
             .iter()
             .map(palpa_fem::PrismField::von_mises)
             .collect(),
+        turned: turned(&indentation.mesh.body, &state.positions(model)),
     }
+}
+
+fn turned(body: &LayeredBody, positions: &[Vec3]) -> Option<Turned> {
+    let shapes = prism_shapes(body, positions);
+    let invalid = || shapes.iter().enumerate().filter(|(_, s)| !s.is_valid());
+    let (p, _) = invalid().min_by(|a, b| a.1.scaled_jacobian.total_cmp(&b.1.scaled_jacobian))?;
+    let n_intervals = body.n_levels - 1;
+    let corners = body.prism(p / n_intervals, p % n_intervals);
+    Some(Turned {
+        n: invalid().count(),
+        at: corners.iter().map(|&node| positions[node]).sum::<Vec3>() / 6.0,
+    })
 }
 
 /// The table: the fields of [`Sample`], and at the end a column for the thickness of each layer.

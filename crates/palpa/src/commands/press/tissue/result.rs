@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::super::words::status_line;
 use super::record::Recorded;
+use crate::build::in_mm;
 use crate::press::Phase;
 use crate::press::tissue::{Failure, Indentation, Sample, told};
 
@@ -29,6 +30,8 @@ pub(super) struct PressResult {
     pub(super) layers: Vec<LayerResult>,
     /// The layer whose thickness changes most there.
     pub(super) gives_most: Option<String>,
+    /// Prisms with corners turned inside out where the first run is deepest.
+    pub(super) n_turned_prisms: usize,
     /// Of all samples that converged.
     pub(super) worst: Worst,
     pub(super) failures: Vec<Failure>,
@@ -70,6 +73,7 @@ pub(super) struct Worst {
     pub(super) cone_n: f64,
     pub(super) slip: f64,
     pub(super) friction_smoothing_um: f64,
+    /// Not of the body at rest before it is pressed, which may have no forces to compare with.
     pub(super) residual: f64,
     pub(super) volume_ratio_min: f64,
     pub(super) volume_ratio_max: f64,
@@ -103,6 +107,11 @@ pub(super) fn result_of(
         secant_stiffness_n_per_mm: first.and_then(|run| run.secant_stiffness_n_per_mm),
         force_after_retract_n: first.and_then(|run| run.force_after_retract_n),
         gives_most: most.filter(|l| change(l) > 0.0).map(|l| l.name.clone()),
+        n_turned_prisms: recorded
+            .deepest
+            .turned
+            .as_ref()
+            .map_or(0, |turned| turned.n),
         worst: worst(&good),
         notes: notes(indentation, recorded, &good),
         runs,
@@ -173,6 +182,11 @@ fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
         .collect()
 }
 
+/// Whether nothing has pressed yet: there may be no force of which a share could be out of balance.
+fn is_unloaded(sample: &Sample) -> bool {
+    sample.phase == Phase::Load && sample.cycle == 0 && sample.depth_mm == 0.0
+}
+
 fn worst(good: &[&Sample]) -> Worst {
     let largest = |of: fn(&Sample) -> f64| good.iter().map(|s| of(s)).fold(0.0, f64::max);
     Worst {
@@ -182,7 +196,7 @@ fn worst(good: &[&Sample]) -> Worst {
         cone_n: largest(|s| s.cone_n),
         slip: largest(|s| s.slip),
         friction_smoothing_um: largest(|s| s.friction_smoothing_um),
-        residual: largest(|s| s.residual),
+        residual: largest(|s| if is_unloaded(s) { 0.0 } else { s.residual }),
         volume_ratio_min: (good.iter().map(|s| s.volume_ratio_min)).fold(f64::INFINITY, f64::min),
         volume_ratio_max: largest(|s| s.volume_ratio_max),
     }
@@ -199,6 +213,15 @@ fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Ve
             )
         })
         .collect();
+    if let Some(turned) = &recorded.deepest.turned {
+        notes.push(format!(
+            "at {:.2} mm {} prisms have corners that are turned inside out, the worst near ({}) mm; stress there means little, and \
+             the force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
+            recorded.deepest.depth_mm,
+            turned.n,
+            in_mm(turned.at)
+        ));
+    }
     let smoothed = (good.iter())
         .filter(|s| s.friction_smoothing_um > 0.0)
         .count();
