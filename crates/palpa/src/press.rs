@@ -10,7 +10,7 @@ pub mod reference;
 pub mod tissue;
 
 pub use place::Place;
-pub use programme::{Phase, Waypoint, waypoints};
+pub use programme::{Phase, Waypoint, n_steps, waypoints};
 pub(crate) use reference::nodes_under_disc;
 
 /// Without the digits that binary fractions leave behind.

@@ -28,10 +28,14 @@ pub struct Waypoint {
     pub depth: f64,
 }
 
+/// Number of equal steps down, of which none is larger than asked for.
+pub fn n_steps(press: &Press) -> usize {
+    (press.depth / press.step - 1e-9).ceil().max(1.0) as usize
+}
+
 /// Down in equal steps at this speed (m/s), a rest sampled at these shares of its duration, and back; and again.
 pub fn waypoints(press: &Press, speed: f64, rests: &[f64]) -> Vec<Waypoint> {
-    // No step is larger than asked for.
-    let n = (press.depth / press.step - 1e-9).ceil().max(1.0) as usize;
+    let n = n_steps(press);
     let depth_at = |i: usize| press.depth * i as f64 / n as f64;
     let down = press.depth / speed;
     let mut path = Vec::new();

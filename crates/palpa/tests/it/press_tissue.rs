@@ -461,6 +461,57 @@ fn a_lump_outside_the_tissue_is_refused_and_one_across_the_skin_noted() {
 }
 
 #[test]
+fn free_cut_faces_under_tension_are_noted() {
+    let tense = BLOCK.replace(
+        "levels = 2\n[[layer]]",
+        "levels = 2\nprestress = \"3 kPa\"\n[[layer]]",
+    );
+    let says_so = |scene: &str| set_up(scene).unwrap().contains("cut faces are free");
+    assert!(says_so(&tense) && !says_so(BLOCK));
+    assert!(!says_so(
+        &tense.replace("[body]", "[body]\ncut_faces = \"fixed\"")
+    ));
+}
+
+#[test]
+fn steps_too_long_for_friction_are_noted() {
+    let pressed = |friction: &str, step: &str| {
+        let tool = format!("shape = \"sphere\"\nradius = \"12 mm\"\nfriction = {friction}");
+        let scene = BLOCK.replace("shape = \"disc\"\nradius = \"10 mm\"", &tool);
+        set_up(&scene.replace("step = \"0.5 mm\"", &format!("step = \"{step}\""))).unwrap()
+    };
+    // A twentieth of 12 mm/√2 is 0.424 mm.
+    let note = pressed("0.4", "0.5 mm");
+    assert!(note.contains("--step \"0.42 mm\""), "{note}");
+    assert!(!pressed("0.4", "0.4 mm").contains("friction"));
+    assert!(!pressed("0", "0.5 mm").contains("friction"));
+}
+
+#[test]
+fn prisms_turned_inside_out_at_a_corner_are_noted() {
+    let bench = tissue_bench();
+    let deep = BLOCK
+        .replace("\"10 mm\"\n[press]", "\"8 mm\"\n[press]")
+        .replace("depth = \"2 mm\"", "depth = \"9 mm\"\nretract = false")
+        .replace("near_tool = \"5 mm\"", "near_tool = \"2 mm\"");
+    let [deep, shallow] = [&deep, BLOCK].map(|scene| report(&bench, scene));
+    let turned = |report: &Value| {
+        let is_noted = report["notes"].to_string().contains("inside out");
+        (number(&report["result"]["n_turned_prisms"]), is_noted)
+    };
+    assert!(
+        turned(&deep).0 > 0.0 && turned(&deep).1,
+        "{:?}",
+        turned(&deep)
+    );
+    assert_eq!(turned(&shallow), (0.0, false));
+    // At rest there is no force of which a share could be out of balance.
+    let residuals = column(&shallow, "residual");
+    let worst = residuals[1..].iter().copied().fold(0.0, f64::max);
+    assert_eq!(shallow["result"]["worst"]["residual"], worst);
+}
+
+#[test]
 fn the_shipped_scenes_without_files_can_be_set_up() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut n = 0;
