@@ -215,8 +215,8 @@ fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Ve
         .collect();
     if let Some(turned) = &recorded.deepest.turned {
         notes.push(format!(
-            "at {:.2} mm {} prisms have corners that are turned inside out, the worst near ({}) mm; stress there means little, and \
-             the force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
+            "prisms with a corner turned inside out at {:.2} mm: {}, the worst near ({}) mm; stress there means little, and the \
+             force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
             recorded.deepest.depth_mm,
             turned.n,
             in_mm(turned.at)
