@@ -206,7 +206,7 @@ fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Ve
     let mut notes: Vec<String> = (recorded.failures.iter())
         .map(|failure| {
             format!(
-                "at {} mm/s the step to {:.2} mm FAILED: {}; results end before it. Press less deep, or refine the mesh there",
+                "at {} mm/s the step to {:.2} mm FAILED: {}; results end before it. Press less deep, refine the mesh there, or make [model] alpha smaller",
                 failure.speed_mm_s,
                 failure.depth_mm,
                 told(&failure.outcome)
