@@ -77,9 +77,8 @@ impl Case {
             {}
             depth = "2 mm"
             step = "1 mm"
+            hold = "0 s"
             retract = false
-            [reference]
-            substeps = 2
             "#,
             path(self.skin),
             bones.join(", "),
@@ -137,12 +136,14 @@ impl Case {
             loading[0].abs() < 1e-9 && loading[1] > 0.01 && loading[2] > loading[1],
             "{forces:?}"
         );
+        let keeps_volume = |s: &Value| s["volume_ratio_min"].as_f64().unwrap() > 0.5;
         assert!(
             samples
                 .iter()
-                .all(|s| s["n_inverted"] == 0 && s["outcome"] == "converged"),
+                .all(|s| keeps_volume(s) && s["outcome"] == "converged"),
             "{samples:?}"
         );
+        assert_eq!(report["result"]["n_turned_prisms"], 0);
         for file in [
             "press.csv",
             "press.pvd",
