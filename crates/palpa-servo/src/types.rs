@@ -1,0 +1,54 @@
+//! What crosses between a device and the law.
+
+use crate::Vec3;
+
+/// How many tools may touch one body.
+pub const MAX_TOOLS: usize = 2;
+
+/// Position and orientation of a tool: takes points of its own frame to the world.
+pub type Pose = nalgebra::Isometry3<f64>;
+
+/// What a device says of its hand-piece at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceState {
+    /// When it was read, on the clock of the loop, s.
+    pub time: f64,
+    /// Where the hand-piece is. The identity orientation for devices that have none.
+    pub pose: Pose,
+    /// Velocity of its position, m/s; zero where a device does not say.
+    pub velocity: Vec3,
+    /// One bit per button.
+    pub buttons: u32,
+}
+
+/// What a device shall exert on the hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceCommand {
+    /// Force, N, in the world's frame.
+    pub force: Vec3,
+    /// Moment about the hand-piece's position, N m; for devices that can.
+    pub torque: Vec3,
+}
+
+impl ForceCommand {
+    /// No force at all.
+    pub const ZERO: Self = Self {
+        force: Vec3::new(0.0, 0.0, 0.0),
+        torque: Vec3::new(0.0, 0.0, 0.0),
+    };
+}
+
+/// What a device can do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceSpec {
+    /// Largest force, N.
+    pub max_force: f64,
+    /// Largest moment, N m; 0 for devices without.
+    pub max_torque: f64,
+    /// Largest change of force in time, N/s.
+    pub max_slew: f64,
+    /// Stiffness up to which the device is stable in any hand, N/m.
+    pub max_stiffness: f64,
+    /// Largest damping that it renders stably, N s/m.
+    pub max_damping: f64,
+}
