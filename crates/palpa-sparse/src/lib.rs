@@ -1,11 +1,16 @@
 //! Sparse Cholesky factors of layered bodies, in memory that is allocated once.
 //!
-//! The order of elimination is that of the body's columns ([`minimum_degree`] of the skin's graph); a [`Pattern`] says
-//! where entries stand, and a [`Factor`] is refilled for every matrix of that pattern.
+//! Unknowns are ordered by the body's columns. Two factors stand side by side:
+//!
+//! - [`Factor`] of any [`Pattern`], for whole bodies in double precision, ordered by [`minimum_degree`];
+//! - [`fronts`], on columns alone, of which a part can be made anew while the rest is kept: the real-time factor.
 
+mod blocks;
 mod cholesky;
+pub mod fronts;
 mod order;
 
+pub use blocks::{Block, ColumnPattern};
 pub use cholesky::{Factor, Pattern};
 pub use order::minimum_degree;
 

@@ -1,0 +1,285 @@
+//! The numbers of a factor: every front is assembled, eliminated, and leaves an update to its parent.
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, Par};
+
+use super::Number;
+use super::tree::{Front, FrontPair, Half, Tree};
+use crate::Singular;
+use crate::blocks::Block;
+
+/// Memory that factoring needs and leaves nothing in.
+pub struct FactorScratch<T> {
+    updates: Vec<T>,
+    memory: MemBuffer,
+}
+
+impl<T> std::fmt::Debug for FactorScratch<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FactorScratch")
+            .field("n_updates", &self.updates.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<T: Number> FactorScratch<T> {
+    /// Scratch for a half of a tree.
+    pub fn new(tree: &Tree, half: Half) -> Self {
+        let b = tree.width;
+        let most = tree.fronts[tree.range(half)]
+            .iter()
+            .map(|f| f.own.len() * b)
+            .max();
+        let need = most.map_or(StackReq::EMPTY, |n| {
+            cholesky_in_place_scratch::<T>(n, Par::Seq, faer::Spec::default())
+        });
+        Self {
+            updates: vec![T::default(); tree.scratch[half as usize]],
+            memory: MemBuffer::new(need),
+        }
+    }
+}
+
+/// The factor of the columns outside the zone, and what they leave on its ring.
+#[derive(Debug, Clone)]
+pub struct Exterior<T> {
+    pub(super) panels: Vec<T>,
+    /// Lower triangle of the Schur complement on the ring, column by column.
+    schur: Vec<T>,
+}
+
+impl<T: Number> Exterior<T> {
+    /// Room for a tree's exterior; a zone cannot be factored with it before it is.
+    pub fn new(tree: &Tree) -> Self {
+        let ring = tree.ring.len() * tree.width;
+        Self {
+            panels: vec![T::default(); tree.panels[Half::Exterior as usize]],
+            schur: vec![T::default(); ring * ring],
+        }
+    }
+
+    /// Factors the exterior of the matrix of these blocks, which must not have the zone's own part in them. Ring blocks
+    /// are the exterior's share of them.
+    ///
+    /// # Errors
+    /// When the matrix is not positive definite; the factor is then of no use.
+    pub fn factor(
+        &mut self,
+        tree: &Tree,
+        blocks: &[Block<T>],
+        scratch: &mut FactorScratch<T>,
+    ) -> Result<(), Singular> {
+        self.schur.fill(T::default());
+        let n = tree.ring.len() * tree.width;
+        put_pairs(tree, &tree.ring_pairs, blocks, &mut self.schur, n);
+        for f in tree.range(Half::Exterior) {
+            eliminate(tree, f, blocks, &mut self.panels, None, scratch)?;
+            let front = &tree.fronts[f];
+            if front.parent.is_none() {
+                let size = front.border.len() * tree.width;
+                let update = &scratch.updates[front.update..][..size * size];
+                add_update(tree.width, &front.to_parent, update, 0, &mut self.schur, n);
+            }
+        }
+        Ok(())
+    }
+
+    /// What the exterior leaves on the ring: the lower triangle of its Schur complement, column by column.
+    pub fn schur(&self) -> &[T] {
+        &self.schur
+    }
+}
+
+/// The factor of the columns of the zone.
+#[derive(Debug, Clone)]
+pub struct Zone<T> {
+    pub(super) panels: Vec<T>,
+}
+
+impl<T: Number> Zone<T> {
+    /// Room for a tree's zone.
+    pub fn new(tree: &Tree) -> Self {
+        Self {
+            panels: vec![T::default(); tree.panels[Half::Zone as usize]],
+        }
+    }
+
+    /// Factors the zone of the matrix of these blocks, on top of a factored exterior if the tree has one.
+    ///
+    /// # Errors
+    /// When the matrix is not positive definite; the factor is then of no use.
+    pub fn factor(
+        &mut self,
+        tree: &Tree,
+        blocks: &[Block<T>],
+        exterior: Option<&Exterior<T>>,
+        scratch: &mut FactorScratch<T>,
+    ) -> Result<(), Singular> {
+        for f in tree.range(Half::Zone) {
+            let is_ring = tree.fronts[f].own == tree.ring;
+            let schur = exterior.filter(|_| is_ring).map(|e| &e.schur[..]);
+            eliminate(tree, f, blocks, &mut self.panels, schur, scratch)?;
+        }
+        Ok(())
+    }
+}
+
+/// Assembles a front, factors its own columns and leaves its update in the scratch.
+fn eliminate<T: Number>(
+    tree: &Tree,
+    f: usize,
+    blocks: &[Block<T>],
+    panels: &mut [T],
+    schur: Option<&[T]>,
+    scratch: &mut FactorScratch<T>,
+) -> Result<(), Singular> {
+    let front = &tree.fronts[f];
+    let b = tree.width;
+    let (own, border) = (front.own.len() * b, front.border.len() * b);
+    let height = own + border;
+    let panel = &mut panels[front.panel..][..height * own];
+    match schur {
+        // The ring has no border: its panel is as large as the complement.
+        Some(schur) => panel.copy_from_slice(schur),
+        None => panel.fill(T::default()),
+    }
+    put_pairs(tree, &front.pairs, blocks, panel, height);
+    for child in children(tree, front) {
+        let size = child.border.len() * b;
+        let update = &scratch.updates[child.update..][..size * size];
+        add_update(b, &child.to_parent, update, 0, panel, height);
+    }
+    let (mut top, bottom) =
+        MatMut::from_column_major_slice_mut(panel, height, own).split_at_row_mut(own);
+    cholesky_in_place(
+        top.rb_mut(),
+        faer::linalg::cholesky::llt::factor::LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(&mut scratch.memory),
+        faer::Spec::default(),
+    )
+    .map_err(|_| Singular)?;
+    if (0..own).any(|i| !top[(i, i)].wide().is_finite()) {
+        return Err(Singular);
+    }
+    if border > 0 {
+        let mut bottom = bottom;
+        solve_lower_triangular_in_place(top.rb(), bottom.rb_mut().transpose_mut(), Par::Seq);
+        let (before, rest) = scratch.updates.split_at_mut(front.update);
+        let (update, after) = rest.split_at_mut(border * border);
+        matmul(
+            MatMut::from_column_major_slice_mut(update, border, border),
+            BlockStructure::TriangularLower,
+            Accum::Replace,
+            bottom.rb(),
+            BlockStructure::Rectangular,
+            bottom.rb().transpose(),
+            BlockStructure::Rectangular,
+            T::nearest(-1.0),
+            Par::Seq,
+        );
+        for child in children(tree, front) {
+            let size = child.border.len() * b;
+            let from = if child.update < front.update {
+                &before[child.update..][..size * size]
+            } else {
+                &after[child.update - front.update - border * border..][..size * size]
+            };
+            add_update(b, &child.to_parent, from, front.own.len(), update, border);
+        }
+    }
+    Ok(())
+}
+
+fn children<'a>(tree: &'a Tree, front: &'a Front) -> impl Iterator<Item = &'a Front> {
+    front.children.iter().map(|&c| &tree.fronts[c as usize])
+}
+
+/// Adds the part of a child's update whose columns are, in the parent's counting, from `first` on (and, for a panel, end
+/// where it ends).
+fn add_update<T: Number>(
+    b: usize,
+    to_parent: &[u32],
+    update: &[T],
+    first: usize,
+    into: &mut [T],
+    height: usize,
+) {
+    let size = to_parent.len() * b;
+    let width = into.len() / height;
+    for (j, &column) in to_parent.iter().enumerate() {
+        let Some(column) = (column as usize).checked_sub(first) else {
+            continue;
+        };
+        if column * b >= width {
+            break;
+        }
+        for jj in 0..b {
+            let from = &update[(j * b + jj) * size..][..size];
+            let into = &mut into[(column * b + jj) * height..][..height];
+            for (i, &row) in to_parent.iter().enumerate().skip(j) {
+                let row = (row as usize - first) * b;
+                let (from, into) = (&from[i * b..][..b], &mut into[row..][..b]);
+                for (into, &from) in into.iter_mut().zip(from) {
+                    *into += from;
+                }
+            }
+        }
+    }
+}
+
+/// Adds blocks to a front.
+fn put_pairs<T: Number>(
+    tree: &Tree,
+    pairs: &[FrontPair],
+    blocks: &[Block<T>],
+    into: &mut [T],
+    height: usize,
+) {
+    let (b, n) = (tree.width, tree.n_levels);
+    for pair in pairs {
+        let (row, column) = (pair.row as usize * b, pair.column as usize * b);
+        let first = pair.blocks as usize;
+        if pair.row == pair.column {
+            for l in 0..n {
+                let at = (column + 3 * l) * height + row + 3 * l;
+                add_block(&blocks[first + 2 * l], false, &mut into[at..], height);
+                if l + 1 < n {
+                    add_block(
+                        &blocks[first + 2 * l + 1],
+                        false,
+                        &mut into[at + 3..],
+                        height,
+                    );
+                }
+            }
+            continue;
+        }
+        for l in 0..n {
+            for k in l.saturating_sub(1)..(l + 2).min(n) {
+                let block = &blocks[first + 3 * l + k + 1 - l];
+                let (r, c) = if pair.is_turned { (l, k) } else { (k, l) };
+                let at = (column + 3 * c) * height + row + 3 * r;
+                add_block(block, pair.is_turned, &mut into[at..], height);
+            }
+        }
+    }
+}
+
+#[inline]
+fn add_block<T: Number>(block: &Block<T>, is_turned: bool, into: &mut [T], height: usize) {
+    for c in 0..3 {
+        let into = &mut into[c * height..][..3];
+        for (r, into) in into.iter_mut().enumerate() {
+            *into += if is_turned {
+                block[c + 3 * r]
+            } else {
+                block[r + 3 * c]
+            };
+        }
+    }
+}

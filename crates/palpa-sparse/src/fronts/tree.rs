@@ -1,0 +1,358 @@
+//! Which columns are eliminated together, in which order, and what that fills.
+
+use std::ops::Range;
+
+use super::dissect::{Part, dissect};
+use crate::TooLarge;
+use crate::blocks::ColumnPattern;
+
+/// A factor may take at most so many numbers.
+const MOST_NUMBERS: usize = 1 << 30;
+
+/// Which half of a tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Half {
+    /// The columns outside the zone, eliminated first.
+    Exterior,
+    /// The columns of the zone; of a tree without a zone, all.
+    Zone,
+}
+
+/// Columns that are eliminated together, and the later ones that this fills.
+#[derive(Debug)]
+pub(super) struct Front {
+    /// Its own columns, by their place in the order of elimination.
+    pub(super) own: Range<u32>,
+    /// Later columns that it touches, ascending.
+    pub(super) border: Vec<u32>,
+    /// In the same half; the exterior's last fronts have none.
+    pub(super) parent: Option<u32>,
+    pub(super) children: Vec<u32>,
+    /// For each border column the place among the parent's columns, own first; of a last front of the exterior among
+    /// the ring.
+    pub(super) to_parent: Vec<u32>,
+    /// Pairs of neighbours that are assembled here.
+    pub(super) pairs: Vec<FrontPair>,
+    /// First number of its panel, `(own + border) × own` blocks of columns, among those of its half.
+    pub(super) panel: usize,
+    /// First number of its update, `border × border`, among the scratch of its half.
+    pub(super) update: usize,
+}
+
+/// A pair of neighbours in a front.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FrontPair {
+    /// First block of the pair.
+    pub(super) blocks: u32,
+    /// Row and column among the front's columns.
+    pub(super) row: u32,
+    pub(super) column: u32,
+    /// Whether rows and columns of its blocks change places.
+    pub(super) is_turned: bool,
+}
+
+/// An order of elimination of columns, and everything about it that does not depend on numbers.
+#[derive(Debug)]
+pub struct Tree {
+    pub(super) fronts: Vec<Front>,
+    /// How many of the fronts are the exterior's.
+    pub(super) n_exterior: usize,
+    /// Columns in the order of elimination, and the place of each in it.
+    pub(super) order: Vec<u32>,
+    pub(super) place: Vec<u32>,
+    /// Front of each place.
+    pub(super) front_of: Vec<u32>,
+    /// Places of the ring: the columns of the zone that touch the exterior, which are last.
+    pub(super) ring: Range<u32>,
+    /// Pairs of the ring that the exterior has a part in.
+    pub(super) ring_pairs: Vec<FrontPair>,
+    /// Unknowns of a column.
+    pub(super) width: usize,
+    pub(super) n_levels: usize,
+    /// Numbers of panels and scratch of the exterior, then of the zone.
+    pub(super) panels: [usize; 2],
+    pub(super) scratch: [usize; 2],
+    flops: [f64; 2],
+}
+
+impl Tree {
+    /// Orders all columns by nested dissection. `places` is where they are (in any unit).
+    ///
+    /// # Errors
+    /// When the factor would take more than 8 GiB.
+    pub fn whole(pattern: &ColumnPattern, places: &[[f64; 3]]) -> Result<Self, TooLarge> {
+        Self::zone_last(pattern, places, &vec![true; pattern.n_columns()])
+    }
+
+    /// Orders the columns outside `zone` first, then those within, then the ring: the columns of the zone that touch the
+    /// exterior. When only what is in the zone changes, only its half has to be factored again.
+    ///
+    /// # Errors
+    /// When the factor would take more than 8 GiB.
+    pub fn zone_last(
+        pattern: &ColumnPattern,
+        places: &[[f64; 3]],
+        zone: &[bool],
+    ) -> Result<Self, TooLarge> {
+        let n = pattern.n_columns();
+        let is_ring =
+            |c: usize| zone[c] && pattern.neighbours(c).iter().any(|&k| !zone[k as usize]);
+        let set = |keep: &dyn Fn(usize) -> bool| -> Vec<u32> {
+            (0..n).filter(|&c| keep(c)).map(|c| c as u32).collect()
+        };
+        let exterior = set(&|c| !zone[c]);
+        let within = set(&|c| zone[c] && !is_ring(c));
+        let ring = set(&|c| is_ring(c));
+        let mut side = vec![0; n];
+        let mut parts = Vec::new();
+        if !exterior.is_empty() {
+            dissect(pattern, places, exterior, &mut side, &mut parts);
+        }
+        let n_exterior = parts.len();
+        let ring_len = ring.len();
+        if !within.is_empty() {
+            dissect(pattern, places, within, &mut side, &mut parts);
+        }
+        if ring_len > 0 {
+            let children = (parts.len() > n_exterior).then(|| parts.len() - 1);
+            parts.push(Part {
+                columns: ring,
+                children: children.into_iter().collect(),
+            });
+        }
+        Self::analyse(pattern, parts, n_exterior, ring_len)
+    }
+
+    fn analyse(
+        pattern: &ColumnPattern,
+        parts: Vec<Part>,
+        n_exterior: usize,
+        ring_len: usize,
+    ) -> Result<Self, TooLarge> {
+        let n = pattern.n_columns();
+        let width = pattern.width();
+        let mut order = Vec::with_capacity(n);
+        let (mut place, mut front_of) = (vec![0; n], vec![0; n]);
+        let mut fronts: Vec<Front> = Vec::with_capacity(parts.len());
+        for (f, part) in parts.into_iter().enumerate() {
+            let first = order.len() as u32;
+            for c in part.columns {
+                place[c as usize] = order.len() as u32;
+                front_of[order.len()] = f as u32;
+                order.push(c);
+            }
+            for &child in &part.children {
+                fronts[child].parent = Some(f as u32);
+            }
+            fronts.push(Front {
+                own: first..order.len() as u32,
+                border: Vec::new(),
+                parent: None,
+                children: part.children.iter().map(|&c| c as u32).collect(),
+                to_parent: Vec::new(),
+                pairs: Vec::new(),
+                panel: 0,
+                update: 0,
+            });
+        }
+        let ring = (n - ring_len) as u32..n as u32;
+        for f in 0..fronts.len() {
+            let last = fronts[f].own.end;
+            let mut border: Vec<u32> = fronts[f]
+                .own
+                .clone()
+                .flat_map(|p| pattern.neighbours(order[p as usize] as usize))
+                .map(|&c| place[c as usize])
+                .chain(
+                    fronts[f]
+                        .children
+                        .iter()
+                        .flat_map(|&c| fronts[c as usize].border.clone()),
+                )
+                .filter(|&p| p >= last)
+                .collect();
+            border.sort_unstable();
+            border.dedup();
+            fronts[f].border = border;
+        }
+        for f in 0..fronts.len() {
+            let to_parent = match fronts[f].parent {
+                Some(parent) => {
+                    let parent = &fronts[parent as usize];
+                    fronts[f].border.iter().map(|&p| local(parent, p)).collect()
+                }
+                None => fronts[f].border.iter().map(|&p| p - ring.start).collect(),
+            };
+            fronts[f].to_parent = to_parent;
+        }
+        let mut tree = Self {
+            fronts,
+            n_exterior,
+            order,
+            place,
+            front_of,
+            ring,
+            ring_pairs: Vec::new(),
+            width,
+            n_levels: pattern.n_levels(),
+            panels: [0; 2],
+            scratch: [0; 2],
+            flops: [0.0; 2],
+        };
+        tree.assign_pairs(pattern);
+        tree.lay_out()?;
+        Ok(tree)
+    }
+
+    fn assign_pairs(&mut self, pattern: &ColumnPattern) {
+        let mut put = |row: u32, column: u32, blocks: usize, is_turned: bool| {
+            let f = self.front_of[column as usize] as usize;
+            let front = &mut self.fronts[f];
+            let pair = FrontPair {
+                blocks: blocks as u32,
+                row: local(front, row),
+                column: column - front.own.start,
+                is_turned,
+            };
+            front.pairs.push(pair);
+            if self.ring.contains(&column) {
+                self.ring_pairs.push(pair);
+            }
+        };
+        for c in 0..pattern.n_columns() {
+            let p = self.place[c];
+            put(p, p, pattern.own(c), false);
+        }
+        for pair in 0..pattern.n_pairs() {
+            let [a, b] = pattern.pair(pair).map(|c| self.place[c as usize]);
+            put(a.max(b), a.min(b), pattern.between(pair), a < b);
+        }
+    }
+
+    /// Gives every front its place in memory. Scratch is used again as soon as a parent has taken it up.
+    fn lay_out(&mut self) -> Result<(), TooLarge> {
+        let b = self.width;
+        for half in [Half::Exterior, Half::Zone] {
+            let h = half as usize;
+            let mut free: Vec<Range<usize>> = Vec::new();
+            for f in self.range(half) {
+                let own = self.fronts[f].own.len() * b;
+                let border = self.fronts[f].border.len() * b;
+                let (s, r) = (own as f64, border as f64);
+                self.flops[h] += s * s * s / 3.0 + s * s * r + s * r * r;
+                self.fronts[f].panel = self.panels[h];
+                self.panels[h] += own * (own + border);
+                self.fronts[f].update = take(&mut free, border * border, &mut self.scratch[h]);
+                for c in self.fronts[f].children.clone() {
+                    let child = &self.fronts[c as usize];
+                    let size = (child.border.len() * b).pow(2);
+                    give(&mut free, child.update..child.update + size);
+                }
+            }
+            if self.panels[h] > MOST_NUMBERS || self.scratch[h] > MOST_NUMBERS {
+                return Err(TooLarge {
+                    n_dofs: self.order.len() * b,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The fronts of a half, in the order of elimination.
+    pub(super) fn range(&self, half: Half) -> Range<usize> {
+        match half {
+            Half::Exterior => 0..self.n_exterior,
+            Half::Zone => self.n_exterior..self.fronts.len(),
+        }
+    }
+
+    /// Number of columns.
+    pub fn n_columns(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Columns of the zone, with its ring.
+    pub fn n_zone_columns(&self) -> usize {
+        self.fronts[self.range(Half::Zone)]
+            .iter()
+            .map(|f| f.own.len())
+            .sum()
+    }
+
+    /// Columns of the ring between zone and exterior.
+    pub fn n_ring_columns(&self) -> usize {
+        self.ring.len()
+    }
+
+    /// Floating-point operations (multiplication and addition count as one) that factor a half.
+    pub fn flops(&self, half: Half) -> f64 {
+        self.flops[half as usize]
+    }
+
+    /// Numbers that the factor of a half takes.
+    pub fn n_numbers(&self, half: Half) -> usize {
+        self.panels[half as usize]
+    }
+
+    /// The first unknown of a column in vectors that are ordered by elimination.
+    pub fn first_dof(&self, column: usize) -> usize {
+        self.place[column] as usize * self.width
+    }
+
+    /// Where the zone's unknowns begin in vectors that are ordered by elimination.
+    pub fn first_zone_dof(&self) -> usize {
+        self.fronts[..self.n_exterior]
+            .iter()
+            .map(|f| f.own.len())
+            .sum::<usize>()
+            * self.width
+    }
+}
+
+/// Place of a column, given by its place in the order, among those of a front.
+fn local(front: &Front, place: u32) -> u32 {
+    if front.own.contains(&place) {
+        return place - front.own.start;
+    }
+    let at = front.border.partition_point(|&p| p < place);
+    debug_assert_eq!(front.border.get(at), Some(&place));
+    (front.own.len() + at) as u32
+}
+
+/// Finds room of a size: the first hole that is large enough, or the end.
+fn take(free: &mut Vec<Range<usize>>, size: usize, end: &mut usize) -> usize {
+    if size == 0 {
+        return 0;
+    }
+    if let Some(i) = free.iter().position(|hole| hole.len() >= size) {
+        let start = free[i].start;
+        free[i].start += size;
+        if free[i].is_empty() {
+            free.remove(i);
+        }
+        return start;
+    }
+    let start = match free.last() {
+        Some(hole) if hole.end == *end => free.pop().map_or(*end, |hole| hole.start),
+        _ => *end,
+    };
+    *end = start + size;
+    start
+}
+
+/// Gives room back, joined with the holes beside it.
+fn give(free: &mut Vec<Range<usize>>, room: Range<usize>) {
+    if room.is_empty() {
+        return;
+    }
+    let at = free.partition_point(|hole| hole.start < room.start);
+    free.insert(at, room);
+    if at + 1 < free.len() && free[at].end == free[at + 1].start {
+        free[at].end = free[at + 1].end;
+        free.remove(at + 1);
+    }
+    if at > 0 && free[at - 1].end == free[at].start {
+        free[at - 1].end = free[at].end;
+        free.remove(at);
+    }
+}

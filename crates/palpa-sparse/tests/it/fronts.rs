@@ -1,0 +1,307 @@
+//! The multifrontal factor: whole and by zones, in both precisions, against a dense Cholesky factor.
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{Mat, Side};
+use palpa_sparse::fronts::{
+    Compliance, Exterior, FactorScratch, Half, Number, SolveScratch, Tree, Unit, Zone,
+    back_substitute, substitute,
+};
+use palpa_sparse::{Block, ColumnPattern};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+}
+
+/// A grid of columns with diagonals, some twice as dense, on a plane or closed to a tube.
+struct Case {
+    pattern: ColumnPattern,
+    places: Vec<[f64; 3]>,
+    edges: Vec<(usize, usize)>,
+    zone: Vec<bool>,
+}
+
+fn case(nx: usize, ny: usize, n_levels: usize, is_tube: bool, zone_radius: f64) -> Case {
+    let mut noise = Noise(3);
+    let places: Vec<[f64; 3]> = (0..nx * ny)
+        .map(|c| {
+            let (x, y) = ((c % nx) as f64, (c / nx) as f64);
+            if is_tube {
+                let angle = y / ny as f64 * std::f64::consts::TAU;
+                [x, 2.0 * angle.cos(), 2.0 * angle.sin()]
+            } else {
+                [x + 0.3 * noise.next(), y + 0.3 * noise.next(), 0.0]
+            }
+        })
+        .collect();
+    let mut edges = Vec::new();
+    for y in 0..ny {
+        for x in 0..nx {
+            let c = y * nx + x;
+            let up = if y + 1 < ny {
+                Some((y + 1) * nx)
+            } else {
+                is_tube.then_some(0)
+            };
+            if x + 1 < nx {
+                edges.push((c, c + 1));
+            }
+            if let Some(up) = up {
+                edges.push((c, up + x));
+                if x + 1 < nx {
+                    edges.push((up + x + 1, c));
+                }
+            }
+        }
+    }
+    let middle = places[(ny / 2) * nx + nx / 2];
+    let zone = places
+        .iter()
+        .map(|p| (0..3).map(|i| (p[i] - middle[i]).powi(2)).sum::<f64>() <= zone_radius.powi(2))
+        .collect();
+    Case {
+        pattern: ColumnPattern::new(nx * ny, n_levels, edges.iter().copied()),
+        places,
+        edges,
+        zone,
+    }
+}
+
+/// Blocks of what is inside the zone, then of the rest: springs of random stiffness between nodes, and to the ground.
+fn blocks(case: &Case, seed: u64) -> [Vec<Block<f64>>; 2] {
+    let pattern = &case.pattern;
+    let n = pattern.n_levels();
+    let mut noise = Noise(seed);
+    let mut parts = [
+        vec![[0.0; 9]; pattern.n_blocks()],
+        vec![[0.0; 9]; pattern.n_blocks()],
+    ];
+    let spring = |noise: &mut Noise| -> Block<f64> {
+        let d = [noise.next(), noise.next(), noise.next()];
+        std::array::from_fn(|i| d[i % 3] * d[i / 3] + if i % 4 == 0 { 0.05 } else { 0.0 })
+    };
+    let mut add = |a: (usize, usize), b: Option<(usize, usize)>, noise: &mut Noise| {
+        let k = spring(noise);
+        let is_inside = case.zone[a.0] && b.is_none_or(|b| case.zone[b.0]);
+        let part = &mut parts[usize::from(!is_inside)];
+        let mut put = |at: usize, sign: f64| {
+            for i in 0..9 {
+                part[at][i] += sign * k[i];
+            }
+        };
+        put(pattern.own(a.0) + 2 * a.1, 1.0);
+        let Some(b) = b else { return };
+        put(pattern.own(b.0) + 2 * b.1, 1.0);
+        if a.0 == b.0 {
+            put(pattern.own(a.0) + 2 * a.1.min(b.1) + 1, -1.0);
+        } else {
+            let (row, column) = if a.0 > b.0 { (a, b) } else { (b, a) };
+            let pair = pattern.find(row.0, column.0).unwrap();
+            put(
+                pattern.between(pair) + 3 * column.1 + row.1 + 1 - column.1,
+                -1.0,
+            );
+        }
+    };
+    for c in 0..pattern.n_columns() {
+        for l in 0..n {
+            if l + 1 == n {
+                add((c, l), None, &mut noise);
+            } else {
+                add((c, l), Some((c, l + 1)), &mut noise);
+            }
+        }
+    }
+    for &(a, b) in &case.edges {
+        for l in 0..n {
+            for k in l.saturating_sub(1)..(l + 2).min(n) {
+                add((a, l), Some((b, k)), &mut noise);
+            }
+        }
+    }
+    parts
+}
+
+fn dense(pattern: &ColumnPattern, parts: &[Vec<Block<f64>>; 2]) -> Mat<f64> {
+    let (n, b) = (pattern.n_levels(), pattern.width());
+    let mut matrix = Mat::zeros(pattern.n_dofs(), pattern.n_dofs());
+    let mut put = |row: usize, column: usize, at: usize| {
+        for part in parts {
+            for i in 0..9 {
+                let (r, c) = (row + i % 3, column + i / 3);
+                matrix[(r, c)] += part[at][i];
+                if row != column {
+                    matrix[(c, r)] += part[at][i];
+                }
+            }
+        }
+    };
+    for c in 0..pattern.n_columns() {
+        for l in 0..n {
+            put(b * c + 3 * l, b * c + 3 * l, pattern.own(c) + 2 * l);
+            if l + 1 < n {
+                put(b * c + 3 * l + 3, b * c + 3 * l, pattern.own(c) + 2 * l + 1);
+            }
+        }
+    }
+    for pair in 0..pattern.n_pairs() {
+        let [row, column] = pattern.pair(pair).map(|c| c as usize);
+        for l in 0..n {
+            for k in l.saturating_sub(1)..(l + 2).min(n) {
+                put(
+                    b * row + 3 * k,
+                    b * column + 3 * l,
+                    pattern.between(pair) + 3 * l + k + 1 - l,
+                );
+            }
+        }
+    }
+    matrix
+}
+
+fn narrow<T: Number>(blocks: &[Block<f64>]) -> Vec<Block<T>> {
+    blocks.iter().map(|b| b.map(T::nearest)).collect()
+}
+
+/// Everything that a factor is asked for, against the dense one: the largest relative errors of a solution and of W.
+fn errors<T: Number>(case: &Case, tree: &Tree) -> [f64; 2] {
+    let pattern = &case.pattern;
+    let n = pattern.n_dofs();
+    let mut exterior = Exterior::<T>::new(tree);
+    let mut zone = Zone::<T>::new(tree);
+    let mut outside = FactorScratch::new(tree, Half::Exterior);
+    let mut inside = FactorScratch::new(tree, Half::Zone);
+    let mut solve = SolveScratch::new(tree);
+    let units: Vec<Unit> = (0..pattern.n_columns() as u32)
+        .rev()
+        .filter(|&c| case.zone[c as usize])
+        .step_by(2)
+        .map(|column| Unit { column, level: 0 })
+        .collect();
+    let mut compliance = Compliance::<T>::new(tree, units.len());
+    let mut w = vec![T::default(); 9 * units.len() * units.len()];
+    let mut worst = [0.0_f64; 2];
+    let [_, rest] = blocks(case, 1);
+    // The zone's numbers change; the exterior is factored once.
+    for (round, seed) in [1, 5].into_iter().enumerate() {
+        let [inner, _] = blocks(case, seed);
+        let whole = dense(pattern, &[inner.clone(), rest.clone()]);
+        let oracle = whole.llt(Side::Lower).unwrap();
+        let mut noise = Noise(9);
+        let force = Mat::from_fn(n, 1, |_, _| noise.next());
+        let expected = oracle.solve(&force);
+        let (inner, outer) = (narrow::<T>(&inner), narrow::<T>(&rest));
+        let mut x = vec![T::default(); n];
+        for c in 0..pattern.n_columns() {
+            for d in 0..pattern.width() {
+                x[tree.first_dof(c) + d] = T::nearest(force[(c * pattern.width() + d, 0)]);
+            }
+        }
+        let mut run = || {
+            if round == 0 {
+                exterior.factor(tree, &outer, &mut outside).unwrap();
+            }
+            zone.factor(tree, &inner, Some(&exterior), &mut inside)
+                .unwrap();
+            substitute(tree, Half::Exterior, &exterior, &mut x, &mut solve);
+            substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+            back_substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+            back_substitute(tree, Half::Exterior, &exterior, &mut x, &mut solve);
+            compliance.compute(tree, &zone, &units, &mut w);
+        };
+        if round == 0 {
+            // The first products make faer's own scratch.
+            run();
+        } else {
+            assert_no_alloc(run);
+        }
+        let mut error = 0.0_f64;
+        for c in 0..pattern.n_columns() {
+            for d in 0..pattern.width() {
+                let difference =
+                    x[tree.first_dof(c) + d].wide() - expected[(c * pattern.width() + d, 0)];
+                error = error.max(difference.abs());
+            }
+        }
+        worst[0] = worst[0].max(error / expected.norm_max());
+        let inverse = oracle.inverse();
+        let dof = |i: usize| units[i / 3].column as usize * pattern.width() + i % 3;
+        let m = 3 * units.len();
+        let (mut error, mut size) = (0.0_f64, 0.0_f64);
+        for j in 0..m {
+            for i in 0..m {
+                let expected = inverse[(dof(i), dof(j))];
+                error = error.max((w[i + m * j].wide() - expected).abs());
+                size = size.max(expected.abs());
+            }
+        }
+        worst[1] = worst[1].max(error / size);
+    }
+    worst
+}
+
+#[test]
+fn a_zone_is_factored_on_a_kept_exterior_as_the_whole_would_be() {
+    for (name, case) in [
+        ("grid, zone in the middle", case(13, 11, 3, false, 3.2)),
+        ("grid, small zone", case(9, 9, 4, false, 1.2)),
+        ("tube", case(14, 12, 2, true, 3.0)),
+        ("zone of one column's star", case(6, 5, 1, false, 1.5)),
+        ("nothing but a zone", case(7, 6, 3, false, 100.0)),
+    ] {
+        let zone_last = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+        let [x, w] = errors::<f64>(&case, &zone_last);
+        assert!(x < 1e-11 && w < 1e-11, "{name}: {x:e} {w:e}");
+        let [x, w] = errors::<f32>(&case, &zone_last);
+        assert!(x < 1e-3 && w < 1e-3, "{name}, single: {x:e} {w:e}");
+    }
+}
+
+#[test]
+fn the_work_of_a_zone_is_a_small_part_of_the_whole() {
+    let case = case(30, 30, 4, false, 5.0);
+    let whole = Tree::whole(&case.pattern, &case.places).unwrap();
+    let zone = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    assert!(whole.flops(Half::Exterior) == 0.0);
+    assert_eq!(whole.n_zone_columns(), 900);
+    assert!(zone.n_zone_columns() < 100 && zone.n_ring_columns() < 40);
+    let share = zone.flops(Half::Zone) / whole.flops(Half::Zone);
+    assert!(share < 0.15, "{share}");
+}
+
+#[test]
+fn a_matrix_that_is_not_positive_definite_is_refused() {
+    let case = case(6, 6, 2, false, 2.0);
+    let tree = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    let [mut inner, mut outer] = blocks(&case, 1);
+    let mut exterior = Exterior::<f64>::new(&tree);
+    let mut outside = FactorScratch::new(&tree, Half::Exterior);
+    exterior.factor(&tree, &outer, &mut outside).unwrap();
+    let mut zone = Zone::<f64>::new(&tree);
+    let mut inside = FactorScratch::new(&tree, Half::Zone);
+    let middle = case.zone.iter().position(|&z| z).unwrap();
+    for bad in [-100.0, f64::NAN] {
+        inner[case.pattern.own(middle)][0] = bad;
+        assert!(
+            zone.factor(&tree, &inner, Some(&exterior), &mut inside)
+                .is_err(),
+            "{bad}"
+        );
+        outer[case.pattern.own(0)][0] = bad;
+        assert!(
+            exterior.factor(&tree, &outer, &mut outside).is_err(),
+            "{bad}"
+        );
+    }
+}

@@ -1,0 +1,3 @@
+//! Factors against dense linear algebra.
+
+mod fronts;
