@@ -13,6 +13,7 @@ pub mod lump;
 mod materials;
 mod model;
 pub mod pairing;
+pub mod realtime;
 pub mod shape;
 mod state;
 mod statics;

@@ -37,6 +37,7 @@ pub use yeoh::Yeoh;
 
 use crate::{Mat3, Mat9};
 use invariants::FirstInvariant;
+pub(crate) use invariants::Hardening;
 
 /// An energy density beyond this (J/m³) is that of no tissue, and its derivatives may overflow: it counts as infinite.
 const HIGHEST_ENERGY: f64 = 1e60;
@@ -130,6 +131,30 @@ macro_rules! of_each {
             Law::Fung($law) => $expression,
         }
     };
+}
+
+impl Law {
+    /// `w'` at rest (Pa), how it grows, and the bulk modulus (Pa), of a law in the first invariant whose volumetric energy
+    /// is quadratic; none of others.
+    pub(crate) fn first_invariant(&self) -> Option<(f64, Hardening, f64)> {
+        let (slope, hardening, volumetric) = match self {
+            Self::NeoHookean(law) => (0.5 * law.shear(), Hardening::None, law.volumetric()),
+            Self::Yeoh(law) => {
+                let [c10, c20, c30] = law.constants();
+                let (a, b) = (c20 / c10, c30 / c10);
+                (c10, Hardening::Cubic { a, b }, law.volumetric())
+            }
+            Self::Fung(law) => {
+                let hardening = Hardening::Exponential { b: law.b() };
+                (0.5 * law.shear(), hardening, law.volumetric())
+            }
+            _ => return None,
+        };
+        match *volumetric {
+            Volumetric::Quadratic { bulk } => Some((slope, hardening, bulk)),
+            Volumetric::Logarithmic { .. } => None,
+        }
+    }
 }
 
 macro_rules! law_from {

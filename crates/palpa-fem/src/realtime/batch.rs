@@ -1,0 +1,614 @@
+//! Pairs of prisms in batches of sixteen, of one interval and one kind of law, as the kernel takes them.
+//!
+//! Pairs whose law is not one of the kernel's are evaluated one by one.
+
+use palpa_mesh::Vec3;
+use palpa_sparse::fronts::Number;
+use palpa_sparse::{Block, ColumnPattern};
+use pulp::{Arch, Simd, WithSimd};
+
+use super::kernel::{
+    Constant, Geometry, Local, N_BLOCKS, N_NODES, N_POINTS, Row, Stiffness, WIDTH, evaluate,
+};
+use super::lanes::{Doubles, Lanes, Singles};
+use crate::assembly::{Inverted, phases_at};
+use crate::columns::SurfaceGroup;
+use crate::element::{GroupResponse, Overstress, PhaseAt};
+use crate::law::Hardening;
+use crate::model::Model;
+use crate::state::Memory;
+
+/// Set in the place of a block that is to be added turned.
+const TURNED: u32 = 1 << 31;
+
+/// Numbers of a batch in one precision.
+#[derive(Debug)]
+struct Numbers<E> {
+    geometry: Geometry<E>,
+    stiffness: Stiffness<E>,
+    constant: Option<Constant<E>>,
+}
+
+#[derive(Debug)]
+struct Batch {
+    /// Pairs that are really there; the other lanes repeat the first.
+    n: usize,
+    hardening: Hardening,
+    /// Index of the geometry and phases of each pair.
+    pairs: [u32; WIDTH],
+    /// Nodes in the order of the kernel.
+    nodes: [[u32; WIDTH]; N_NODES],
+    double: Numbers<f64>,
+    /// For tangents: in single precision, and where they go.
+    tangent: Option<(Numbers<f32>, [[u32; WIDTH]; N_BLOCKS])>,
+}
+
+/// A pair whose law is not the kernel's.
+#[derive(Debug)]
+struct Other {
+    pair: u32,
+    blocks: [u32; N_BLOCKS],
+}
+
+/// The prisms of some part of a body.
+#[derive(Debug)]
+pub(super) struct Batches {
+    batches: Vec<Box<Batch>>,
+    others: Vec<Other>,
+    local_double: Box<Local<f64>>,
+    local_single: Box<Local<f32>>,
+    response: GroupResponse,
+    has_memory: bool,
+}
+
+/// Local columns in the order of the kernel: the first wedge's own, the two that are shared, the second's own.
+fn kernel_columns(group: &SurfaceGroup) -> [usize; 4] {
+    let [first, second] = group.shape.wedges.map(|w| w.map(usize::from));
+    if group.shape.n_wedges == 1 {
+        return [first[0], first[1], first[2], first[0]];
+    }
+    let shared: Vec<usize> = first.into_iter().filter(|c| second.contains(c)).collect();
+    let own = |wedge: [usize; 3], other: [usize; 3]| {
+        wedge
+            .into_iter()
+            .find(|c| !other.contains(c))
+            .unwrap_or(wedge[0])
+    };
+    [own(first, second), shared[0], shared[1], own(second, first)]
+}
+
+/// `w'` at rest and bulk modulus of a group, per point and for its volume, and how it hardens; none if its law is not the
+/// kernel's.
+fn lane(phases: &[PhaseAt<'_>]) -> Option<([f64; N_POINTS], f64, Hardening)> {
+    let mut slopes = [0.0; N_POINTS];
+    let mut bulk = 0.0;
+    let mut common = None;
+    for at in phases {
+        let (slope, hardening, k) = at.law.first_invariant()?;
+        if *common.get_or_insert(hardening) != hardening {
+            return None;
+        }
+        for (sum, share) in slopes.iter_mut().zip(at.phase.points) {
+            *sum += slope * share * at.scale[0];
+        }
+        bulk += k * at.phase.volume * at.scale[1];
+    }
+    common.map(|hardening| (slopes, bulk, hardening))
+}
+
+impl Batches {
+    /// The prisms under the groups that `keep` names. With tangents they can be assembled into blocks of the pattern.
+    pub(super) fn new(
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        keep: &dyn Fn(&SurfaceGroup) -> bool,
+        with_tangent: bool,
+    ) -> Self {
+        let mut batches: Vec<Box<Batch>> = Vec::new();
+        let mut others = Vec::new();
+        let mut phases = Vec::new();
+        let n_groups = model.n_groups();
+        for i in 0..model.body.n_levels - 1 {
+            // Batches of this interval that have room.
+            let mut open: Vec<usize> = Vec::new();
+            for (g, group) in model.structure.groups.iter().enumerate() {
+                if !keep(group) {
+                    continue;
+                }
+                let pair = i * n_groups + g;
+                phases_at(model, memory, pair, &mut phases);
+                let columns = kernel_columns(group);
+                let Some((_, _, hardening)) = lane(&phases) else {
+                    others.push(Other {
+                        pair: pair as u32,
+                        blocks: places(model, pattern, group, i, [0, 1, 2, 3]),
+                    });
+                    continue;
+                };
+                let index = match open.iter().find(|&&b| batches[b].hardening == hardening) {
+                    Some(&index) => index,
+                    None => {
+                        let batch = Batch::empty(hardening, with_tangent, model.has_memory);
+                        batches.push(Box::new(batch));
+                        open.push(batches.len() - 1);
+                        batches.len() - 1
+                    }
+                };
+                batches[index].push(model, pattern, g, i, columns);
+                if batches[index].n == WIDTH {
+                    open.retain(|&b| b != index);
+                }
+            }
+        }
+        let mut all = Self {
+            batches,
+            others,
+            local_double: Box::new(Local::new()),
+            local_single: Box::new(Local::new()),
+            response: GroupResponse::new(),
+            has_memory: true,
+        };
+        for batch in &mut all.batches {
+            batch.fill();
+        }
+        all.refresh(model, memory);
+        all.has_memory = model.has_memory;
+        all
+    }
+
+    /// Takes over what a step's duration and the past make of materials that have a memory.
+    pub(super) fn refresh(&mut self, model: &Model, memory: &Memory) {
+        if !self.has_memory {
+            return;
+        }
+        let mut phases = Vec::with_capacity(4);
+        for batch in &mut self.batches {
+            for lane_index in 0..WIDTH {
+                let pair = batch.pairs[lane_index] as usize;
+                phases_at(model, memory, pair, &mut phases);
+                let Some((slopes, bulk, _)) = lane(&phases) else {
+                    continue;
+                };
+                batch.double.put(lane_index, slopes, bulk, &phases);
+                if let Some((single, _)) = &mut batch.tangent {
+                    single.put(lane_index, slopes, bulk, &phases);
+                }
+            }
+        }
+    }
+
+    /// Adds `∂W/∂u` of these prisms, N.
+    pub(super) fn add_forces(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        forces: &mut [Vec3],
+    ) -> Result<(), Inverted> {
+        let pass = Forces {
+            batches: &self.batches,
+            local: &mut self.local_double,
+            displacements,
+            forces,
+        };
+        Arch::new()
+            .dispatch(pass)
+            .map_err(|pair| inverted(model, pair))?;
+        let mut phases = Vec::new();
+        for other in &self.others {
+            let pair = other.pair as usize;
+            one_by_one(
+                model,
+                memory,
+                pair,
+                displacements,
+                &mut phases,
+                &mut self.response,
+                false,
+            )?;
+            let (group, nodes) = group_nodes(model, pair);
+            for (n, &node) in nodes.iter().enumerate().take(group.n_nodes()) {
+                forces[node] += self.response.forces[n];
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the stiffness of these prisms to the blocks of the pattern, one of which, past its end, is for what has no
+    /// place. N/m
+    pub(super) fn add_stiffness(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        blocks: &mut [Block<f32>],
+    ) -> Result<(), Inverted> {
+        let pass = Tangents {
+            batches: &self.batches,
+            local: &mut self.local_single,
+            displacements,
+            blocks,
+        };
+        Arch::new()
+            .dispatch(pass)
+            .map_err(|pair| inverted(model, pair))?;
+        let mut phases = Vec::new();
+        for other in &self.others {
+            let pair = other.pair as usize;
+            one_by_one(
+                model,
+                memory,
+                pair,
+                displacements,
+                &mut phases,
+                &mut self.response,
+                true,
+            )?;
+            for (place, block) in other.blocks.iter().zip(&self.response.stiffness) {
+                let into = &mut blocks[(place & !TURNED) as usize];
+                for r in 0..3 {
+                    for c in 0..3 {
+                        let at = if place & TURNED == 0 {
+                            r + 3 * c
+                        } else {
+                            c + 3 * r
+                        };
+                        into[at] += block[(r, c)] as f32;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn group_nodes(model: &Model, pair: usize) -> (&SurfaceGroup, [usize; N_NODES]) {
+    let (i, g) = (pair / model.n_groups(), pair % model.n_groups());
+    (&model.structure.groups[g], model.group_nodes(g, i))
+}
+
+fn one_by_one<'a>(
+    model: &'a Model,
+    memory: &'a Memory,
+    pair: usize,
+    displacements: &[Vec3],
+    phases: &mut Vec<PhaseAt<'a>>,
+    response: &mut GroupResponse,
+    with_tangent: bool,
+) -> Result<(), Inverted> {
+    phases_at(model, memory, pair, phases);
+    let (group, nodes) = group_nodes(model, pair);
+    crate::element::evaluate(
+        group.shape,
+        &model.geometries[pair],
+        &nodes.map(|n| displacements[n]),
+        phases,
+        model.params.alpha,
+        with_tangent,
+        response,
+    );
+    if response.energy.is_finite() {
+        Ok(())
+    } else {
+        Err(inverted(model, pair as u32))
+    }
+}
+
+fn inverted(model: &Model, pair: u32) -> Inverted {
+    let (_, nodes) = group_nodes(model, pair as usize);
+    Inverted {
+        at: nodes.iter().map(|&n| model.body.positions[n]).sum::<Vec3>() / N_NODES as f64,
+    }
+}
+
+/// Where the blocks between the nodes of a group go, given the local column of each of the kernel's.
+fn places(
+    model: &Model,
+    pattern: &ColumnPattern,
+    group: &SurfaceGroup,
+    interval: usize,
+    columns: [usize; 4],
+) -> [u32; N_BLOCKS] {
+    let nowhere = pattern.n_blocks() as u32;
+    let n_free = model.structure.n_free_levels;
+    let mut places = [nowhere; N_BLOCKS];
+    for a in 0..N_NODES {
+        for b in 0..=a {
+            let (ca, cb) = (a / 2, b / 2);
+            // In a single prism the fourth column is there for the form.
+            if ca.max(cb) >= group.n_columns() {
+                continue;
+            }
+            let (la, lb) = (interval + a % 2, interval + b % 2);
+            if la.max(lb) >= n_free {
+                continue;
+            }
+            let va = group.vertices[columns[ca]] as usize;
+            let vb = group.vertices[columns[cb]] as usize;
+            places[a * (a + 1) / 2 + b] = if va == vb {
+                (pattern.own(va) + 2 * lb + la - lb) as u32
+            } else {
+                let (row, column, k, l) = if va > vb {
+                    (va, vb, la, lb)
+                } else {
+                    (vb, va, lb, la)
+                };
+                let Some(pair) = pattern.find(row, column) else {
+                    continue;
+                };
+                let place = (pattern.between(pair) + 3 * l + k + 1 - l) as u32;
+                if va > vb { place } else { place | TURNED }
+            };
+        }
+    }
+    places
+}
+
+impl Batch {
+    fn empty(hardening: Hardening, with_tangent: bool, has_memory: bool) -> Self {
+        Self {
+            n: 0,
+            hardening,
+            pairs: [0; WIDTH],
+            nodes: [[0; WIDTH]; N_NODES],
+            double: Numbers::new(has_memory),
+            tangent: with_tangent.then(|| (Numbers::new(has_memory), [[0; WIDTH]; N_BLOCKS])),
+        }
+    }
+
+    fn push(
+        &mut self,
+        model: &Model,
+        pattern: &ColumnPattern,
+        g: usize,
+        interval: usize,
+        columns: [usize; 4],
+    ) {
+        let lane = self.n;
+        self.n += 1;
+        let group = &model.structure.groups[g];
+        let pair = interval * model.n_groups() + g;
+        self.pairs[lane] = pair as u32;
+        for (n, nodes) in self.nodes.iter_mut().enumerate() {
+            let vertex = group.vertices[columns[n / 2]] as usize;
+            nodes[lane] = model.body.node(vertex, interval + n % 2) as u32;
+        }
+        self.double.shape(model, pair, lane, columns);
+        if let Some((single, blocks)) = &mut self.tangent {
+            single.shape(model, pair, lane, columns);
+            let places = places(model, pattern, group, interval, columns);
+            for (row, place) in blocks.iter_mut().zip(places) {
+                row[lane] = place;
+            }
+        }
+    }
+
+    /// Fills lanes that have no pair with the first.
+    fn fill(&mut self) {
+        for lane in self.n..WIDTH {
+            self.pairs[lane] = self.pairs[0];
+            for nodes in &mut self.nodes {
+                nodes[lane] = nodes[0];
+            }
+            self.double.copy_first(lane);
+            if let Some((single, _)) = &mut self.tangent {
+                single.copy_first(lane);
+            }
+        }
+    }
+}
+
+impl<E: Number> Numbers<E> {
+    fn new(has_memory: bool) -> Self {
+        let zero = [E::default(); WIDTH];
+        Self {
+            geometry: Geometry {
+                gradients: [[[[zero; 3]; 6]; 2]; 2],
+                volumes: [[zero; 2]; 2],
+                thickness: [zero; 3],
+                thickness_gradient: [zero; 3],
+                alpha: zero,
+            },
+            stiffness: Stiffness {
+                slope: [zero; N_POINTS],
+                bulk: zero,
+            },
+            constant: has_memory.then_some(Constant {
+                stress: [[zero; 6]; N_POINTS],
+                pressure: zero,
+            }),
+        }
+    }
+
+    fn shape(&mut self, model: &Model, pair: usize, lane: usize, columns: [usize; 4]) {
+        let group = &model.structure.groups[pair % model.n_groups()];
+        let from = &model.geometries[pair];
+        let geometry = &mut self.geometry;
+        let is_pair = group.shape.n_wedges == 2;
+        for w in 0..2 {
+            for n in 0..6 {
+                let column = columns[w + n / 2] as u8;
+                let wedge = group.shape.wedges[w];
+                let corner = wedge.iter().position(|&c| c == column).unwrap_or(0) + 3 * (n % 2);
+                for q in 0..2 {
+                    for c in 0..3 {
+                        geometry.gradients[w][q][n][c][lane] =
+                            E::nearest(from.wedges[w].gradients[q][corner][c]);
+                    }
+                }
+            }
+            for q in 0..2 {
+                geometry.volumes[w][q][lane] = E::nearest(from.wedges[w].volumes[q]);
+            }
+        }
+        for c in 0..3 {
+            geometry.thickness[c][lane] = E::nearest(from.thickness[c]);
+            geometry.thickness_gradient[c][lane] = E::nearest(from.thickness_gradient[c]);
+        }
+        geometry.alpha[lane] = E::nearest(if is_pair { model.params.alpha } else { 0.0 });
+    }
+
+    fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64, phases: &[PhaseAt<'_>]) {
+        for (row, slope) in self.stiffness.slope.iter_mut().zip(slopes) {
+            row[lane] = E::nearest(slope);
+        }
+        self.stiffness.bulk[lane] = E::nearest(bulk);
+        let Some(constant) = &mut self.constant else {
+            return;
+        };
+        let shares = |overstress: &Overstress, at: &PhaseAt<'_>, point: usize| {
+            overstress.points[point] * at.phase.points[point]
+        };
+        for point in 0..N_POINTS {
+            let sum = phases
+                .iter()
+                .filter_map(|at| at.overstress.map(|o| shares(o, at, point)))
+                .sum::<crate::Mat3>();
+            let six = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
+            for (row, place) in constant.stress[point].iter_mut().zip(six) {
+                row[lane] = E::nearest(sum[place]);
+            }
+        }
+        let pressure: f64 = phases
+            .iter()
+            .filter_map(|at| at.overstress.map(|o| o.volume * at.phase.volume))
+            .sum();
+        constant.pressure[lane] = E::nearest(pressure);
+    }
+
+    fn copy_first(&mut self, lane: usize) {
+        let copy = |row: &mut Row<E>| row[lane] = row[0];
+        let geometry = &mut self.geometry;
+        geometry
+            .gradients
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .flatten()
+            .for_each(copy);
+        geometry.volumes.iter_mut().flatten().for_each(copy);
+        geometry.thickness.iter_mut().for_each(copy);
+        geometry.thickness_gradient.iter_mut().for_each(copy);
+        copy(&mut geometry.alpha);
+    }
+}
+
+impl<E: Number> Local<E> {
+    fn new() -> Self {
+        let zero = [E::default(); WIDTH];
+        Self {
+            displacements: [[zero; 3]; N_NODES],
+            forces: [[zero; 3]; N_NODES],
+            stiffness: [[zero; 9]; N_BLOCKS],
+        }
+    }
+
+    #[inline(always)]
+    fn gather(&mut self, nodes: &[[u32; WIDTH]; N_NODES], displacements: &[Vec3]) {
+        for (rows, nodes) in self.displacements.iter_mut().zip(nodes) {
+            for (lane, &node) in nodes.iter().enumerate() {
+                let u = &displacements[node as usize];
+                for c in 0..3 {
+                    rows[c][lane] = E::nearest(u[c]);
+                }
+            }
+        }
+    }
+}
+
+/// A batch in one precision; returns whether all its points are the right way out.
+#[inline(always)]
+fn run<R: Lanes, const TANGENT: bool>(
+    token: R::Token,
+    numbers: &Numbers<R::Element>,
+    hardening: Hardening,
+    local: &mut Local<R::Element>,
+) -> bool {
+    let mut least = [R::Element::nearest(1.0); WIDTH];
+    for at in (0..WIDTH).step_by(R::N) {
+        let constant = numbers.constant.as_ref();
+        evaluate::<R, TANGENT>(
+            token,
+            at,
+            &numbers.geometry,
+            &numbers.stiffness,
+            constant,
+            hardening,
+            local,
+        )
+        .store(&mut least[at..]);
+    }
+    least.iter().all(|&j| j > R::Element::default())
+}
+
+struct Forces<'a> {
+    batches: &'a [Box<Batch>],
+    local: &'a mut Local<f64>,
+    displacements: &'a [Vec3],
+    forces: &'a mut [Vec3],
+}
+
+impl WithSimd for Forces<'_> {
+    type Output = Result<(), u32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        for batch in self.batches {
+            self.local.gather(&batch.nodes, self.displacements);
+            if !run::<Doubles<S>, false>(simd, &batch.double, batch.hardening, self.local) {
+                return Err(batch.pairs[0]);
+            }
+            for (rows, nodes) in self.local.forces.iter().zip(&batch.nodes) {
+                for (lane, &node) in nodes.iter().enumerate().take(batch.n) {
+                    let force = &mut self.forces[node as usize];
+                    for c in 0..3 {
+                        force[c] += rows[c][lane];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Tangents<'a> {
+    batches: &'a [Box<Batch>],
+    local: &'a mut Local<f32>,
+    displacements: &'a [Vec3],
+    blocks: &'a mut [Block<f32>],
+}
+
+impl WithSimd for Tangents<'_> {
+    type Output = Result<(), u32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        for batch in self.batches {
+            let Some((single, places)) = &batch.tangent else {
+                continue;
+            };
+            self.local.gather(&batch.nodes, self.displacements);
+            if !run::<Singles<S>, true>(simd, single, batch.hardening, self.local) {
+                return Err(batch.pairs[0]);
+            }
+            for (rows, places) in self.local.stiffness.iter().zip(places) {
+                for (lane, &place) in places.iter().enumerate().take(batch.n) {
+                    let into = &mut self.blocks[(place & !TURNED) as usize];
+                    // Rows hold entry (r, c) at 3 r + c, blocks at r + 3 c.
+                    for r in 0..3 {
+                        for c in 0..3 {
+                            let at = if place & TURNED == 0 {
+                                r + 3 * c
+                            } else {
+                                c + 3 * r
+                            };
+                            into[at] += rows[3 * r + c][lane];
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,215 @@
+//! The kernel against the element.
+
+use super::batch::Batches;
+use super::column_pattern;
+use crate::assembly::assemble;
+use crate::columns::SurfaceGroup;
+use crate::law::{Fung, Law, Moduli, MooneyRivlin, NeoHookean, Prony, PronyTerm, Volumetric, Yeoh};
+use crate::model::Model;
+use crate::state::Memory;
+use crate::{Mat3, Material, Materials, ModelParams, State, Supports};
+use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
+use palpa_mesh::{LayeredBody, Vec3};
+
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+}
+
+/// Seven by five cells: an odd number of batches, and one that is not full; three layers of different stiffness.
+fn body() -> LayeredBody {
+    let levels = LevelStack {
+        depths: vec![0.0, 2e-3, 5e-3, 9e-3],
+        interval_layer: vec![0, 1, 2],
+    };
+    let grid = Grid {
+        n_cells: [7, 5],
+        diagonal: Diagonal::Alternate,
+        jitter: Some(3),
+    };
+    mapped_grid(
+        &grid,
+        |u, v| Vec3::new(0.02 * u, 0.015 * v, 2e-3 * u * v),
+        &levels,
+    )
+}
+
+fn materials(laws: [Law; 3], is_viscous: bool) -> Materials {
+    Materials::of_layers(
+        laws.into_iter()
+            .map(|law| {
+                let mut material = Material::new("t", law);
+                if is_viscous {
+                    let terms = vec![
+                        PronyTerm { g: 0.3, tau: 0.1 },
+                        PronyTerm { g: 0.2, tau: 1.0 },
+                    ];
+                    let prony = Prony::new(terms, Moduli::Instantaneous, true);
+                    material.prony = Some(prony.unwrap());
+                    material.prestress = 500.0;
+                }
+                material
+            })
+            .collect(),
+    )
+}
+
+fn cases() -> Vec<(&'static str, Materials)> {
+    let soft = |young| Law::from(NeoHookean::from_young(young, 0.49).unwrap());
+    let neo_hookean = [soft(100e3), soft(5e3), soft(30e3)];
+    let hardening = [
+        Fung::from_young(50e3, 0.47, 10.0).unwrap().into(),
+        Yeoh::from_young(10e3, 0.45, [0.5, 2.0]).unwrap().into(),
+        soft(30e3),
+    ];
+    let log = Volumetric::Logarithmic { bulk: 3e5 };
+    let strange = [
+        MooneyRivlin::new(8e3, 3e3, Volumetric::Quadratic { bulk: 4e5 })
+            .unwrap()
+            .into(),
+        NeoHookean::new(1e4, log).unwrap().into(),
+        soft(30e3),
+    ];
+    vec![
+        ("neo-Hookean", materials(neo_hookean, false)),
+        ("Fung and Yeoh", materials(hardening, false)),
+        ("one by one", materials(strange, false)),
+        ("viscous", materials(neo_hookean, true)),
+        ("viscous, hardening", materials(hardening, true)),
+    ]
+}
+
+/// A body that has been deformed, twice if it remembers.
+fn deformed(model: &Model, memory: &mut Memory, size: f64) -> Vec<Vec3> {
+    let mut state = State::new(model);
+    let mut noise = Noise(11);
+    let stretch = Mat3::new(0.05, 0.1, -0.04, 0.02, 0.06, 0.1, -0.1, 0.03, -0.2);
+    let mut shake = || -> Vec<Vec3> {
+        let noise = &mut noise;
+        model
+            .body
+            .positions
+            .iter()
+            .map(|x| stretch * x + Vec3::from_fn(|_, _| size * noise.next()))
+            .collect()
+    };
+    state.displacements = shake();
+    memory.begin(model, &state, 0.05);
+    memory.commit(model, &mut state);
+    memory.begin(model, &state, 0.01);
+    shake()
+}
+
+#[test]
+fn forces_and_stiffness_are_the_elements() {
+    let body = body();
+    for (name, materials) in cases() {
+        for is_fixed in [true, false] {
+            let supports = if is_fixed {
+                Supports::on_base(&body)
+            } else {
+                Supports::default()
+            };
+            let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
+            let mut memory = Memory::new(&model);
+            let u = deformed(&model, &mut memory, 3e-4);
+            let n = model.n_nodes();
+            let mut expected = vec![Vec3::zeros(); n];
+            let mut expected_blocks = vec![Mat3::zeros(); model.structure.n_blocks()];
+            assemble(
+                &model,
+                &memory,
+                &u,
+                &mut expected,
+                Some(&mut expected_blocks),
+            )
+            .unwrap();
+            let size = expected.iter().map(Vec3::norm).fold(0.0, f64::max);
+
+            let pattern = column_pattern(&model);
+            // Made of two parts, as zone and exterior are.
+            let mut forces = vec![Vec3::zeros(); n];
+            let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+            for is_first in [true, false] {
+                let keep = |group: &SurfaceGroup| (group.triangles[0] % 3 == 0) == is_first;
+                let mut batches = Batches::new(&model, &memory, &pattern, &keep, true);
+                batches.refresh(&model, &memory);
+                batches
+                    .add_forces(&model, &memory, &u, &mut forces)
+                    .unwrap();
+                batches
+                    .add_stiffness(&model, &memory, &u, &mut blocks)
+                    .unwrap();
+            }
+            for (force, expected) in forces.iter().zip(&expected) {
+                let error = (force - expected).norm();
+                assert!(error < 1e-13 * size.max(1.0), "{name}: {error:e} of {size}");
+            }
+            let largest = expected_blocks.iter().map(Mat3::norm).fold(0.0, f64::max);
+            let (mut worst, mut compared) = (0.0_f64, 0);
+            for (i, row, column, _) in model.structure.blocks() {
+                let (v, w) = (row / model.body.n_levels, column / model.body.n_levels);
+                let (k, l) = (row % model.body.n_levels, column % model.body.n_levels);
+                let (place, is_turned) = if v == w {
+                    (pattern.own(v) + 2 * l.min(k) + k.abs_diff(l), k < l)
+                } else {
+                    let (a, b, ka, kb) = if v > w { (v, w, k, l) } else { (w, v, l, k) };
+                    let pair = pattern.find(a, b).unwrap();
+                    (pattern.between(pair) + 3 * kb + ka + 1 - kb, v < w)
+                };
+                let block = Mat3::from_fn(|r, c| {
+                    let at = if is_turned { c + 3 * r } else { r + 3 * c };
+                    f64::from(blocks[place][at])
+                });
+                worst = worst.max((block - expected_blocks[i]).norm());
+                compared += 1;
+            }
+            assert!(compared > 500);
+            assert!(worst < 3e-6 * largest, "{name}: {worst:e} of {largest:e}");
+        }
+    }
+}
+
+#[test]
+fn prisms_that_are_inside_out_are_found() {
+    let body = body();
+    for (name, materials) in cases() {
+        let supports = Supports::on_base(&body);
+        let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
+        let memory = Memory::new(&model);
+        let pattern = column_pattern(&model);
+        let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, true);
+        let mut u = vec![Vec3::zeros(); model.n_nodes()];
+        let node = model.body.node(20, 0);
+        // Through the level below it.
+        u[node] = Vec3::new(0.0, 0.0, -12e-3);
+        let mut forces = vec![Vec3::zeros(); model.n_nodes()];
+        let found = batches.add_forces(&model, &memory, &u, &mut forces);
+        let at = found.expect_err(name).at;
+        assert!(
+            (at - model.body.positions[node]).norm() < 0.03,
+            "{name}: {at}"
+        );
+        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+        assert!(
+            batches
+                .add_stiffness(&model, &memory, &u, &mut blocks)
+                .is_err(),
+            "{name}"
+        );
+        u[node] = Vec3::new(f64::NAN, 0.0, 0.0);
+        assert!(
+            batches
+                .add_forces(&model, &memory, &u, &mut forces)
+                .is_err(),
+            "{name}"
+        );
+    }
+}
