@@ -20,6 +20,15 @@ pub enum FemError {
         /// Its middle, m.
         at: [f64; 3],
     },
+    /// The stiffness at rest is not positive definite: the body cannot bear its own tension, or nothing holds it.
+    #[error(
+        "the body is not stable at rest, near ({:.2}, {:.2}, {:.2}) mm; fix its base, or take less pre-stress",
+        at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+    )]
+    NoRest {
+        /// Where, m.
+        at: [f64; 3],
+    },
     /// There is not one material for every layer.
     #[error(
         "the body has {n_layers} layers, and {n_materials} of them have a material; give one for each"

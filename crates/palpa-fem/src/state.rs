@@ -107,7 +107,7 @@ impl State {
 }
 
 /// What a step of a given duration makes of every material: factors and constant stresses.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Memory {
     /// For each material the factors of its deviatoric and volumetric part.
     pub(crate) scales: Vec<[f64; 2]>,

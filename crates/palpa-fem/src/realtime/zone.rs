@@ -1,0 +1,383 @@
+//! A zone round the tools, whose stiffness is made anew in every step, and the rest of the body, whose stiffness is kept.
+
+use palpa_mesh::Vec3;
+use palpa_sparse::fronts::{
+    Compliance, Exterior, FactorScratch, Half, SolveScratch, Tree, Unit, Zone, back_substitute,
+    substitute,
+};
+use palpa_sparse::{Block, ColumnPattern, Singular, TooLarge};
+
+use super::MOST_CANDIDATES;
+use super::batch::Batches;
+use crate::assembly::Inverted;
+use crate::columns::SurfaceGroup;
+use crate::model::Model;
+use crate::state::Memory;
+
+/// Stiffness of what holds a supported node, relative to its own.
+const SUPPORT: f64 = 1e3;
+/// First shift of a zone that is not positive definite, relative to its diagonal, its growth, and how often it may grow.
+const FIRST_SHIFT: f32 = 1e-3;
+const SHIFT_GROWTH: f32 = 4.0;
+const MOST_SHIFTS: usize = 8;
+
+/// Why a step could not be made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Trouble {
+    Inverted(Vec3),
+    Singular,
+}
+
+impl From<Inverted> for Trouble {
+    fn from(inverted: Inverted) -> Self {
+        Self::Inverted(inverted.at)
+    }
+}
+
+impl From<Singular> for Trouble {
+    fn from(_: Singular) -> Self {
+        Self::Singular
+    }
+}
+
+/// Which columns are in a zone, and in which order all are eliminated.
+#[derive(Debug)]
+pub(super) struct Plan {
+    pub(super) id: u64,
+    pub(super) centre: Vec3,
+    pub(super) tree: Tree,
+    /// `[n_vertices]`
+    pub(super) is_inside: Vec<bool>,
+    /// Skin vertices of the zone.
+    pub(super) vertices: Vec<u32>,
+    /// Nodes with unknowns and the first of these: of the zone, of the ring among them, and of the exterior.
+    pub(super) zone: Vec<[u32; 2]>,
+    pub(super) ring: Vec<[u32; 2]>,
+    pub(super) exterior: Vec<[u32; 2]>,
+}
+
+impl Plan {
+    /// The zone of all columns whose skin vertex is, at rest, within `radius` of `centre`; all if there is none.
+    pub(super) fn new(
+        model: &Model,
+        pattern: &ColumnPattern,
+        id: u64,
+        centre: Vec3,
+        radius: f64,
+    ) -> Result<Self, TooLarge> {
+        let points = &model.body.skin.points;
+        let mut is_inside: Vec<bool> = points.iter().map(|p| (p - centre).norm() <= radius).collect();
+        if !is_inside.contains(&true) {
+            is_inside.fill(true);
+        }
+        let places: Vec<[f64; 3]> = points.iter().map(|p| (*p).into()).collect();
+        let tree = Tree::zone_last(pattern, &places, &is_inside)?;
+        let nodes = |keep: &dyn Fn(usize) -> bool| -> Vec<[u32; 2]> {
+            (0..points.len())
+                .filter(|&v| keep(v))
+                .flat_map(|v| {
+                    let first = tree.first_dof(v);
+                    (0..model.structure.n_free_levels)
+                        .map(move |l| [model.body.node(v, l) as u32, (first + 3 * l) as u32])
+                })
+                .collect()
+        };
+        let ring_start = model.structure.n_dofs() - tree.n_ring_columns() * pattern.width();
+        let has_ring = tree.n_ring_columns() > 0;
+        let zone = nodes(&|v| is_inside[v]);
+        let ring = nodes(&|v| has_ring && is_inside[v] && tree.first_dof(v) >= ring_start);
+        let exterior = nodes(&|v| !is_inside[v]);
+        Ok(Self {
+            id,
+            centre,
+            vertices: (0..points.len() as u32).filter(|&v| is_inside[v as usize]).collect(),
+            zone,
+            ring,
+            exterior,
+            tree,
+            is_inside,
+        })
+    }
+
+    fn holds(&self, group: &SurfaceGroup) -> bool {
+        group.vertices[..group.n_columns()]
+            .iter()
+            .all(|&v| self.is_inside[v as usize])
+    }
+
+    /// Adds stiff springs where nodes are supported.
+    fn support(&self, model: &Model, pattern: &ColumnPattern, inside: bool, blocks: &mut [Block<f32>]) {
+        for &[node, _] in if inside { &self.zone } else { &self.exterior } {
+            let hold = &model.supports[node as usize];
+            if hold.n == 0 {
+                continue;
+            }
+            let (v, l) = (node as usize / model.body.n_levels, node as usize % model.body.n_levels);
+            let block = &mut blocks[pattern.own(v) + 2 * l];
+            let size = (block[0] + block[4] + block[8]) / 3.0 * SUPPORT as f32;
+            for k in 0..usize::from(hold.n) {
+                let axis = hold.frame.column(k);
+                for c in 0..3 {
+                    for r in 0..3 {
+                        block[r + 3 * c] += size * (axis[r] * axis[c]) as f32;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The zone's prisms and factor.
+#[derive(Debug)]
+pub(super) struct Inside {
+    pub(super) batches: Batches,
+    blocks: Vec<Block<f32>>,
+    factor: Zone<f32>,
+    scratch: FactorScratch<f32>,
+    solve: SolveScratch<f32>,
+    compliance: Compliance<f32>,
+    w: Vec<f32>,
+    units: Vec<Unit>,
+}
+
+impl Inside {
+    pub(super) fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
+        let tree = &plan.tree;
+        Self {
+            batches: Batches::new(model, memory, pattern, &|group| plan.holds(group), true),
+            blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
+            factor: Zone::new(tree),
+            scratch: FactorScratch::new(tree, Half::Zone),
+            solve: SolveScratch::new(tree),
+            compliance: Compliance::new(tree, MOST_CANDIDATES),
+            w: vec![0.0; 9 * MOST_CANDIDATES * MOST_CANDIDATES],
+            units: Vec::with_capacity(MOST_CANDIDATES),
+        }
+    }
+
+    /// Makes the zone's stiffness and factor at these displacements. Returns the shift that it needed, relative to the
+    /// diagonal.
+    pub(super) fn refactor(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        outside: &Outside,
+        displacements: &[Vec3],
+    ) -> Result<f32, Trouble> {
+        self.clear(pattern, plan);
+        self.batches.add_stiffness(model, memory, displacements, &mut self.blocks)?;
+        plan.support(model, pattern, true, &mut self.blocks);
+        let mut shift = 0.0;
+        for attempt in 0..=MOST_SHIFTS {
+            let result = self.factor.factor(
+                &plan.tree,
+                &self.blocks,
+                Some(&outside.factor),
+                &mut self.scratch,
+            );
+            if result.is_ok() {
+                return Ok(shift);
+            }
+            let next = if attempt == 0 { FIRST_SHIFT } else { shift * SHIFT_GROWTH };
+            for &[node, _] in &plan.zone {
+                let (v, l) = (node as usize / model.body.n_levels, node as usize % model.body.n_levels);
+                let block = &mut self.blocks[pattern.own(v) + 2 * l];
+                for d in [0, 4, 8] {
+                    block[d] = (block[d].abs() / (1.0 + shift)) * (1.0 + next);
+                }
+            }
+            shift = next;
+        }
+        Err(Trouble::Singular)
+    }
+
+    /// Empties the blocks that the zone's prisms are in.
+    fn clear(&mut self, pattern: &ColumnPattern, plan: &Plan) {
+        let n = pattern.n_levels();
+        for &v in &plan.vertices {
+            let own = pattern.own(v as usize);
+            self.blocks[own..own + 2 * n].fill([0.0; 9]);
+            for &w in pattern.neighbours(v as usize) {
+                if w < v && plan.is_inside[w as usize]
+                    && let Some(pair) = pattern.find(v as usize, w as usize)
+                {
+                    let first = pattern.between(pair);
+                    self.blocks[first..first + 3 * n].fill([0.0; 9]);
+                }
+            }
+        }
+    }
+
+    /// Displacements of the zone under a right side that has been reduced to it.
+    pub(super) fn solve(&mut self, plan: &Plan, x: &mut [f32]) {
+        substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
+        back_substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
+    }
+
+    /// What skin vertices of the zone answer to forces on them, into the first `9 n²` of `out`, m/N.
+    pub(super) fn compliance(&mut self, plan: &Plan, vertices: impl Iterator<Item = u32>, out: &mut [f64]) {
+        self.units.clear();
+        self.units.extend(vertices.map(|column| Unit { column, level: 0 }));
+        let size = 9 * self.units.len() * self.units.len();
+        self.compliance
+            .compute(&plan.tree, &self.factor, &self.units, &mut self.w[..size]);
+        for (out, w) in out.iter_mut().zip(&self.w[..size]) {
+            *out = f64::from(*w);
+        }
+    }
+}
+
+/// The rest of the body: linear about a state in the past, whose equilibrium it follows.
+#[derive(Debug)]
+pub(super) struct Outside {
+    /// Counts factors.
+    pub(super) id: u64,
+    pub(super) batches: Batches,
+    blocks: Vec<Block<f32>>,
+    factor: Exterior<f32>,
+    scratch: FactorScratch<f32>,
+    solve: SolveScratch<f32>,
+    forces: Vec<Vec3>,
+    /// The right side that is left of the exterior's own unknowns after elimination, and what it pushes the ring with.
+    right: Vec<f32>,
+    /// Displacements of all nodes about which it is linear, m.
+    pub(super) at: Vec<Vec3>,
+}
+
+impl Outside {
+    pub(super) fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
+        let tree = &plan.tree;
+        Self {
+            id: 0,
+            batches: Batches::new(model, memory, pattern, &|group| !plan.holds(group), true),
+            blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
+            factor: Exterior::new(tree),
+            scratch: FactorScratch::new(tree, Half::Exterior),
+            solve: SolveScratch::new(tree),
+            forces: vec![Vec3::zeros(); model.n_nodes()],
+            right: vec![0.0; model.structure.n_dofs()],
+            at: vec![Vec3::zeros(); model.n_nodes()],
+        }
+    }
+
+    /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
+    pub(super) fn refactor(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        displacements: &[Vec3],
+    ) -> Result<(), Trouble> {
+        self.blocks.fill([0.0; 9]);
+        self.batches.add_stiffness(model, memory, displacements, &mut self.blocks)?;
+        plan.support(model, pattern, false, &mut self.blocks);
+        if !plan.exterior.is_empty() {
+            self.factor.factor(&plan.tree, &self.blocks, &mut self.scratch)?;
+        }
+        self.follow(model, memory, plan, displacements)
+    }
+
+    /// Is linear about other displacements, with the stiffness that it has.
+    pub(super) fn follow(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        plan: &Plan,
+        displacements: &[Vec3],
+    ) -> Result<(), Trouble> {
+        self.forces.fill(Vec3::zeros());
+        self.batches.add_forces(model, memory, displacements, &mut self.forces)?;
+        self.at.copy_from_slice(displacements);
+        self.right.fill(0.0);
+        for &[node, dof] in plan.exterior.iter().chain(&plan.ring) {
+            let force = model.supports[node as usize].free_part(&self.forces[node as usize]);
+            for c in 0..3 {
+                self.right[dof as usize + c] = -force[c] as f32;
+            }
+        }
+        substitute(&plan.tree, Half::Exterior, &self.factor, &mut self.right, &mut self.solve);
+        Ok(())
+    }
+
+    /// Adds what it pushes the ring with, at these displacements, to a right side. Cost: the square of the ring.
+    pub(super) fn push(&self, plan: &Plan, displacements: &[Vec3], x: &mut [f32], moves: &mut Vec<f32>) {
+        let Some(&[_, first]) = plan.ring.iter().min_by_key(|r| r[1]) else {
+            return;
+        };
+        let first = first as usize;
+        let n = x.len() - first;
+        moves.clear();
+        moves.resize(n, 0.0);
+        let mut has_moved = false;
+        for &[node, dof] in &plan.ring {
+            let change = displacements[node as usize] - self.at[node as usize];
+            has_moved |= change != Vec3::zeros();
+            for c in 0..3 {
+                moves[dof as usize - first + c] = change[c] as f32;
+            }
+        }
+        let ring = &mut x[first..];
+        for (x, right) in ring.iter_mut().zip(&self.right[first..]) {
+            *x += right;
+        }
+        if has_moved {
+            subtract_symmetric(self.factor.schur(), n, moves, ring);
+        }
+    }
+
+    /// Displacements of the exterior that go with those of the ring: brings `displacements` up to date.
+    pub(super) fn settle(&mut self, model: &Model, plan: &Plan, displacements: &mut [Vec3], x: &mut [f32]) {
+        if plan.exterior.is_empty() {
+            return;
+        }
+        x.copy_from_slice(&self.right);
+        for &[node, dof] in &plan.ring {
+            let change = displacements[node as usize] - self.at[node as usize];
+            for c in 0..3 {
+                x[dof as usize + c] = change[c] as f32;
+            }
+        }
+        back_substitute(&plan.tree, Half::Exterior, &self.factor, x, &mut self.solve);
+        for &[node, dof] in &plan.exterior {
+            let change = Vec3::from_fn(|c, _| f64::from(x[dof as usize + c]));
+            let change = model.supports[node as usize].free_part(&change);
+            displacements[node as usize] = self.at[node as usize] + change;
+        }
+    }
+}
+
+/// `y −= A x` of a symmetric matrix whose lower triangle is given, column by column.
+fn subtract_symmetric(a: &[f32], n: usize, x: &[f32], y: &mut [f32]) {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            for j in 0..n {
+                let column = &a[j * n + j + 1..(j + 1) * n];
+                let factor = x[j];
+                let (_, below) = y.split_at_mut(j + 1);
+                let mut lanes = [0.0_f32; 16];
+                let chunks = column.len() / 16 * 16;
+                for (k, (a, x)) in column[..chunks]
+                    .chunks_exact(16)
+                    .zip(x[j + 1..].chunks_exact(16))
+                    .enumerate()
+                {
+                    let y = &mut below[16 * k..16 * k + 16];
+                    for i in 0..16 {
+                        y[i] -= a[i] * factor;
+                        lanes[i] += a[i] * x[i];
+                    }
+                }
+                let mut sum: f32 = lanes.iter().sum();
+                for k in chunks..column.len() {
+                    below[k] -= column[k] * factor;
+                    sum += column[k] * x[j + 1 + k];
+                }
+                y[j] -= a[j * n + j] * factor + sum;
+            }
+        },
+    );
+}
