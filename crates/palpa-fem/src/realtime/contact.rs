@@ -1,302 +1,322 @@
 //! The small contact problem of a moving step: forces on a few skin vertices, given how these answer to them.
 //!
 //! ```text
-//! x = x0 + W (λ − λ0),   0 ≤ g(x) ⟂ λ_n ≥ 0,   |λ_t| ≤ μ λ_n, against the slip from the anchor where it reaches that
+//! s = s0 + w (f − p0),   p = f − κ s,   0 ≤ g0 + s − s0 ⟂ p ≥ 0
 //! ```
-//! Without friction an active set is found exactly; with friction that is where projected Gauss–Seidel sweeps start. Normals
-//! follow the vertices over the tool's surface in a few outer passes.
+//! along the normals: `s` the displacement of a vertex, `p` its pressure (N), `g` its gap. Where `κ > 0` the compliance `w` is that of a
+//! body whose vertex is held by a spring, which `p` leaves out again: deep under a tool the free body is not stable, and only
+//! the tool holds it. Without friction this is all, and an active set solves it exactly. With friction,
+//! `|t| ≤ μ p` against the slip from the anchor where it reaches that, projected Gauss–Seidel sweeps go on from there.
 
 use palpa_mesh::Vec3;
 
+use super::MOST_CANDIDATES;
 use crate::Mat3;
 use crate::contact::PosedTool;
 
-/// Passes in which normals and gaps follow the vertices.
-const PASSES: usize = 6;
-/// Changes of the active set in one pass.
-const MOST_CHANGES: usize = 30;
-/// Sweeps of a pass with friction.
-const SWEEPS: usize = 30;
-/// Change of a force in a pass, as a share of all, that counts as none.
+/// Changes of the active set.
+const MOST_CHANGES: usize = 40;
+/// Sweeps with friction.
+const SWEEPS: usize = 60;
+/// Change of the forces in a sweep, as a share of all, that counts as none.
 const SETTLED: f64 = 1e-6;
+/// A gap (m) that counts as none.
+const NO_GAP: f64 = 1e-12;
 
 /// A skin vertex near a tool.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidate {
     pub(super) vertex: u32,
     pub(super) tool: u32,
-    /// Where it would be under `force`, m: `x0`.
-    pub(super) position: Vec3,
-    /// `λ0`, then `λ`, N.
-    pub(super) force: Vec3,
+    /// Where it is at the start of the iteration, m.
+    pub(super) start: Vec3,
+    /// From the tool to the tissue.
+    pub(super) normal: Vec3,
+    /// Gap at the start, m.
+    pub(super) gap: f64,
+    /// Pressing force, N: `p0`, then `p`.
+    pub(super) pressure: f64,
+    /// Force of friction on it, N.
+    pub(super) friction: Vec3,
+    /// `κ`, N/m.
+    pub(super) support: f64,
     /// Where friction holds it, in the tool's frame, m.
     pub(super) anchor: Vec3,
-    /// Whether it has come to touch only now, so that its anchor is where it touches.
-    pub(super) is_new: bool,
-    /// From the tool to the tissue, at the end.
-    pub(super) normal: Vec3,
-    /// m, at the end.
-    pub(super) gap: f64,
+    /// Displacement of the iteration, m: with the forces of the start, then with those found. Along the normal alone where no
+    /// tool rubs.
+    pub(super) displacement: Vec3,
+}
+
+impl Candidate {
+    /// Force of the tool on it, N.
+    pub(super) fn force(&self) -> Vec3 {
+        self.normal * self.pressure + self.friction
+    }
 }
 
 /// Memory for so many candidates.
 #[derive(Debug)]
 pub(super) struct ContactProblem {
     pub(super) candidates: Vec<Candidate>,
-    /// `W`, column by column, `3 n × 3 n`, m/N.
+    /// Compliance, column by column, m/N: `n × n` along the normals, or `3 n × 3 n` along the axes with friction.
     pub(super) compliance: Vec<f64>,
-    /// Positions under the present forces, m.
-    pub(super) positions: Vec<Vec3>,
-    normals_compliance: Vec<f64>,
+    /// By how much the force that the linear system takes is more than before: `f − p0` along the normals, or along the
+    /// axes, N.
+    pub(super) change: Vec<f64>,
+    along: Vec<f64>,
     factor: Vec<f64>,
-    active: Vec<u32>,
-    is_active: Vec<bool>,
-    pressures: Vec<f64>,
-    rest_gaps: Vec<f64>,
-    start: Vec<Vec3>,
+    is_active: [bool; MOST_CANDIDATES],
 }
 
 impl ContactProblem {
-    pub(super) fn new(most: usize) -> Self {
+    pub(super) fn new() -> Self {
+        let n = MOST_CANDIDATES;
         Self {
-            candidates: Vec::with_capacity(most),
-            compliance: vec![0.0; 9 * most * most],
-            positions: vec![Vec3::zeros(); most],
-            normals_compliance: vec![0.0; most * most],
-            factor: vec![0.0; most * most],
-            active: Vec::with_capacity(most),
-            is_active: vec![false; most],
-            pressures: vec![0.0; most],
-            rest_gaps: vec![0.0; most],
-            start: vec![Vec3::zeros(); most],
+            candidates: Vec::with_capacity(n),
+            compliance: vec![0.0; 9 * n * n],
+            change: vec![0.0; 3 * n],
+            along: vec![0.0; n * n],
+            factor: vec![0.0; n * n],
+            is_active: [false; MOST_CANDIDATES],
         }
     }
 
-    /// The block of `W` between two candidates.
+    /// The block of the compliance between two candidates, with friction.
     fn block(&self, i: usize, j: usize) -> Mat3 {
         let n = 3 * self.candidates.len();
-        let at = |r: usize, c: usize| self.compliance[3 * i + r + n * (3 * j + c)];
-        Mat3::from_fn(at)
+        Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
 
-    /// Finds forces and positions. Cost: some n³ of active vertices, and with friction n² of candidates a sweep.
-    pub(super) fn solve(&mut self, tools: &[PosedTool]) {
-        let n = self.candidates.len();
-        for (start, candidate) in self.start.iter_mut().zip(&self.candidates) {
-            *start = candidate.force;
-        }
-        for (active, candidate) in self.is_active.iter_mut().zip(&self.candidates) {
-            *active = candidate.force != Vec3::zeros();
-        }
-        self.place();
-        let has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
-        for _ in 0..PASSES {
-            let before: f64 = self.candidates.iter().map(|c| c.force.norm()).sum();
-            let change = {
-                self.measure(tools);
-                self.press()
-            };
-            if change <= SETTLED * before {
-                break;
-            }
-        }
-        if has_friction {
-            self.measure(tools);
-            for i in 0..n {
-                let Candidate { tool, normal, gap, is_new, .. } = self.candidates[i];
-                if is_new {
-                    let surface = self.positions[i] - normal * gap;
-                    let pose = &tools[tool as usize].pose;
-                    self.candidates[i].anchor = pose.inverse_transform_point(&surface.into()).coords;
-                }
-            }
-            for _ in 0..PASSES {
-                let size: f64 = self.candidates.iter().map(|c| c.force.norm()).sum();
-                self.measure(tools);
-                if self.rub(tools) <= SETTLED * size {
-                    break;
-                }
-            }
-        }
-        self.measure(tools);
-    }
-
-    /// Positions under the present forces.
-    fn place(&mut self) {
-        for i in 0..self.candidates.len() {
-            let mut x = self.candidates[i].position;
-            for j in 0..self.candidates.len() {
-                let change = self.candidates[j].force - self.start[j];
-                if change != Vec3::zeros() {
-                    x += self.block(i, j) * change;
-                }
-            }
-            self.positions[i] = x;
-        }
-    }
-
-    /// Gaps and normals at the present positions.
-    fn measure(&mut self, tools: &[PosedTool]) {
-        for (candidate, x) in self.candidates.iter_mut().zip(&self.positions) {
-            let PosedTool { tool, pose } = &tools[candidate.tool as usize];
-            let distance = tool.distance_at(pose, x);
-            candidate.gap = distance.distance;
-            candidate.normal = distance.normal;
-        }
-    }
-
-    /// Forces along the present normals that leave no gap negative. Returns how much they changed, N.
-    fn press(&mut self) -> f64 {
+    /// Finds forces and displacements. Cost: some n³ of vertices that press, and with friction n² of candidates a sweep.
+    pub(super) fn solve(&mut self, tools: &[PosedTool], has_friction: bool) {
         let n = self.candidates.len();
         for j in 0..n {
-            let normal = self.candidates[j].normal;
             for i in 0..n {
-                let value = self.candidates[i].normal.dot(&(self.block(i, j) * normal));
-                self.normals_compliance[i + n * j] = value;
+                self.along[i + n * j] = if has_friction {
+                    let (a, b) = (&self.candidates[i].normal, &self.candidates[j].normal);
+                    a.dot(&(self.block(i, j) * b))
+                } else {
+                    self.compliance[i + n * j]
+                };
             }
         }
-        // Gaps if no force acted along the normals.
+        let start: [f64; MOST_CANDIDATES] =
+            std::array::from_fn(|i| self.candidates.get(i).map_or(0.0, |c| c.pressure));
+        self.press(&start);
+        if !has_friction {
+            return;
+        }
+        let before: [Vec3; MOST_CANDIDATES] =
+            std::array::from_fn(|i| self.candidates.get(i).map_or(Vec3::zeros(), |c| c.friction));
+        // Pressures have been found along the normals; what they do across these is not yet in the displacements.
+        self.respond();
+        self.rub(tools, &start, &before);
+    }
+
+    /// The linear system's force along the normal: pressure, and what the support takes.
+    fn taken(candidate: &Candidate) -> f64 {
+        candidate.pressure + candidate.support * candidate.displacement.dot(&candidate.normal)
+    }
+
+    /// Pressures that leave no gap negative, by an active set.
+    fn press(&mut self, start: &[f64; MOST_CANDIDATES]) {
+        let n = self.candidates.len();
+        let mut rest = [0.0; MOST_CANDIDATES];
         for i in 0..n {
-            let mut gap = self.candidates[i].gap;
-            let normal = self.candidates[i].normal;
-            for j in 0..n {
-                let force = self.candidates[j].force;
-                if force != Vec3::zeros() {
-                    gap -= normal.dot(&(self.block(i, j) * force));
+            let candidate = &self.candidates[i];
+            self.is_active[i] = candidate.pressure > 0.0;
+            rest[i] = candidate.displacement.dot(&candidate.normal);
+        }
+        // Those in the system: that press, or have a support to do without.
+        let mut rows = [0_usize; MOST_CANDIDATES];
+        let mut taken = [0.0; MOST_CANDIDATES];
+        let mut slides = rest;
+        for _ in 0..MOST_CHANGES {
+            let mut m = 0;
+            for i in 0..n {
+                if self.is_active[i] || self.candidates[i].support > 0.0 {
+                    rows[m] = i;
+                    m += 1;
                 }
             }
-            self.rest_gaps[i] = gap;
-        }
-        for _ in 0..MOST_CHANGES {
-            self.active.clear();
-            self.active.extend((0..n as u32).filter(|&i| self.is_active[i as usize]));
-            if !self.solve_active(n) {
-                break;
+            // Forces at the start act until they are changed.
+            let mut right = [0.0; MOST_CANDIDATES];
+            for (right, &i) in right.iter_mut().zip(&rows[..m]) {
+                let released: f64 = (0..n)
+                    .filter(|j| !rows[..m].contains(j) && start[*j] != 0.0)
+                    .map(|j| self.along[i + n * j] * start[j])
+                    .sum();
+                let gap = if self.is_active[i] { self.candidates[i].gap } else { 0.0 };
+                *right = released - rest[i] - gap;
+            }
+            let candidates = &self.candidates;
+            let (is_active, along) = (&self.is_active, &self.along);
+            let entry = |r: usize, c: usize| {
+                let (i, j) = (rows[r], rows[c]);
+                let own = if r == c && !is_active[i] { 1.0 / candidates[i].support } else { 0.0 };
+                along[i + n * j] - own
+            };
+            // Change from the start of those in the system.
+            let offset: [f64; MOST_CANDIDATES] = std::array::from_fn(|r| {
+                if r < m && !is_active[rows[r]] { start[rows[r]] / candidates[rows[r]].support } else { 0.0 }
+            });
+            for r in 0..m {
+                right[r] += offset[r];
+            }
+            if !solve_symmetric(m, entry, &mut right, &mut self.factor) {
+                return;
+            }
+            let mut change = [0.0; MOST_CANDIDATES];
+            for j in 0..n {
+                change[j] = -start[j];
+            }
+            for (&i, x) in rows[..m].iter().zip(&right) {
+                change[i] = *x;
+            }
+            for i in 0..n {
+                taken[i] = start[i] + change[i];
+                let sum: f64 = (0..n).map(|j| self.along[i + n * j] * change[j]).sum();
+                slides[i] = rest[i] + sum;
             }
             let mut is_settled = true;
             for i in 0..n {
-                if self.is_active[i] {
-                    if self.pressures[i] < 0.0 {
-                        self.is_active[i] = false;
-                        self.pressures[i] = 0.0;
-                        is_settled = false;
-                    }
-                } else {
-                    let gap = self.active.iter().fold(self.rest_gaps[i], |gap, &j| {
-                        gap + self.normals_compliance[i + n * j as usize] * self.pressures[j as usize]
-                    });
-                    if gap < -1e-12 {
-                        self.is_active[i] = true;
-                        is_settled = false;
-                    }
+                let candidate = &self.candidates[i];
+                let pressure = taken[i] - candidate.support * slides[i];
+                if self.is_active[i] && pressure < 0.0 {
+                    self.is_active[i] = false;
+                    is_settled = false;
+                } else if !self.is_active[i] && candidate.gap + slides[i] < -NO_GAP {
+                    self.is_active[i] = true;
+                    is_settled = false;
                 }
             }
             if is_settled {
                 break;
             }
         }
-        let mut change = 0.0;
         for i in 0..n {
-            let pressure = if self.is_active[i] { self.pressures[i].max(0.0) } else { 0.0 };
-            let force = self.candidates[i].normal * pressure;
-            change += (force - self.candidates[i].force).norm();
-            self.candidates[i].force = force;
+            let candidate = &mut self.candidates[i];
+            candidate.pressure = if self.is_active[i] {
+                (taken[i] - candidate.support * slides[i]).max(0.0)
+            } else {
+                0.0
+            };
+            candidate.displacement += candidate.normal * (slides[i] - rest[i]);
+            self.change[i] = taken[i] - start[i];
         }
-        self.place();
-        change
     }
 
-    /// Pressures of the active vertices that close their gaps, by a dense Cholesky factor.
-    fn solve_active(&mut self, n: usize) -> bool {
-        let m = self.active.len();
-        self.pressures[..n].fill(0.0);
-        let factor = &mut self.factor[..m * m];
-        for (c, &j) in self.active.iter().enumerate() {
-            for (r, &i) in self.active.iter().enumerate().skip(c) {
-                factor[r * m + c] = self.normals_compliance[i as usize + n * j as usize];
-            }
-        }
-        let right = |i: usize| -self.rest_gaps[self.active[i] as usize];
-        // Rows, so that all sums run along memory.
-        for r in 0..m {
-            for c in 0..=r {
-                let (before, row) = factor.split_at_mut(r * m);
-                let dot: f64 = if c < r {
-                    let other = &before[c * m..c * m + c];
-                    row[..c].iter().zip(other).map(|(a, b)| a * b).sum()
-                } else {
-                    row[..c].iter().map(|a| a * a).sum()
-                };
-                let rest = row[c] - dot;
-                if c < r {
-                    row[c] = rest / before[c * m + c];
-                } else if rest > 0.0 {
-                    row[c] = rest.sqrt();
-                } else {
-                    return false;
-                }
-            }
-        }
-        let mut solution = [0.0; super::MOST_CANDIDATES];
-        for r in 0..m {
-            let row = &factor[r * m..r * m + r];
-            let dot: f64 = row.iter().zip(&solution).map(|(a, b)| a * b).sum();
-            solution[r] = (right(r) - dot) / factor[r * m + r];
-        }
-        for r in (0..m).rev() {
-            solution[r] /= factor[r * m + r];
-            let value = solution[r];
-            for (s, a) in solution[..r].iter_mut().zip(&factor[r * m..r * m + r]) {
-                *s -= a * value;
-            }
-        }
-        for (&i, value) in self.active.iter().zip(solution) {
-            self.pressures[i as usize] = value;
-        }
-        true
-    }
-
-    /// Sweeps with friction. Returns how much the forces changed, N.
-    fn rub(&mut self, tools: &[PosedTool]) -> f64 {
+    /// Adds what the change of the pressures does across the normals, which the frictionless solution leaves out.
+    fn respond(&mut self) {
         let n = self.candidates.len();
-        let mut total = 0.0;
-        // Gaps and slips at the positions of the last measurement, from which those of the sweep are linear.
-        let mut measured = [Vec3::zeros(); super::MOST_CANDIDATES];
-        measured[..n].copy_from_slice(&self.positions[..n]);
+        for i in 0..n {
+            let mut response = Vec3::zeros();
+            for j in 0..n {
+                response += self.block(i, j) * (self.candidates[j].normal * self.change[j]);
+            }
+            let normal = self.candidates[i].normal;
+            self.candidates[i].displacement += response - normal * normal.dot(&response);
+        }
+    }
+
+    /// Sweeps with friction; leaves `change` along the axes.
+    fn rub(&mut self, tools: &[PosedTool], start: &[f64; MOST_CANDIDATES], before: &[Vec3; MOST_CANDIDATES]) {
+        let n = self.candidates.len();
+        let mut taken: [Vec3; MOST_CANDIDATES] = std::array::from_fn(|i| {
+            self.candidates.get(i).map_or(Vec3::zeros(), |c| c.normal * Self::taken(c) + c.friction)
+        });
         for _ in 0..SWEEPS {
-            let mut change = 0.0;
+            let (mut moved, mut size) = (0.0, 0.0);
             for i in 0..n {
                 let candidate = self.candidates[i];
                 let PosedTool { tool, pose } = &tools[candidate.tool as usize];
                 let normal = candidate.normal;
                 let own = self.block(i, i);
-                let gap = candidate.gap + normal.dot(&(self.positions[i] - measured[i]));
                 let along = normal.dot(&(own * normal));
                 let across = 0.5 * (own.trace() - along);
-                let pressure = (candidate.force.dot(&normal) - gap / along).max(0.0);
-                let slip = self.positions[i] - (pose * nalgebra::Point3::from(candidate.anchor)).coords;
-                let slip = slip - normal * normal.dot(&slip);
-                let friction = candidate.force - normal * candidate.force.dot(&normal) - slip / across;
-                let most = tool.friction() * pressure;
-                let size = friction.norm();
-                let friction = if size > most { friction * (most / size) } else { friction };
-                let force = normal * pressure + friction;
-                let step = force - candidate.force;
-                if step != Vec3::zeros() {
-                    self.candidates[i].force = force;
-                    for j in 0..n {
-                        let move_ = self.block(j, i) * step;
-                        self.positions[j] += move_;
-                    }
-                    change += step.norm();
+                let slide = candidate.displacement.dot(&normal);
+                let gap = candidate.gap + slide;
+                // What closes the gap; or, if that would pull, what takes the pressure off.
+                let present = taken[i].dot(&normal) - candidate.support * slide;
+                let share = 1.0 - candidate.support * along;
+                let mut push = -gap / along;
+                if present + push * share < 0.0 {
+                    push = -present / share.max(0.1);
                 }
+                let pressure = (present + push * share).max(0.0);
+                let x = candidate.start + candidate.displacement;
+                let slip = x - (pose * nalgebra::Point3::from(candidate.anchor)).coords;
+                let slip = slip - normal * normal.dot(&slip);
+                let friction = candidate.friction - slip / across;
+                let most = tool.friction() * pressure;
+                let norm = friction.norm();
+                let friction = if norm > most { friction * (most / norm) } else { friction };
+                let step = normal * push + friction - candidate.friction;
+                if step != Vec3::zeros() {
+                    for j in 0..n {
+                        let response = self.block(j, i) * step;
+                        self.candidates[j].displacement += response;
+                    }
+                }
+                taken[i] += step;
+                self.candidates[i].pressure = pressure;
+                self.candidates[i].friction = friction;
+                moved += step.norm();
+                size += pressure;
             }
-            total += change;
-            let size: f64 = self.candidates.iter().map(|c| c.force.norm()).sum();
-            if change <= SETTLED * size {
+            if moved <= SETTLED * size {
                 break;
             }
         }
-        total
+        for i in 0..n {
+            let change = taken[i] - self.candidates[i].normal * start[i] - before[i];
+            self.change[3 * i..3 * i + 3].copy_from_slice(change.as_slice());
+        }
     }
+}
+
+/// Solves a dense symmetric system by LDLᵀ; the solution replaces the right side. False where a pivot is nearly zero.
+fn solve_symmetric(
+    n: usize,
+    entry: impl Fn(usize, usize) -> f64,
+    right: &mut [f64],
+    factor: &mut [f64],
+) -> bool {
+    const LEAST_PIVOT: f64 = 1e-12;
+    // Row r holds L D up to the diagonal, then D.
+    for r in 0..n {
+        for c in 0..=r {
+            let (before, row) = factor.split_at_mut(r * n);
+            let mut sum = entry(r, c);
+            if c < r {
+                let other = &before[c * n..c * n + c];
+                for k in 0..c {
+                    sum -= row[k] * other[k] / before[k * n + k];
+                }
+                row[c] = sum;
+            } else {
+                let size = sum.abs();
+                for k in 0..c {
+                    sum -= row[k] * row[k] / before[k * n + k];
+                }
+                if sum.abs() <= LEAST_PIVOT * size {
+                    return false;
+                }
+                row[r] = sum;
+            }
+        }
+    }
+    for r in 0..n {
+        let mut sum = right[r];
+        for k in 0..r {
+            sum -= factor[r * n + k] * right[k];
+        }
+        right[r] = sum / factor[r * n + r];
+    }
+    for r in (0..n).rev() {
+        for c in r + 1..n {
+            right[r] -= factor[c * n + r] / factor[r * n + r] * right[c];
+        }
+    }
+    true
 }

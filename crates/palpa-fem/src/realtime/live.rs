@@ -6,12 +6,24 @@ use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
 
 use super::contact::{Candidate, ContactProblem};
-use super::zone::{Inside, Outside, Plan, Trouble};
+use super::zone::{Follower, Inside, Outside, Plan, Trouble, Workshop};
 use super::{MOST_CANDIDATES, column_pattern};
 use crate::contact::PosedTool;
 use crate::error::FemError;
 use crate::model::Model;
 use crate::state::{Memory, State};
+
+/// First spring that holds vertices under a tool where the free body is not stable, relative to their own stiffness, its
+/// growth, the largest, and the steps after which a smaller one is tried.
+const FIRST_SPRING: f64 = 0.03;
+const SPRING_GROWTH: f64 = 3.0;
+const MOST_SPRING: f64 = 10.0;
+const SPRING_PATIENCE: u32 = 20;
+/// Share of an iteration below which it has failed.
+const LEAST_SHARE: f64 = 0.05;
+/// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
+const FASTEST: f64 = 0.1;
+const LEAST_REACH: f64 = 0.2e-3;
 
 /// How a moving step goes about its work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,6 +93,9 @@ pub struct LiveReport {
     pub n_candidates: usize,
     /// Shift of the diagonal that the zone's stiffness needed, relative.
     pub shift: f32,
+    /// Springs that held the vertices under the tools while it was solved, relative to the skin's own stiffness. Their
+    /// forces are taken out again.
+    pub spring: f64,
     /// Which zone and which factor of the exterior were used.
     pub zone: u64,
     /// Counts factors of the exterior.
@@ -94,8 +109,14 @@ pub struct Rebuild {
     pattern: Arc<ColumnPattern>,
     memory: Memory,
     displacements: Vec<Vec3>,
+    /// The exterior that the displacements outside the zone follow; none where they are up to date.
+    old: Option<(Arc<Plan>, Arc<Outside>)>,
     plan: PlanOrCentre,
-    outside: Option<Box<Outside>>,
+    /// Kept from the last rebuild of the same zone.
+    shop: Option<Box<Shop>>,
+    /// Memory that is no longer needed: used again, or freed where nobody waits.
+    retired: Option<Arc<Outside>>,
+    is_followed: bool,
     id: u64,
 }
 
@@ -105,40 +126,75 @@ enum PlanOrCentre {
     New { id: u64, centre: Vec3, radius: f64 },
 }
 
+/// The exterior's prisms with their tangents, and where it is factored.
+#[derive(Debug)]
+struct Shop {
+    /// The zone that it is the exterior of.
+    plan: u64,
+    follower: Follower,
+    workshop: Workshop,
+}
+
 /// What came of a [`Rebuild`].
 #[derive(Debug)]
 pub struct Rebuilt {
     plan: Arc<Plan>,
-    inside: Option<Box<Inside>>,
+    /// What a new zone needs; the follower where the exterior is followed.
+    inside: Option<(Box<Inside>, Option<Box<Follower>>)>,
     /// None where it failed.
-    outside: Option<Box<Outside>>,
+    outside: Option<Arc<Outside>>,
+    shop: Box<Shop>,
 }
 
 impl Rebuild {
     /// Does the work. Cost: a factor of the whole body.
-    pub fn run(self) -> Rebuilt {
+    pub fn run(mut self) -> Rebuilt {
         let (model, pattern, memory) = (&*self.model, &*self.pattern, &self.memory);
-        let (plan, inside) = match self.plan {
-            PlanOrCentre::Same(plan) => (plan, None),
+        let is_new = matches!(self.plan, PlanOrCentre::New { .. });
+        let plan = match self.plan {
+            PlanOrCentre::Same(plan) => plan,
             PlanOrCentre::New { id, centre, radius } => {
-                // Not too large: the whole body's pattern was not when the first zone was made.
-                let Ok(plan) = Plan::new(model, pattern, id, centre, radius) else {
-                    unreachable!("a zone's factor is smaller than the body's")
-                };
-                let inside = Inside::new(model, memory, pattern, &plan);
-                (Arc::new(plan), Some(Box::new(inside)))
+                let plan = Plan::new(model, pattern, id, centre, radius);
+                Arc::new(plan.expect("a body that could be factored with one zone can with another"))
             }
         };
-        let recycled = self.outside.filter(|_| inside.is_none());
-        let mut outside =
-            recycled.unwrap_or_else(|| Box::new(Outside::new(model, memory, pattern, &plan)));
-        outside.batches.refresh(model, memory);
+        let mut shop = self.shop.filter(|shop| shop.plan == plan.id).unwrap_or_else(|| {
+            Box::new(Shop {
+                plan: plan.id,
+                follower: Follower::new(model, memory, pattern, &plan, true),
+                workshop: Workshop::new(model, pattern, &plan),
+            })
+        });
+        if let Some((plan, old)) = &self.old {
+            let mut scratch = palpa_sparse::fronts::SolveScratch::new(&plan.tree);
+            let x = &mut shop.workshop.x;
+            old.settle(model, plan, &mut self.displacements, x, &mut scratch);
+        }
+        shop.follower.batches.refresh(model, memory);
+        let recycled = self.retired.filter(|old| old.plan == plan.id).and_then(Arc::into_inner);
+        let mut outside = recycled.unwrap_or_else(|| Outside::new(model, &plan));
         outside.id = self.id;
-        let made = outside.refactor(model, memory, pattern, &plan, &self.displacements);
+        let Shop { follower, workshop, .. } = &mut *shop;
+        let made = outside.refactor(
+            model,
+            memory,
+            pattern,
+            &plan,
+            follower,
+            workshop,
+            &self.displacements,
+        );
+        let inside = is_new.then(|| {
+            let follower = self
+                .is_followed
+                .then(|| Box::new(Follower::new(model, memory, pattern, &plan, false)));
+            (Box::new(Inside::new(model, memory, pattern, &plan)), follower)
+        });
         Rebuilt {
             plan,
             inside,
-            outside: made.is_ok().then_some(outside),
+            outside: made.is_ok().then(|| Arc::new(outside)),
+            shop,
         }
     }
 }
@@ -153,20 +209,29 @@ pub struct Live {
     memory: Memory,
     plan: Arc<Plan>,
     inside: Box<Inside>,
-    outside: Box<Outside>,
-    spare: Option<Box<Outside>>,
+    outside: Arc<Outside>,
+    /// Where the exterior is followed.
+    follower: Option<Box<Follower>>,
+    shop: Option<Box<Shop>>,
+    retired: Option<Arc<Outside>>,
     problem: ContactProblem,
-    /// Force of the tools on skin vertices, N, and where friction holds them, in the tool's frame. `[n_vertices]`
-    contact_forces: Vec<Vec3>,
+    has_friction: bool,
+    /// Forces of the tools on skin vertices: pressing, N, and of friction, N; and where friction holds them, in the tool's
+    /// frame, m. `[n_vertices]`
+    pressures: Vec<f64>,
+    frictions: Vec<Vec3>,
     anchors: Vec<Vec3>,
     /// Internal forces of the zone's prisms at the present displacements, N. `[n_nodes]`
     forces: Vec<Vec3>,
+    /// Whether they are those of the present displacements.
+    is_fresh: bool,
     x: Vec<f32>,
-    right: Vec<f32>,
     moves: Vec<f32>,
     before: Vec<Vec3>,
-    /// The tools where they were last followed to.
     tools: Vec<PosedTool>,
+    /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
+    spring: f64,
+    spring_age: u32,
     job: Option<Rebuild>,
     is_job_out: bool,
     n_jobs: u64,
@@ -179,51 +244,72 @@ impl Live {
     ///
     /// # Errors
     /// When the body is too large to be factored, or cannot be at rest.
-    pub fn new(model: Arc<Model>, tools: &[PosedTool], params: LiveParams) -> Result<Self, FemError> {
+    pub fn new(
+        model: Arc<Model>,
+        tools: &[PosedTool],
+        params: LiveParams,
+    ) -> Result<Self, FemError> {
         let pattern = Arc::new(column_pattern(&model));
         let state = State::new(&model);
         let mut memory = Memory::new(&model);
         memory.begin(&model, &state, 0.0);
-        let centre = zone_centre(&model, &state.displacements, tools);
-        let plan = Arc::new(Plan::new(&model, &pattern, 1, centre, params.zone_radius)?);
+        let centre = nearest_point(&model, &state.displacements, tools, None).1;
+        let plan = Plan::new(&model, &pattern, 1, centre, params.zone_radius)?;
         let inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
-        let mut outside = Box::new(Outside::new(&model, &memory, &pattern, &plan));
+        let mut shop = Box::new(Shop {
+            plan: plan.id,
+            follower: Follower::new(&model, &memory, &pattern, &plan, true),
+            workshop: Workshop::new(&model, &pattern, &plan),
+        });
+        let mut outside = Outside::new(&model, &plan);
+        let Shop { follower, workshop, .. } = &mut *shop;
+        let rest = &state.displacements;
         outside
-            .refactor(&model, &memory, &pattern, &plan, &state.displacements)
+            .refactor(&model, &memory, &pattern, &plan, follower, workshop, rest)
             .map_err(|trouble| match trouble {
                 Trouble::Inverted(at) => FemError::NoRest { at: at.into() },
                 Trouble::Singular => FemError::NoRest { at: centre.into() },
             })?;
-        let n = model.n_nodes();
+        let is_followed = params.exterior == ExteriorMode::Followed;
+        let follower = is_followed
+            .then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
+        let (n, n_vertices) = (model.n_nodes(), model.body.n_vertices());
         let n_dofs = model.structure.n_dofs();
         Ok(Self {
-            problem: ContactProblem::new(MOST_CANDIDATES),
-            contact_forces: vec![Vec3::zeros(); model.body.n_vertices()],
-            anchors: vec![Vec3::zeros(); model.body.n_vertices()],
+            plan: Arc::new(plan),
+            inside,
+            outside: Arc::new(outside),
+            follower,
+            shop: Some(shop),
+            retired: None,
+            problem: ContactProblem::new(),
+            has_friction: false,
+            pressures: vec![0.0; n_vertices],
+            frictions: vec![Vec3::zeros(); n_vertices],
+            anchors: vec![Vec3::zeros(); n_vertices],
             forces: vec![Vec3::zeros(); n],
+            is_fresh: false,
             x: vec![0.0; n_dofs],
-            right: vec![0.0; n_dofs],
-            moves: Vec::with_capacity(n_dofs),
+            moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
-            tools: tools.to_vec(),
+            tools: Vec::with_capacity(tools.len()),
+            spring: 0.0,
+            spring_age: 0,
             job: None,
             is_job_out: false,
             n_jobs: 0,
             n_zones: 1,
             depth_at_factor: 0.0,
-            spare: None,
             model,
             pattern,
             params,
             state,
             memory,
-            plan,
-            inside,
-            outside,
         })
     }
 
-    /// Displacements of all nodes, m. Those outside the zone are brought up to date by [`Self::settle`].
+    /// Displacements of all nodes, m. Where the exterior answers linearly those outside the zone are brought up to date by
+    /// [`Self::settle`].
     pub fn displacements(&self) -> &[Vec3] {
         &self.state.displacements
     }
@@ -233,26 +319,31 @@ impl Live {
         &self.model
     }
 
+    /// Columns of the zone, of its ring, and of the body.
+    pub fn n_columns(&self) -> [usize; 3] {
+        let tree = &self.plan.tree;
+        [tree.n_zone_columns(), tree.n_ring_columns(), tree.n_columns()]
+    }
+
     /// Force of the tissue on a tool, N.
     pub fn tool_force(&self, tool: usize) -> Vec3 {
-        -self
-            .problem
-            .candidates
-            .iter()
-            .filter(|c| c.tool as usize == tool)
-            .map(|c| c.force)
-            .sum::<Vec3>()
+        let candidates = self.problem.candidates.iter();
+        -candidates.filter(|c| c.tool as usize == tool).map(Candidate::force).sum::<Vec3>()
     }
 
     /// Follows the tools to where they are now.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
+        self.tools.clear();
+        self.tools.extend_from_slice(tools);
+        self.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
         if self.model.has_memory {
             self.memory.begin(&self.model, &self.state, dt);
             self.inside.batches.refresh(&self.model, &self.memory);
-            self.outside.batches.refresh(&self.model, &self.memory);
+            if let Some(follower) = &mut self.follower {
+                follower.batches.refresh(&self.model, &self.memory);
+            }
+            self.is_fresh = false;
         }
-        self.tools.clear();
-        self.tools.extend_from_slice(tools);
         let mut report = LiveReport {
             outcome: StepOutcome::Arrived,
             iterations: 0,
@@ -260,12 +351,13 @@ impl Live {
             n_active: 0,
             n_candidates: 0,
             shift: 0.0,
+            spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
         };
         while report.iterations < self.params.max_iterations {
             report.iterations += 1;
-            match self.iterate(&mut report) {
+            match self.iterate(dt, &mut report) {
                 Ok(()) if report.residual <= self.params.tolerance => break,
                 Ok(()) => {}
                 Err(_) => {
@@ -282,67 +374,90 @@ impl Live {
     }
 
     /// One Newton iteration. An error leaves the state as it was.
-    fn iterate(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
+    fn iterate(&mut self, dt: f64, report: &mut LiveReport) -> Result<(), Trouble> {
         let (model, plan) = (Arc::clone(&self.model), Arc::clone(&self.plan));
-        let is_followed = self.params.exterior == ExteriorMode::Followed;
-        self.internal_forces()?;
-        if is_followed {
-            self.outside.follow(&model, &self.memory, &plan, &self.state.displacements)?;
+        if !self.is_fresh {
+            self.internal_forces()?;
         }
-        let shift = self.inside.refactor(
-            &model,
-            &self.memory,
-            &self.pattern,
-            &plan,
-            &self.outside,
-            &self.state.displacements,
-        )?;
-        report.shift = report.shift.max(shift);
+        if let (Some(follower), Some(outside)) = (&mut self.follower, Arc::get_mut(&mut self.outside)) {
+            outside.follow(&model, &self.memory, &plan, follower, &self.state.displacements)?;
+        }
+        self.find_candidates(dt);
+        self.refactor(report)?;
+        let zone = plan.tree.first_zone_dof();
         self.right_side();
-        self.x.copy_from_slice(&self.right);
-        self.inside.solve(&plan, &mut self.x);
-        self.find_candidates();
-        report.n_candidates = self.problem.candidates.len();
-        let vertices = self.problem.candidates.iter().map(|c| c.vertex);
-        self.inside.compliance(&plan, vertices, &mut self.problem.compliance);
-        self.problem.solve(&self.tools);
-        // The same system with the forces that contact has found.
-        let width = model.body.n_levels;
-        for candidate in &self.problem.candidates {
-            let vertex = candidate.vertex as usize;
-            let change = candidate.force - self.contact_forces[vertex];
-            let dof = plan.tree.first_dof(vertex);
-            for c in 0..3 {
-                self.right[dof + c] += change[c] as f32;
-            }
-        }
-        self.x.copy_from_slice(&self.right);
-        self.inside.solve(&plan, &mut self.x);
+        self.inside.substitute(&plan, &mut self.x);
+        self.inside.prepare(&plan, &self.x, self.has_friction, &mut self.problem);
+        self.problem.solve(&self.tools, self.has_friction);
+        self.inside.push(&plan, &self.problem, &mut self.x);
+        self.inside.back_substitute(&plan, &mut self.x);
+        debug_assert!(zone <= self.x.len());
         for &[node, _] in &plan.zone {
             self.before[node as usize] = self.state.displacements[node as usize];
         }
-        debug_assert!(width > 0);
         let mut share = 1.0;
         loop {
             self.take(share);
-            let ok = self.internal_forces();
-            if ok.is_ok() {
+            if self.internal_forces().is_ok() {
                 break;
             }
             share *= 0.5;
             report.outcome = StepOutcome::BackedOff;
-            if share < 0.05 {
+            if share < LEAST_SHARE {
                 self.take(0.0);
                 return Err(Trouble::Singular);
             }
         }
         self.accept_contact(share);
-        if is_followed {
-            self.outside.settle(&model, &plan, &mut self.state.displacements, &mut self.x);
+        if let Some(follower) = &mut self.follower {
+            let x = &mut self.moves;
+            self.outside
+                .settle(&model, &plan, &mut self.state.displacements, x, &mut follower.solve);
         }
-        report.n_active = self.problem.candidates.iter().filter(|c| c.force != Vec3::zeros()).count();
+        report.n_candidates = self.problem.candidates.len();
+        report.n_active = self.problem.candidates.iter().filter(|c| c.pressure > 0.0).count();
         report.residual = self.residual();
         Ok(())
+    }
+
+    /// Makes the zone's stiffness and factor. Where the body is not stable without its tools, springs hold the vertices
+    /// under them.
+    fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
+        let (model, pattern, plan) = (&*self.model, &*self.pattern, &*self.plan);
+        let inside = &mut self.inside;
+        inside.assemble(model, &self.memory, pattern, plan, &self.state.displacements)?;
+        let pressed = self.problem.candidates.iter().filter(|c| c.pressure > 0.0).map(|c| c.vertex);
+        let size = inside.skin_stiffness(pattern, pressed);
+        self.spring_age += 1;
+        if self.spring > 0.0 && self.spring_age > SPRING_PATIENCE {
+            self.spring_age = 0;
+            self.spring /= SPRING_GROWTH;
+            if self.spring < 0.5 * FIRST_SPRING {
+                self.spring = 0.0;
+            }
+        }
+        let mut there = 0.0;
+        loop {
+            let springs = self.spring * size;
+            for candidate in &mut self.problem.candidates {
+                candidate.support = if candidate.pressure > 0.0 { springs } else { 0.0 };
+            }
+            inside.add_springs(pattern, &self.problem.candidates, springs - there);
+            there = springs;
+            let may_shift = size == 0.0 || self.spring >= MOST_SPRING;
+            match inside.factor(model, pattern, plan, &self.outside, may_shift) {
+                Ok(shift) => {
+                    report.shift = report.shift.max(shift);
+                    report.spring = self.spring;
+                    return Ok(());
+                }
+                Err(trouble) if may_shift => return Err(trouble),
+                Err(_) => {
+                    self.spring_age = 0;
+                    self.spring = (self.spring * SPRING_GROWTH).max(FIRST_SPRING);
+                }
+            }
+        }
     }
 
     /// Takes a share of the step that is in `x`, from `before`.
@@ -356,6 +471,7 @@ impl Live {
 
     /// Internal forces of the zone's prisms.
     fn internal_forces(&mut self) -> Result<(), Trouble> {
+        self.is_fresh = false;
         let levels = self.model.body.n_levels;
         for &v in &self.plan.vertices {
             let first = v as usize * levels;
@@ -367,51 +483,66 @@ impl Live {
             &self.state.displacements,
             &mut self.forces,
         )?;
+        self.is_fresh = true;
         Ok(())
     }
 
-    /// Forces out of balance, reduced to the zone.
+    /// Forces out of balance, with those of the tools, reduced to the zone, into `x`.
     fn right_side(&mut self) {
-        self.right.fill(0.0);
-        let levels = self.model.body.n_levels;
         for &[node, dof] in &self.plan.zone {
             let node = node as usize;
-            let mut force = -self.forces[node];
-            if node % levels == 0 {
-                force += self.contact_forces[node / levels];
-            }
-            let force = self.model.supports[node].free_part(&force);
+            let force = self.model.supports[node].free_part(&-self.forces[node]);
             for c in 0..3 {
-                self.right[dof as usize + c] = force[c] as f32;
+                self.x[dof as usize + c] = force[c] as f32;
             }
         }
-        self.outside
-            .push(&self.plan, &self.state.displacements, &mut self.right, &mut self.moves);
+        for candidate in &self.problem.candidates {
+            let vertex = candidate.vertex as usize;
+            let force = candidate.force();
+            let dof = self.plan.tree.first_dof(vertex);
+            let node = self.model.body.node(vertex, 0);
+            let sum = self.model.supports[node].free_part(&(force - self.forces[node]));
+            for c in 0..3 {
+                self.x[dof + c] = sum[c] as f32;
+            }
+        }
+        let displacements = &self.state.displacements;
+        self.outside.push(&self.plan, displacements, &mut self.x, &mut self.moves);
     }
 
     /// Forces out of balance in the zone off its ring, as a share of the tools'.
     fn residual(&self) -> f64 {
         let levels = self.model.body.n_levels;
-        let ring = self.model.structure.n_dofs() - 3 * self.plan.ring.len();
-        let mut sum = 0.0;
-        for &[node, dof] in &self.plan.zone {
-            let node = node as usize;
-            if dof as usize >= ring {
-                continue;
-            }
-            let mut force = -self.forces[node];
-            if node % levels == 0 {
-                force += self.contact_forces[node / levels];
-            }
-            sum += self.model.supports[node].free_part(&force).norm_squared();
-        }
-        let size: f64 = self.problem.candidates.iter().map(|c| c.force.norm_squared()).sum();
-        (sum / size.max(1e-12)).sqrt()
+        let ring = self.x.len() - 3 * self.plan.ring.len();
+        let sum: f64 = self
+            .plan
+            .zone
+            .iter()
+            .filter(|n| (n[1] as usize) < ring && !(n[0] as usize).is_multiple_of(levels))
+            .map(|n| self.model.supports[n[0] as usize].free_part(&self.forces[n[0] as usize]))
+            .map(|force| force.norm_squared())
+            .sum();
+        let skin: f64 = self
+            .plan
+            .vertices
+            .iter()
+            .filter(|&&v| self.plan.tree.first_dof(v as usize) < ring)
+            .map(|&v| {
+                let node = self.model.body.node(v as usize, 0);
+                let pressed = self.problem.candidates.binary_search_by_key(&v, |c| c.vertex);
+                let tool = pressed.map_or(Vec3::zeros(), |i| self.problem.candidates[i].force());
+                let force = tool - self.forces[node];
+                self.model.supports[node].free_part(&force).norm_squared()
+            })
+            .sum();
+        let size: f64 = self.problem.candidates.iter().map(|c| c.force().norm_squared()).sum();
+        ((sum + skin) / size.max(1e-12)).sqrt()
     }
 
-    /// Vertices of the zone that press or are near a tool, those nearest first; where the step in `x` takes them.
-    fn find_candidates(&mut self) {
+    /// Vertices of the zone that press or are near a tool, those nearest first.
+    fn find_candidates(&mut self, dt: f64) {
         let model = &self.model;
+        let reach = (FASTEST * 2.0 * dt).clamp(LEAST_REACH, self.params.reach);
         let candidates = &mut self.problem.candidates;
         candidates.clear();
         for &v in &self.plan.vertices {
@@ -420,35 +551,46 @@ impl Live {
             if model.supports[node].n == 3 {
                 continue;
             }
-            let x = model.body.positions[node] + self.state.displacements[node];
-            let dof = self.plan.tree.first_dof(vertex);
-            let step = Vec3::from_fn(|c, _| f64::from(self.x[dof + c]));
-            let position = x + model.supports[node].free_part(&step);
-            let force = self.contact_forces[vertex];
-            let nearest = self
-                .tools
-                .iter()
-                .enumerate()
-                .map(|(t, tool)| (t, tool.tool.distance_at(&tool.pose, &position).distance))
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((tool, gap)) = nearest else { continue };
-            let presses = force != Vec3::zeros();
-            if gap > self.params.reach && !presses {
+            let start = model.body.positions[node] + self.state.displacements[node];
+            let distances = self.tools.iter().map(|tool| tool.tool.distance_at(&tool.pose, &start));
+            let nearest = distances.enumerate().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+            let Some((tool, distance)) = nearest else { continue };
+            let pressure = self.pressures[vertex];
+            if distance.distance > reach && pressure == 0.0 {
                 continue;
             }
+            let normal = distance.normal;
+            let mut friction = self.frictions[vertex];
+            friction -= normal * normal.dot(&friction);
+            let anchor = if pressure > 0.0 {
+                self.anchors[vertex]
+            } else {
+                // Where it would touch.
+                let surface = start - normal * distance.distance;
+                self.tools[tool].pose.inverse_transform_point(&surface.into()).coords
+            };
             candidates.push(Candidate {
                 vertex: v,
                 tool: tool as u32,
-                position,
-                force,
-                anchor: self.anchors[vertex],
-                is_new: !presses,
-                normal: Vec3::z(),
-                gap: if presses { f64::NEG_INFINITY } else { gap },
+                start,
+                normal,
+                gap: distance.distance,
+                pressure,
+                friction,
+                support: 0.0,
+                anchor,
+                displacement: Vec3::zeros(),
             });
         }
         if candidates.len() > MOST_CANDIDATES {
-            candidates.select_nth_unstable_by(MOST_CANDIDATES - 1, |a, b| a.gap.total_cmp(&b.gap));
+            let order = |c: &Candidate| if c.pressure > 0.0 { f64::NEG_INFINITY } else { c.gap };
+            candidates.select_nth_unstable_by(MOST_CANDIDATES - 1, |a, b| {
+                order(a).total_cmp(&order(b)).then(a.vertex.cmp(&b.vertex))
+            });
+            for lost in &candidates[MOST_CANDIDATES..] {
+                self.pressures[lost.vertex as usize] = 0.0;
+                self.frictions[lost.vertex as usize] = Vec3::zeros();
+            }
             candidates.truncate(MOST_CANDIDATES);
         }
         candidates.sort_unstable_by_key(|c| c.vertex);
@@ -458,17 +600,20 @@ impl Live {
     fn accept_contact(&mut self, share: f64) {
         for candidate in &mut self.problem.candidates {
             let vertex = candidate.vertex as usize;
-            let before = self.contact_forces[vertex];
-            candidate.force = before + (candidate.force - before) * share;
-            self.contact_forces[vertex] = candidate.force;
+            let before = self.pressures[vertex];
+            candidate.pressure = before + (candidate.pressure - before) * share;
+            self.pressures[vertex] = candidate.pressure;
+            self.frictions[vertex] = candidate.friction;
+            if !self.has_friction {
+                continue;
+            }
             let PosedTool { tool, pose } = &self.tools[candidate.tool as usize];
-            let pressure = candidate.force.dot(&candidate.normal);
-            let friction = candidate.force - candidate.normal * pressure;
-            let slides = friction.norm() >= tool.friction() * pressure * (1.0 - 1e-6);
-            if candidate.is_new || slides {
+            let most = tool.friction() * candidate.pressure;
+            if candidate.friction.norm() >= most * (1.0 - 1e-6) {
                 let node = self.model.body.node(vertex, 0);
                 let x = self.model.body.positions[node] + self.state.displacements[node];
-                let surface = x - candidate.normal * tool.distance_at(pose, &x).distance;
+                let distance = tool.distance_at(pose, &x);
+                let surface = x - distance.normal * distance.distance;
                 candidate.anchor = pose.inverse_transform_point(&surface.into()).coords;
             }
             self.anchors[vertex] = candidate.anchor;
@@ -477,12 +622,18 @@ impl Live {
 
     /// Asks for a rebuild where it is due.
     fn ask(&mut self) {
-        if self.is_job_out || self.job.is_some() || self.params.zone_radius.is_infinite() {
+        if self.is_job_out || self.job.is_some() || self.plan.exterior.is_empty() {
             return;
         }
-        let centre = zone_centre(&self.model, &self.state.displacements, &self.tools);
-        let is_leaving =
-            (centre - self.plan.centre).norm() > self.params.leave * self.params.zone_radius;
+        let radius = self.params.zone_radius;
+        let displacements = &self.state.displacements;
+        let near = nearest_point(&self.model, displacements, &self.tools, Some(&self.plan.vertices));
+        let (_, centre) = if near.0 < radius {
+            near
+        } else {
+            nearest_point(&self.model, displacements, &self.tools, None)
+        };
+        let is_leaving = (centre - self.plan.centre).norm() > self.params.leave * radius;
         let depth = self.depth();
         let is_stale = (depth - self.depth_at_factor).abs() > self.params.stale;
         if !(is_leaving || is_stale) {
@@ -492,18 +643,23 @@ impl Live {
         self.depth_at_factor = depth;
         let plan = if is_leaving {
             self.n_zones += 1;
-            let (id, radius) = (self.n_zones, self.params.zone_radius);
+            let id = self.n_zones;
             PlanOrCentre::New { id, centre, radius }
         } else {
             PlanOrCentre::Same(Arc::clone(&self.plan))
         };
+        let is_followed = self.params.exterior == ExteriorMode::Followed;
+        let old = (!is_followed).then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside)));
         self.job = Some(Rebuild {
             model: Arc::clone(&self.model),
             pattern: Arc::clone(&self.pattern),
             memory: self.memory.clone(),
             displacements: self.state.displacements.clone(),
+            old,
             plan,
-            outside: self.spare.take(),
+            shop: self.shop.take(),
+            retired: self.retired.take(),
+            is_followed,
             id: self.n_jobs,
         });
     }
@@ -513,15 +669,17 @@ impl Live {
         self.problem
             .candidates
             .iter()
-            .filter(|c| c.force != Vec3::zeros())
+            .filter(|c| c.pressure > 0.0)
             .map(|c| self.state.displacements[self.model.body.node(c.vertex as usize, 0)].norm())
             .fold(0.0, f64::max)
     }
 
-    /// Brings the displacements outside the zone up to date. Cost: a substitution through the exterior.
+    /// Brings the displacements outside the zone up to date. Cost: a substitution through the exterior, and memory.
     pub fn settle(&mut self) {
+        let mut scratch = palpa_sparse::fronts::SolveScratch::new(&self.plan.tree);
+        let displacements = &mut self.state.displacements;
         self.outside
-            .settle(&self.model, &self.plan, &mut self.state.displacements, &mut self.x);
+            .settle(&self.model, &self.plan, displacements, &mut self.moves, &mut scratch);
     }
 
     /// Work for another thread, if any is due; its result is to be given to [`Self::install`].
@@ -534,32 +692,48 @@ impl Live {
     /// Takes over what came of a job.
     pub fn install(&mut self, done: Rebuilt) {
         self.is_job_out = false;
+        self.shop = Some(done.shop);
         let Some(outside) = done.outside else { return };
-        self.settle();
-        self.plan = done.plan;
-        let old = std::mem::replace(&mut self.outside, outside);
-        if let Some(inside) = done.inside {
-            self.inside = inside;
-            self.spare = None;
-        } else {
-            self.spare = Some(old);
+        // What was in no zone until now is where the job found it.
+        for (v, was_inside) in self.plan.is_inside.iter().enumerate() {
+            if !was_inside {
+                let first = self.model.body.node(v, 0);
+                let column = first..first + self.model.body.n_levels;
+                self.state.displacements[column.clone()].copy_from_slice(&outside.at[column]);
+            }
         }
-        // Nodes that were in the old zone and are outside the new one follow from here on.
-        self.settle();
+        self.plan = done.plan;
+        self.retired = Some(std::mem::replace(&mut self.outside, outside));
+        if let Some((inside, follower)) = done.inside {
+            self.inside = inside;
+            self.follower = follower;
+            self.inside.batches.refresh(&self.model, &self.memory);
+        }
+        self.is_fresh = false;
     }
 }
 
-/// The skin's point nearest to the tools, at rest.
-fn zone_centre(model: &Model, displacements: &[Vec3], tools: &[PosedTool]) -> Vec3 {
-    let mut best = (f64::INFINITY, Vec3::zeros());
-    for (vertex, point) in model.body.skin.points.iter().enumerate() {
+/// The least distance of the skin (or of these vertices) from the tools, and the point at rest where that is.
+fn nearest_point(
+    model: &Model,
+    displacements: &[Vec3],
+    tools: &[PosedTool],
+    among: Option<&[u32]>,
+) -> (f64, Vec3) {
+    let mut best = (f64::INFINITY, model.body.skin.points[0]);
+    let mut look = |vertex: usize| {
+        let point = model.body.skin.points[vertex];
         let x = point + displacements[model.body.node(vertex, 0)];
         for tool in tools {
             let distance = tool.tool.distance_at(&tool.pose, &x).distance;
             if distance < best.0 {
-                best = (distance, *point);
+                best = (distance, point);
             }
         }
+    };
+    match among {
+        Some(vertices) => vertices.iter().for_each(|&v| look(v as usize)),
+        None => (0..model.body.n_vertices()).for_each(look),
     }
-    best.1
+    best
 }

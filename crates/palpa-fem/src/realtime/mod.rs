@@ -22,7 +22,7 @@ use palpa_sparse::ColumnPattern;
 use crate::model::Model;
 
 /// How many vertices may be candidates for contact.
-pub const MOST_CANDIDATES: usize = 60;
+pub const MOST_CANDIDATES: usize = 160;
 
 /// The columns of a body's skin, and which of them are neighbours.
 fn column_pattern(model: &Model) -> ColumnPattern {

@@ -2,13 +2,14 @@
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
-    Compliance, Exterior, FactorScratch, Half, SolveScratch, Tree, Unit, Zone, back_substitute,
+    Compliance, Exterior, FactorScratch, Half, Push, SolveScratch, Tree, Zone, back_substitute,
     substitute,
 };
 use palpa_sparse::{Block, ColumnPattern, Singular, TooLarge};
 
 use super::MOST_CANDIDATES;
 use super::batch::Batches;
+use super::contact::ContactProblem;
 use crate::assembly::Inverted;
 use crate::columns::SurfaceGroup;
 use crate::model::Model;
@@ -127,6 +128,9 @@ impl Plan {
     }
 }
 
+/// Springs that hold skin vertices along normals, so that the free body is stable.
+pub(super) type Springs<'a> = &'a [super::contact::Candidate];
+
 /// The zone's prisms and factor.
 #[derive(Debug)]
 pub(super) struct Inside {
@@ -136,49 +140,84 @@ pub(super) struct Inside {
     scratch: FactorScratch<f32>,
     solve: SolveScratch<f32>,
     compliance: Compliance<f32>,
+    pushes: Vec<Push<f32>>,
     w: Vec<f32>,
-    units: Vec<Unit>,
+    moves: Vec<f32>,
 }
 
 impl Inside {
     pub(super) fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
         let tree = &plan.tree;
+        let most = 3 * MOST_CANDIDATES;
         Self {
             batches: Batches::new(model, memory, pattern, &|group| plan.holds(group), true),
             blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
             factor: Zone::new(tree),
             scratch: FactorScratch::new(tree, Half::Zone),
             solve: SolveScratch::new(tree),
-            compliance: Compliance::new(tree, MOST_CANDIDATES),
-            w: vec![0.0; 9 * MOST_CANDIDATES * MOST_CANDIDATES],
-            units: Vec::with_capacity(MOST_CANDIDATES),
+            compliance: Compliance::new(tree, most),
+            pushes: Vec::with_capacity(most),
+            w: vec![0.0; most * most],
+            moves: vec![0.0; most],
         }
     }
 
-    /// Makes the zone's stiffness and factor at these displacements. Returns the shift that it needed, relative to the
-    /// diagonal.
-    pub(super) fn refactor(
+    /// Makes the zone's stiffness at these displacements.
+    pub(super) fn assemble(
         &mut self,
         model: &Model,
         memory: &Memory,
         pattern: &ColumnPattern,
         plan: &Plan,
-        outside: &Outside,
         displacements: &[Vec3],
-    ) -> Result<f32, Trouble> {
+    ) -> Result<(), Trouble> {
         self.clear(pattern, plan);
         self.batches.add_stiffness(model, memory, displacements, &mut self.blocks)?;
         plan.support(model, pattern, true, &mut self.blocks);
+        Ok(())
+    }
+
+    /// Mean stiffness of a skin vertex of the zone against its neighbours, N/m.
+    pub(super) fn skin_stiffness(&self, pattern: &ColumnPattern, vertices: impl Iterator<Item = u32>) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for v in vertices {
+            let block = &self.blocks[pattern.own(v as usize)];
+            sum += f64::from(block[0] + block[4] + block[8]).abs() / 3.0;
+            n += 1.0;
+        }
+        if n > 0.0 { sum / n } else { 0.0 }
+    }
+
+    /// Adds springs at vertices.
+    pub(super) fn add_springs(&mut self, pattern: &ColumnPattern, springs: Springs<'_>, by: f64) {
+        for spring in springs.iter().filter(|s| s.support > 0.0) {
+            let block = &mut self.blocks[pattern.own(spring.vertex as usize)];
+            for c in 0..3 {
+                for r in 0..3 {
+                    block[r + 3 * c] += (by * spring.normal[r] * spring.normal[c]) as f32;
+                }
+            }
+        }
+    }
+
+    /// Factors the zone; with a share of the diagonal added to it, until it is positive definite. Returns that share.
+    pub(super) fn factor(
+        &mut self,
+        model: &Model,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        outside: &Outside,
+        may_shift: bool,
+    ) -> Result<f32, Trouble> {
         let mut shift = 0.0;
         for attempt in 0..=MOST_SHIFTS {
-            let result = self.factor.factor(
-                &plan.tree,
-                &self.blocks,
-                Some(&outside.factor),
-                &mut self.scratch,
-            );
+            let exterior = Some(&outside.factor);
+            let result = self.factor.factor(&plan.tree, &self.blocks, exterior, &mut self.scratch);
             if result.is_ok() {
                 return Ok(shift);
+            }
+            if !may_shift {
+                break;
             }
             let next = if attempt == 0 { FIRST_SHIFT } else { shift * SHIFT_GROWTH };
             for &[node, _] in &plan.zone {
@@ -200,7 +239,8 @@ impl Inside {
             let own = pattern.own(v as usize);
             self.blocks[own..own + 2 * n].fill([0.0; 9]);
             for &w in pattern.neighbours(v as usize) {
-                if w < v && plan.is_inside[w as usize]
+                if w < v
+                    && plan.is_inside[w as usize]
                     && let Some(pair) = pattern.find(v as usize, w as usize)
                 {
                     let first = pattern.between(pair);
@@ -210,36 +250,62 @@ impl Inside {
         }
     }
 
-    /// Displacements of the zone under a right side that has been reduced to it.
-    pub(super) fn solve(&mut self, plan: &Plan, x: &mut [f32]) {
+    /// Forward substitution of a right side that has been reduced to the zone.
+    pub(super) fn substitute(&mut self, plan: &Plan, x: &mut [f32]) {
         substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
+    }
+
+    /// Displacements of the zone, given the forward substitution.
+    pub(super) fn back_substitute(&mut self, plan: &Plan, x: &mut [f32]) {
         back_substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
     }
 
-    /// What skin vertices of the zone answer to forces on them, into the first `9 n²` of `out`, m/N.
-    pub(super) fn compliance(&mut self, plan: &Plan, vertices: impl Iterator<Item = u32>, out: &mut [f64]) {
-        self.units.clear();
-        self.units.extend(vertices.map(|column| Unit { column, level: 0 }));
-        let size = 9 * self.units.len() * self.units.len();
-        self.compliance
-            .compute(&plan.tree, &self.factor, &self.units, &mut self.w[..size]);
-        for (out, w) in out.iter_mut().zip(&self.w[..size]) {
+    /// Fills a contact problem: the compliance, and displacements by the right side whose forward substitution is `z`.
+    pub(super) fn prepare(&mut self, plan: &Plan, z: &[f32], has_friction: bool, problem: &mut ContactProblem) {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        self.pushes.clear();
+        for candidate in &problem.candidates {
+            let normal = [0, 1, 2].map(|c| candidate.normal[c] as f32);
+            let directions = if has_friction { &axes[..] } else { &[normal][..] };
+            self.pushes.extend(directions.iter().map(|&direction| Push {
+                column: candidate.vertex,
+                level: 0,
+                direction,
+            }));
+        }
+        let n = self.pushes.len();
+        self.compliance.compute(&plan.tree, &self.factor, &self.pushes, &mut self.w[..n * n]);
+        for (out, w) in problem.compliance.iter_mut().zip(&self.w[..n * n]) {
             *out = f64::from(*w);
         }
+        self.compliance.project(&plan.tree, z, &mut self.moves[..n]);
+        for (i, candidate) in problem.candidates.iter_mut().enumerate() {
+            candidate.displacement = if has_friction {
+                Vec3::from_fn(|c, _| f64::from(self.moves[3 * i + c]))
+            } else {
+                candidate.normal * f64::from(self.moves[i])
+            };
+        }
+    }
+
+    /// Adds the forces that a contact problem has found to a right side that has been substituted forwards.
+    pub(super) fn push(&mut self, plan: &Plan, problem: &ContactProblem, z: &mut [f32]) {
+        let n = self.pushes.len();
+        for (force, change) in self.moves[..n].iter_mut().zip(&problem.change) {
+            *force = *change as f32;
+        }
+        self.compliance.add(&plan.tree, &self.moves[..n], z);
     }
 }
 
-/// The rest of the body: linear about a state in the past, whose equilibrium it follows.
-#[derive(Debug)]
+/// The rest of the body, linear about a state in the past.
+#[derive(Debug, Clone)]
 pub(super) struct Outside {
     /// Counts factors.
     pub(super) id: u64,
-    pub(super) batches: Batches,
-    blocks: Vec<Block<f32>>,
+    /// The zone that it is the exterior of.
+    pub(super) plan: u64,
     factor: Exterior<f32>,
-    scratch: FactorScratch<f32>,
-    solve: SolveScratch<f32>,
-    forces: Vec<Vec3>,
     /// The right side that is left of the exterior's own unknowns after elimination, and what it pushes the ring with.
     right: Vec<f32>,
     /// Displacements of all nodes about which it is linear, m.
@@ -247,70 +313,21 @@ pub(super) struct Outside {
 }
 
 impl Outside {
-    pub(super) fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
-        let tree = &plan.tree;
+    pub(super) fn new(model: &Model, plan: &Plan) -> Self {
         Self {
             id: 0,
-            batches: Batches::new(model, memory, pattern, &|group| !plan.holds(group), true),
-            blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
-            factor: Exterior::new(tree),
-            scratch: FactorScratch::new(tree, Half::Exterior),
-            solve: SolveScratch::new(tree),
-            forces: vec![Vec3::zeros(); model.n_nodes()],
+            plan: plan.id,
+            factor: Exterior::new(&plan.tree),
             right: vec![0.0; model.structure.n_dofs()],
             at: vec![Vec3::zeros(); model.n_nodes()],
         }
     }
 
-    /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
-    pub(super) fn refactor(
-        &mut self,
-        model: &Model,
-        memory: &Memory,
-        pattern: &ColumnPattern,
-        plan: &Plan,
-        displacements: &[Vec3],
-    ) -> Result<(), Trouble> {
-        self.blocks.fill([0.0; 9]);
-        self.batches.add_stiffness(model, memory, displacements, &mut self.blocks)?;
-        plan.support(model, pattern, false, &mut self.blocks);
-        if !plan.exterior.is_empty() {
-            self.factor.factor(&plan.tree, &self.blocks, &mut self.scratch)?;
-        }
-        self.follow(model, memory, plan, displacements)
-    }
-
-    /// Is linear about other displacements, with the stiffness that it has.
-    pub(super) fn follow(
-        &mut self,
-        model: &Model,
-        memory: &Memory,
-        plan: &Plan,
-        displacements: &[Vec3],
-    ) -> Result<(), Trouble> {
-        self.forces.fill(Vec3::zeros());
-        self.batches.add_forces(model, memory, displacements, &mut self.forces)?;
-        self.at.copy_from_slice(displacements);
-        self.right.fill(0.0);
-        for &[node, dof] in plan.exterior.iter().chain(&plan.ring) {
-            let force = model.supports[node as usize].free_part(&self.forces[node as usize]);
-            for c in 0..3 {
-                self.right[dof as usize + c] = -force[c] as f32;
-            }
-        }
-        substitute(&plan.tree, Half::Exterior, &self.factor, &mut self.right, &mut self.solve);
-        Ok(())
-    }
-
     /// Adds what it pushes the ring with, at these displacements, to a right side. Cost: the square of the ring.
-    pub(super) fn push(&self, plan: &Plan, displacements: &[Vec3], x: &mut [f32], moves: &mut Vec<f32>) {
-        let Some(&[_, first]) = plan.ring.iter().min_by_key(|r| r[1]) else {
-            return;
-        };
-        let first = first as usize;
-        let n = x.len() - first;
-        moves.clear();
-        moves.resize(n, 0.0);
+    pub(super) fn push(&self, plan: &Plan, displacements: &[Vec3], x: &mut [f32], moves: &mut [f32]) {
+        let n = 3 * plan.ring.len();
+        let first = x.len() - n;
+        let moves = &mut moves[..n];
         let mut has_moved = false;
         for &[node, dof] in &plan.ring {
             let change = displacements[node as usize] - self.at[node as usize];
@@ -328,23 +345,123 @@ impl Outside {
         }
     }
 
-    /// Displacements of the exterior that go with those of the ring: brings `displacements` up to date.
-    pub(super) fn settle(&mut self, model: &Model, plan: &Plan, displacements: &mut [Vec3], x: &mut [f32]) {
+    /// Displacements of the exterior that go with those of the ring: brings `displacements` up to date. Cost: a
+    /// substitution through the exterior.
+    pub(super) fn settle(
+        &self,
+        model: &Model,
+        plan: &Plan,
+        displacements: &mut [Vec3],
+        x: &mut [f32],
+        scratch: &mut SolveScratch<f32>,
+    ) {
         if plan.exterior.is_empty() {
             return;
         }
-        x.copy_from_slice(&self.right);
+        let n = plan.tree.first_zone_dof();
+        x[..n].copy_from_slice(&self.right[..n]);
+        x[n..].fill(0.0);
         for &[node, dof] in &plan.ring {
             let change = displacements[node as usize] - self.at[node as usize];
             for c in 0..3 {
                 x[dof as usize + c] = change[c] as f32;
             }
         }
-        back_substitute(&plan.tree, Half::Exterior, &self.factor, x, &mut self.solve);
+        back_substitute(&plan.tree, Half::Exterior, &self.factor, x, scratch);
         for &[node, dof] in &plan.exterior {
             let change = Vec3::from_fn(|c, _| f64::from(x[dof as usize + c]));
             let change = model.supports[node as usize].free_part(&change);
             displacements[node as usize] = self.at[node as usize] + change;
+        }
+    }
+
+    /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
+    pub(super) fn refactor(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        follower: &mut Follower,
+        workshop: &mut Workshop,
+        displacements: &[Vec3],
+    ) -> Result<(), Trouble> {
+        if !plan.exterior.is_empty() {
+            workshop.blocks.fill([0.0; 9]);
+            follower.batches.add_stiffness(model, memory, displacements, &mut workshop.blocks)?;
+            plan.support(model, pattern, false, &mut workshop.blocks);
+            self.factor.factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
+        }
+        self.follow(model, memory, plan, follower, displacements)
+    }
+
+    /// Is linear about other displacements, with the stiffness that it has. Cost: forces of the exterior's prisms and a
+    /// substitution.
+    pub(super) fn follow(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        plan: &Plan,
+        follower: &mut Follower,
+        displacements: &[Vec3],
+    ) -> Result<(), Trouble> {
+        if plan.exterior.is_empty() {
+            return Ok(());
+        }
+        follower.forces.fill(Vec3::zeros());
+        follower.batches.add_forces(model, memory, displacements, &mut follower.forces)?;
+        self.at.copy_from_slice(displacements);
+        self.right[plan.tree.first_zone_dof()..].fill(0.0);
+        for &[node, dof] in plan.exterior.iter().chain(&plan.ring) {
+            let force = model.supports[node as usize].free_part(&follower.forces[node as usize]);
+            for c in 0..3 {
+                self.right[dof as usize + c] = -force[c] as f32;
+            }
+        }
+        let right = &mut self.right;
+        substitute(&plan.tree, Half::Exterior, &self.factor, right, &mut follower.solve);
+        Ok(())
+    }
+}
+
+/// The exterior's prisms and scratch.
+#[derive(Debug)]
+pub(super) struct Follower {
+    pub(super) batches: Batches,
+    forces: Vec<Vec3>,
+    pub(super) solve: SolveScratch<f32>,
+}
+
+impl Follower {
+    pub(super) fn new(
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        with_tangent: bool,
+    ) -> Self {
+        Self {
+            batches: Batches::new(model, memory, pattern, &|group| !plan.holds(group), with_tangent),
+            forces: vec![Vec3::zeros(); model.n_nodes()],
+            solve: SolveScratch::new(&plan.tree),
+        }
+    }
+}
+
+/// Where exteriors are factored.
+#[derive(Debug)]
+pub(super) struct Workshop {
+    blocks: Vec<Block<f32>>,
+    scratch: FactorScratch<f32>,
+    pub(super) x: Vec<f32>,
+}
+
+impl Workshop {
+    pub(super) fn new(model: &Model, pattern: &ColumnPattern, plan: &Plan) -> Self {
+        Self {
+            blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
+            scratch: FactorScratch::new(&plan.tree, Half::Exterior),
+            x: vec![0.0; model.structure.n_dofs()],
         }
     }
 }

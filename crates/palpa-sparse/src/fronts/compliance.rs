@@ -1,6 +1,9 @@
-//! What the body answers to forces on a few of its nodes: `W = S K⁻¹ Sᵀ = Yᵀ Y` with `Y = L⁻¹ Sᵀ`.
+//! What the body answers to a few forces: `W = S K⁻¹ Sᵀ = Yᵀ Y` with `Y = L⁻¹ Sᵀ`, a column of `Sᵀ` for each force.
 //!
-//! Only the fronts between those nodes and the root are visited, and only forwards.
+//! Only the fronts between those nodes and the root are visited, and only forwards. `Y` is kept: with it a solution under other
+//! forces needs no further forward substitution.
+
+use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as matmul_triangular};
@@ -12,22 +15,25 @@ use super::Number;
 use super::factor::Zone;
 use super::tree::{Half, Tree};
 
-/// A node: its column, and its level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unit {
-    /// Which column.
+/// A force of 1 on a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Push<T> {
+    /// The node's column.
     pub column: u32,
     /// Which of its nodes with unknowns.
     pub level: u32,
+    /// Components of a unit vector.
+    pub direction: [T; 3],
 }
 
-/// Memory for the compliance of at most so many nodes of a zone.
+/// Memory for the compliance under at most so many forces on a zone.
 #[derive(Debug)]
 pub struct Compliance<T> {
     most: usize,
     /// First row of each visited front, of the zone's.
     rows: Vec<usize>,
-    /// Nodes in the order of their columns' elimination.
+    n_rows: usize,
+    /// Forces in the order of their columns' elimination.
     sorted: Vec<u32>,
     y: Vec<T>,
     product: Vec<T>,
@@ -35,7 +41,7 @@ pub struct Compliance<T> {
 }
 
 impl<T: Number> Compliance<T> {
-    /// Room for `most` nodes.
+    /// Room for `most` forces.
     pub fn new(tree: &Tree, most: usize) -> Self {
         let range = tree.range(Half::Zone);
         let fronts = &tree.fronts[range];
@@ -45,26 +51,24 @@ impl<T: Number> Compliance<T> {
             most,
             rows: vec![usize::MAX; fronts.len()],
             sorted: Vec::with_capacity(most),
-            y: vec![T::default(); rows * 3 * most],
-            product: vec![T::default(); border * 3 * most],
-            w: vec![T::default(); 9 * most * most],
+            n_rows: 0,
+            y: vec![T::default(); rows * most],
+            product: vec![T::default(); border * most],
+            w: vec![T::default(); most * most],
         }
     }
 
-    /// The compliance of nodes of the zone: `3 n × 3 n`, column by column, both triangles, m/N for a stiffness in N/m.
+    /// The compliance under forces on the zone: `n × n`, column by column, both triangles, m/N for a stiffness in N/m.
     ///
     /// # Panics
-    /// When there are more nodes than there is room for, or one is not of the zone.
-    pub fn compute(&mut self, tree: &Tree, zone: &Zone<T>, units: &[Unit], out: &mut [T]) {
-        assert!(
-            units.len() <= self.most,
-            "more nodes than there is room for"
-        );
+    /// When there are more forces than there is room for, or one is not on the zone.
+    pub fn compute(&mut self, tree: &Tree, zone: &Zone<T>, pushes: &[Push<T>], out: &mut [T]) {
+        assert!(pushes.len() <= self.most, "more forces than there is room for");
         let b = tree.width;
         let range = tree.range(Half::Zone);
-        let place = |u: u32| tree.place[units[u as usize].column as usize];
+        let place = |u: u32| tree.place[pushes[u as usize].column as usize];
         self.sorted.clear();
-        self.sorted.extend(0..units.len() as u32);
+        self.sorted.extend(0..pushes.len() as u32);
         self.sorted.sort_unstable_by_key(|&u| (place(u), u));
         // Rows for the fronts on the way from a node to the root.
         self.rows.fill(usize::MAX);
@@ -86,7 +90,8 @@ impl<T: Number> Compliance<T> {
                 n_rows += front.own.len() * b;
             }
         }
-        let n = 3 * units.len();
+        self.n_rows = n_rows;
+        let n = pushes.len();
         let y = &mut self.y[..n_rows * n];
         y.fill(T::default());
         let row_of = |rows: &[usize], p: u32| {
@@ -94,10 +99,9 @@ impl<T: Number> Compliance<T> {
             rows[f - range.start] + (p - tree.fronts[f].own.start) as usize * b
         };
         for (j, &u) in self.sorted.iter().enumerate() {
-            let row = row_of(&self.rows, place(u)) + 3 * units[u as usize].level as usize;
-            for d in 0..3 {
-                y[(3 * j + d) * n_rows + row + d] = T::nearest(1.0);
-            }
+            let push = &pushes[u as usize];
+            let row = row_of(&self.rows, place(u)) + 3 * push.level as usize;
+            y[j * n_rows + row..][..3].copy_from_slice(&push.direction);
         }
         for f in range.clone() {
             let first_row = self.rows[f - range.start];
@@ -109,13 +113,13 @@ impl<T: Number> Compliance<T> {
             let first_place = subtree_start(tree, f, range.start);
             let from = self.sorted.partition_point(|&u| place(u) < first_place);
             let to = self.sorted.partition_point(|&u| place(u) < front.own.end);
-            let n_right = 3 * (to - from);
+            let n_right = to - from;
             let (own, border) = (front.own.len() * b, front.border.len() * b);
             let panel = &zone.panels[front.panel..][..(own + border) * own];
             let panel = MatRef::from_column_major_slice(panel, own + border, own);
             let all = MatMut::from_column_major_slice_mut(&mut *y, n_rows, n);
             let mut here = all
-                .subcols_mut(3 * from, n_right)
+                .subcols_mut(from, n_right)
                 .subrows_mut(first_row, own);
             solve_lower_triangular_in_place(panel.subrows(0, own), here.rb_mut(), Par::Seq);
             if border > 0 {
@@ -131,7 +135,7 @@ impl<T: Number> Compliance<T> {
                 for (k, &p) in front.border.iter().enumerate() {
                     let row = row_of(&self.rows, p);
                     for j in 0..n_right {
-                        let into = &mut y[(3 * from + j) * n_rows + row..][..b];
+                        let into = &mut y[(from + j) * n_rows + row..][..b];
                         for (y, &s) in into.iter_mut().zip(&product[j * border + k * b..][..b]) {
                             *y -= s;
                         }
@@ -154,15 +158,48 @@ impl<T: Number> Compliance<T> {
         );
         for (j, &uj) in self.sorted.iter().enumerate() {
             for (i, &ui) in self.sorted.iter().enumerate().skip(j) {
-                for c in 0..3 {
-                    for r in 0..3 {
-                        let (row, column) = (3 * i + r, 3 * j + c);
-                        let value = w[row.max(column) + n * row.min(column)];
-                        let (row, column) = (3 * ui as usize + r, 3 * uj as usize + c);
-                        out[row + n * column] = value;
-                        out[column + n * row] = value;
-                    }
+                let value = w[i + n * j];
+                out[ui as usize + n * uj as usize] = value;
+                out[uj as usize + n * ui as usize] = value;
+            }
+        }
+    }
+
+    /// Displacements along the forces, `Yᵀ z`, of the solution whose forward substitution is `z`.
+    pub fn project(&self, tree: &Tree, z: &[T], out: &mut [T]) {
+        for (column, &u) in self.y.chunks(self.n_rows.max(1)).zip(&self.sorted) {
+            let mut sum = T::default();
+            self.each_front(tree, |rows, places| {
+                for (&y, &z) in column[rows].iter().zip(&z[places]) {
+                    sum += y * z;
                 }
+            });
+            out[u as usize] = sum;
+        }
+    }
+
+    /// Adds these forces to a right side that has been substituted forwards: `z ← z + Y f`.
+    pub fn add(&self, tree: &Tree, forces: &[T], z: &mut [T]) {
+        for (column, &u) in self.y.chunks(self.n_rows.max(1)).zip(&self.sorted) {
+            let force = forces[u as usize];
+            if force == T::default() {
+                continue;
+            }
+            self.each_front(tree, |rows, places| {
+                for (z, &y) in z[places].iter_mut().zip(&column[rows]) {
+                    *z += y * force;
+                }
+            });
+        }
+    }
+
+    /// Calls with the rows of every visited front, in `Y` and in vectors ordered by elimination.
+    fn each_front(&self, tree: &Tree, mut of: impl FnMut(Range<usize>, Range<usize>)) {
+        let b = tree.width;
+        for (&row, front) in self.rows.iter().zip(&tree.fronts[tree.range(Half::Zone)]) {
+            if row != usize::MAX {
+                let (first, n) = (front.own.start as usize * b, front.own.len() * b);
+                of(row..row + n, first..first + n);
             }
         }
     }

@@ -1,25 +1,24 @@
 //! Substitution with a factor, for one right side.
 
+use pulp::{Simd, WithSimd};
+
 use super::Number;
 use super::tree::{Half, Tree};
 
 /// Memory that substitution needs and leaves nothing in.
 #[derive(Debug)]
 pub struct SolveScratch<T> {
-    border: Vec<T>,
+    /// A front's part of the vector: of its own columns, then of its border.
+    part: Vec<T>,
 }
 
 impl<T: Number> SolveScratch<T> {
     /// Scratch for a tree.
     pub fn new(tree: &Tree) -> Self {
-        let most = tree
-            .fronts
-            .iter()
-            .map(|f| f.border.len())
-            .max()
-            .unwrap_or(0);
+        let height = |f: &super::tree::Front| f.own.len() + f.border.len();
+        let most = tree.fronts.iter().map(height).max().unwrap_or(0);
         Self {
-            border: vec![T::default(); most * tree.width],
+            part: vec![T::default(); most * tree.width],
         }
     }
 }
@@ -33,28 +32,13 @@ pub fn substitute<T: Number>(
     x: &mut [T],
     scratch: &mut SolveScratch<T>,
 ) {
-    let panels = panels.as_ref();
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            let b = tree.width;
-            for front in &tree.fronts[tree.range(half)] {
-                let (own, border) = (front.own.len() * b, front.border.len() * b);
-                let height = own + border;
-                let panel = &panels[front.panel..][..height * own];
-                let first = front.own.start as usize * b;
-                let sum = &mut scratch.border[..border];
-                sum.fill(T::default());
-                forward(panel, height, &mut x[first..first + own], sum);
-                for (k, &p) in front.border.iter().enumerate() {
-                    let x = &mut x[p as usize * b..][..b];
-                    for (x, &s) in x.iter_mut().zip(&sum[k * b..][..b]) {
-                        *x -= s;
-                    }
-                }
-            }
-        },
-    );
+    pulp::Arch::new().dispatch(Pass::<T, true> {
+        tree,
+        half,
+        panels: panels.as_ref(),
+        x,
+        part: &mut scratch.part,
+    });
 }
 
 /// Back substitution through the fronts of a half: `x ← L⁻ᵀ x` there, given the solution of the later columns.
@@ -65,34 +49,62 @@ pub fn back_substitute<T: Number>(
     x: &mut [T],
     scratch: &mut SolveScratch<T>,
 ) {
-    let panels = panels.as_ref();
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            let b = tree.width;
-            for front in tree.fronts[tree.range(half)].iter().rev() {
-                let (own, border) = (front.own.len() * b, front.border.len() * b);
-                let height = own + border;
-                let panel = &panels[front.panel..][..height * own];
-                let first = front.own.start as usize * b;
-                let later = &mut scratch.border[..border];
-                for (k, &p) in front.border.iter().enumerate() {
-                    later[k * b..][..b].copy_from_slice(&x[p as usize * b..][..b]);
-                }
-                backward(panel, height, &mut x[first..first + own], later);
-            }
-        },
-    );
+    pulp::Arch::new().dispatch(Pass::<T, false> {
+        tree,
+        half,
+        panels: panels.as_ref(),
+        x,
+        part: &mut scratch.part,
+    });
 }
 
-/// Columns that are taken together, so that what they change is read and written once.
+struct Pass<'a, T, const FORWARD: bool> {
+    tree: &'a Tree,
+    half: Half,
+    panels: &'a [T],
+    x: &'a mut [T],
+    part: &'a mut [T],
+}
+
+impl<T: Number, const FORWARD: bool> WithSimd for Pass<'_, T, FORWARD> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let b = self.tree.width;
+        let fronts = &self.tree.fronts[self.tree.range(self.half)];
+        for i in 0..fronts.len() {
+            let front = if FORWARD { &fronts[i] } else { &fronts[fronts.len() - 1 - i] };
+            let (own, border) = (front.own.len() * b, front.border.len() * b);
+            let height = own + border;
+            let panel = &self.panels[front.panel..][..height * own];
+            let first = front.own.start as usize * b;
+            let part = &mut self.part[..height];
+            part[..own].copy_from_slice(&self.x[first..first + own]);
+            for (k, &p) in front.border.iter().enumerate() {
+                part[own + k * b..][..b].copy_from_slice(&self.x[p as usize * b..][..b]);
+            }
+            if FORWARD {
+                forward(simd, panel, own, part);
+                for (k, &p) in front.border.iter().enumerate() {
+                    self.x[p as usize * b..][..b].copy_from_slice(&part[own + k * b..][..b]);
+                }
+            } else {
+                backward(simd, panel, own, part);
+            }
+            self.x[first..first + own].copy_from_slice(&part[..own]);
+        }
+    }
+}
+
+/// Columns that are taken together, so that vectors are read and written once for all. A column of nodes has three unknowns
+/// a node, so the last may be fewer.
 const TOGETHER: usize = 4;
 
 #[inline(always)]
-fn forward<T: Number>(panel: &[T], height: usize, x: &mut [T], sum: &mut [T]) {
-    let own = x.len();
-    let mut j = 0;
-    while j < own {
+fn forward<T: Number, S: Simd>(simd: S, panel: &[T], own: usize, x: &mut [T]) {
+    let height = x.len();
+    for j in (0..own).step_by(TOGETHER) {
         let n = TOGETHER.min(own - j);
         for a in j..j + n {
             let column = &panel[a * height..][..height];
@@ -102,77 +114,27 @@ fn forward<T: Number>(panel: &[T], height: usize, x: &mut [T], sum: &mut [T]) {
                 x[k] -= product;
             }
         }
-        if n == TOGETHER {
-            let factors: [T; TOGETHER] = [x[j], x[j + 1], x[j + 2], x[j + 3]];
-            let columns: [&[T]; TOGETHER] =
-                std::array::from_fn(|a| &panel[(j + a) * height..][..height]);
-            let rest = &mut x[j + n..];
-            subtract(&columns.map(|c| &c[j + n..own]), factors, rest);
-            add(&columns.map(|c| &c[own..]), factors, sum);
-        } else {
-            for a in j..j + n {
-                let column = &panel[a * height..][..height];
-                for (sum, &l) in sum.iter_mut().zip(&column[own..]) {
-                    *sum += l * x[a];
-                }
+        // Fewer than four are filled up with one of them, times nothing.
+        let columns = std::array::from_fn(|a| &panel[(j + a.min(n - 1)) * height + j + n..][..height - j - n]);
+        let factors = std::array::from_fn(|a| if a < n { x[j + a] } else { T::default() });
+        T::subtract_columns(simd, columns, factors, &mut x[j + n..]);
+    }
+}
+
+#[inline(always)]
+fn backward<T: Number, S: Simd>(simd: S, panel: &[T], own: usize, x: &mut [T]) {
+    let height = x.len();
+    for j in (0..own).step_by(TOGETHER).rev() {
+        let n = TOGETHER.min(own - j);
+        let columns: [&[T]; TOGETHER] =
+            std::array::from_fn(|a| &panel[(j + a.min(n - 1)) * height..][..height]);
+        let after = T::dot_columns(simd, columns.map(|c| &c[j + n..]), &x[j + n..]);
+        for a in (0..n).rev() {
+            let mut sum = x[j + a] - after[a];
+            for k in a + 1..n {
+                sum -= columns[a][j + k] * x[j + k];
             }
-        }
-        j += n;
-    }
-}
-
-#[inline(always)]
-fn subtract<T: Number>(columns: &[&[T]; TOGETHER], f: [T; TOGETHER], x: &mut [T]) {
-    let n = x.len();
-    let c = columns.map(|c| &c[..n]);
-    for k in 0..n {
-        x[k] -= c[0][k] * f[0] + c[1][k] * f[1] + (c[2][k] * f[2] + c[3][k] * f[3]);
-    }
-}
-
-#[inline(always)]
-fn add<T: Number>(columns: &[&[T]; TOGETHER], f: [T; TOGETHER], x: &mut [T]) {
-    let n = x.len();
-    let c = columns.map(|c| &c[..n]);
-    for k in 0..n {
-        x[k] += c[0][k] * f[0] + c[1][k] * f[1] + (c[2][k] * f[2] + c[3][k] * f[3]);
-    }
-}
-
-#[inline(always)]
-fn backward<T: Number>(panel: &[T], height: usize, x: &mut [T], later: &[T]) {
-    let own = x.len();
-    for j in (0..own).rev() {
-        let column = &panel[j * height..][..height];
-        let (before, after) = x.split_at_mut(j + 1);
-        let sum = dot(&column[own..], later) + dot(&column[j + 1..own], after);
-        before[j] = (before[j] - sum) / column[j];
-    }
-}
-
-/// A sum in so many lanes, so that it can be vectorised.
-const LANES: usize = 32;
-
-#[inline(always)]
-fn dot<T: Number>(a: &[T], b: &[T]) -> T {
-    let mut lanes = [T::default(); LANES];
-    let (a, b) = (&a[..a.len().min(b.len())], &b[..a.len().min(b.len())]);
-    let (a_chunks, b_chunks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let mut sum = T::default();
-    for (&a, &b) in a_chunks.remainder().iter().zip(b_chunks.remainder()) {
-        sum += a * b;
-    }
-    for (a, b) in a_chunks.zip(b_chunks) {
-        for k in 0..LANES {
-            lanes[k] += a[k] * b[k];
+            x[j + a] = sum / columns[a][j + a];
         }
     }
-    let mut n = LANES;
-    while n > 1 {
-        n /= 2;
-        for k in 0..n {
-            lanes[k] = lanes[k] + lanes[k + n];
-        }
-    }
-    sum + lanes[0]
 }
