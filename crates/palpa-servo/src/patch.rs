@@ -62,6 +62,24 @@ pub struct ToolContact {
     pub stiffness: Mat3,
 }
 
+impl ToolContact {
+    /// A tool that touches nothing.
+    pub const NONE: Self = Self {
+        pose: Pose {
+            rotation: nalgebra::Unit::new_unchecked(nalgebra::Quaternion::from_vector(
+                nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0),
+            )),
+            translation: nalgebra::Translation3 {
+                vector: Vec3::new(0.0, 0.0, 0.0),
+            },
+        },
+        friction: 0.0,
+        is_bonded: false,
+        force: Vec3::new(0.0, 0.0, 0.0),
+        stiffness: Mat3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+}
+
 /// A local model of the tissue under the tools.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPatch {
@@ -86,4 +104,58 @@ pub struct ContactPatch {
 impl ContactPatch {
     /// Distance between columns of the compliance.
     pub const STRIDE: usize = N;
+
+    #[expect(
+        clippy::large_stack_arrays,
+        reason = "a constant, of which the user chooses the place"
+    )]
+    /// A patch that was never written. 270 KB: keep it in a `static` or a box, not on a stack.
+    pub const EMPTY: Self = Self {
+        id: 0,
+        sampled_at: 0.0,
+        period: 0.0,
+        n_tools: 0,
+        tools: [ToolContact::NONE; MAX_TOOLS],
+        n_contacts: 0,
+        contacts: [Candidate::NONE; MAX_CONTACTS],
+        compliance: [0.0; N * N],
+    };
+
+    /// Displacement of candidate `i` per force on candidate `j`, m/N; zero beyond [`MAX_CONTACTS`].
+    pub fn block(&self, i: usize, j: usize) -> Mat3 {
+        let column = |c: usize| {
+            let at = 3 * i + N * (3 * j + c);
+            let entry = |k: usize| self.compliance.get(at + k).copied().unwrap_or(0.0);
+            Vec3::new(entry(0), entry(1), entry(2))
+        };
+        if i < MAX_CONTACTS && j < MAX_CONTACTS {
+            Mat3::from_columns(&[column(0), column(1), column(2)])
+        } else {
+            Mat3::zeros()
+        }
+    }
+
+    /// Sets [`ContactPatch::block`] (i, j), and not its mirror image; does nothing beyond [`MAX_CONTACTS`].
+    pub fn set_block(&mut self, i: usize, j: usize, block: &Mat3) {
+        if i < MAX_CONTACTS && j < MAX_CONTACTS {
+            for (c, column) in block.column_iter().enumerate() {
+                for (k, value) in column.iter().enumerate() {
+                    let at = 3 * i + k + N * (3 * j + c);
+                    if let Some(entry) = self.compliance.get_mut(at) {
+                        *entry = *value;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where the law gets its patches from: the reader's end of a mailbox in which the latest wins. Nothing may wait.
+pub trait PatchSource {
+    /// The patch that the last [`PatchSource::take`] made current.
+    fn current(&self) -> &ContactPatch;
+    /// Whether there is a newer one.
+    fn is_newer(&self) -> bool;
+    /// Makes the newer one current.
+    fn take(&mut self);
 }

@@ -1,0 +1,5 @@
+//! The closed loop, in simulated time.
+
+mod device;
+mod faults;
+mod stability;

@@ -1,0 +1,213 @@
+//! Time: seconds since the engine's start, and waiting for a moment.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
+
+/// Time that never goes back, s.
+pub trait Clock: Clone + Send + 'static {
+    /// Seconds since the clock was made.
+    fn now(&self) -> f64;
+    /// Waits until a moment, s; comes back at once when it has passed. Never early.
+    fn wait_until(&self, moment: f64);
+}
+
+/// The machine's monotonic clock.
+///
+/// Waiting sleeps until an absolute moment less `spin`, and spins for the rest: 0 leaves the core to others.
+#[derive(Debug, Clone, Copy)]
+pub struct RealClock {
+    origin: origin::Origin,
+    spin: f64,
+}
+
+impl RealClock {
+    /// Starts now. The last `spin` seconds of each wait are spent spinning.
+    pub fn new(spin: f64) -> Self {
+        Self {
+            origin: origin::Origin::now(),
+            spin: spin.max(0.0),
+        }
+    }
+}
+
+impl Clock for RealClock {
+    #[inline]
+    fn now(&self) -> f64 {
+        self.origin.elapsed()
+    }
+
+    fn wait_until(&self, moment: f64) {
+        // Not finite: nothing that one can wait for.
+        if !moment.is_finite() {
+            return;
+        }
+        let asleep_until = moment - self.spin;
+        while self.now() < asleep_until {
+            self.origin.sleep_until(asleep_until);
+        }
+        while self.now() < moment {
+            std::hint::spin_loop();
+        }
+    }
+}
+
+/// A clock that stands still until it is told to move: for tests, and for loops that another owns.
+#[derive(Debug, Clone, Default)]
+pub struct ManualClock(Arc<AtomicU64>);
+
+impl ManualClock {
+    /// At zero.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Moves on by `seconds`; the clock does not go back.
+    pub fn advance(&self, seconds: f64) {
+        let later = self.now() + seconds.max(0.0);
+        self.0.store(later.to_bits(), Ordering::Release);
+    }
+}
+
+impl Clock for ManualClock {
+    fn now(&self) -> f64 {
+        f64::from_bits(self.0.load(Ordering::Acquire))
+    }
+
+    /// Jumps to the moment: whoever waits is the only one who moves time.
+    fn wait_until(&self, moment: f64) {
+        self.advance(moment - self.now());
+    }
+}
+
+/// CPU time that the calling thread has used, s.
+#[inline]
+pub fn thread_cpu() -> f64 {
+    // On Linux the clock itself: the same call as elsewhere, without a chance of a panic.
+    #[cfg(target_os = "linux")]
+    {
+        let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        cpu_time::ThreadTime::now().as_duration().as_secs_f64()
+    }
+}
+
+/// Lets a thread that is no part of the 1 kHz path rest.
+pub(crate) fn rest(duration: Duration) {
+    std::thread::park_timeout(duration);
+}
+
+#[cfg(target_os = "linux")]
+mod origin {
+    use rustix::{
+        thread::clock_nanosleep_absolute,
+        time::{ClockId, Timespec, clock_gettime},
+    };
+
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Origin(Timespec);
+
+    impl Origin {
+        pub(super) fn now() -> Self {
+            Self(clock_gettime(ClockId::Monotonic))
+        }
+
+        pub(super) fn elapsed(self) -> f64 {
+            let t = clock_gettime(ClockId::Monotonic);
+            (t.tv_sec - self.0.tv_sec) as f64 + (t.tv_nsec - self.0.tv_nsec) as f64 * 1e-9
+        }
+
+        /// Absolute, so that what happens between reading the clock and falling asleep adds nothing.
+        pub(super) fn sleep_until(self, moment: f64) {
+            let ns = self.0.tv_nsec + (moment * 1e9) as i64;
+            let at = Timespec {
+                tv_sec: self.0.tv_sec + ns.div_euclid(1_000_000_000),
+                tv_nsec: ns.rem_euclid(1_000_000_000),
+            };
+            // Interrupted by a signal: the caller looks at the clock again.
+            let _ = clock_nanosleep_absolute(ClockId::Monotonic, &at);
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod origin {
+    use std::time::{Duration, Instant};
+
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Origin(Instant);
+
+    impl Origin {
+        pub(super) fn now() -> Self {
+            Self(Instant::now())
+        }
+
+        pub(super) fn elapsed(self) -> f64 {
+            self.0.elapsed().as_secs_f64()
+        }
+
+        #[expect(
+            clippy::disallowed_methods,
+            reason = "the one place that waits, on systems without an absolute sleep"
+        )]
+        pub(super) fn sleep_until(self, moment: f64) {
+            let rest = moment - self.elapsed();
+            if rest > 0.0 {
+                std::thread::sleep(Duration::from_secs_f64(rest));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wait_is_never_early_and_a_past_moment_is_no_wait() {
+        let clock = RealClock::new(1e-4);
+        for k in 1..=5 {
+            let moment = clock.now() + f64::from(k) * 3e-4;
+            clock.wait_until(moment);
+            assert!(clock.now() >= moment);
+        }
+        clock.wait_until(-1.0);
+        clock.wait_until(f64::NAN);
+    }
+
+    #[test]
+    fn work_costs_cpu_time_and_waiting_hardly_any() {
+        let clock = RealClock::new(0.0);
+        let t0 = thread_cpu();
+        clock.wait_until(clock.now() + 0.05);
+        let t1 = thread_cpu();
+        let mut x = 1.0_f64;
+        for _ in 0..2_000_000 {
+            x = std::hint::black_box(x * 1.000_000_1);
+        }
+        let t2 = thread_cpu();
+        assert!(
+            t1 - t0 < 0.5 * 0.05,
+            "{} s of CPU while waiting 0.05 s",
+            t1 - t0
+        );
+        assert!(t2 > t1 && x > 1.0);
+    }
+
+    #[test]
+    fn a_manual_clock_moves_only_when_told() {
+        let clock = ManualClock::new();
+        let other = clock.clone();
+        clock.advance(0.5);
+        other.wait_until(0.75);
+        clock.wait_until(0.1);
+        assert!((clock.now() - 0.75).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,510 @@
+//! The engine: threads, mailboxes and rings put together, started, watched and stopped.
+
+use crate::{
+    clock::RealClock,
+    event::{Level, Speaker},
+    fault::FaultHooks,
+    findings::Board,
+    histogram::Quantiles,
+    mailbox::{Reader, mailbox},
+    record::StepRecord,
+    recorder::{EventRow, LogFile, Recorder, RecorderParams},
+    servo_loop::{LoopStats, Now, ServoLoop, TickEntry},
+    smoothness::{ForceReport, ForceStats},
+    threads::{Granted, Priority, Wish, lock_memory},
+    tissue::{Tissue, empty_patch},
+    tissue_thread::{
+        Background, PoseSample, TissueParams, TissueStats, TissueThread, run_background,
+    },
+};
+use palpa_device::HapticDevice;
+use palpa_servo::{DeviceSpec, MAX_TOOLS, Servo, ServoParams};
+use rtrb::{Producer, RingBuffer};
+use std::{
+    io,
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc,
+    },
+    thread::{self, JoinHandle, Thread},
+};
+
+/// Room in the rings to the recorder, in ticks and steps: eight seconds at 1 kHz.
+const RING: usize = 8192;
+const EVENT_RING: usize = 1024;
+/// Solvers may put small matrices on the stack.
+const TISSUE_STACK: usize = 16 << 20;
+const SMALL_STACK: usize = 2 << 20;
+
+/// How an engine runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EngineParams {
+    /// Period of the loop, s.
+    pub period: f64,
+    /// The law; its period is set to the loop's.
+    pub servo: ServoParams,
+    /// The tissue's thread.
+    pub tissue: TissueParams,
+    /// How long the loop spins before each tick instead of sleeping, s: less lateness for more CPU.
+    pub spin: f64,
+    /// What the loop's thread wishes for.
+    pub servo_wish: Wish,
+    /// What the tissue's thread wishes for.
+    pub tissue_wish: Wish,
+    /// What the background's and the recorder's threads wish for.
+    pub background_wish: Wish,
+    /// Whether memory shall be kept in RAM.
+    pub lock_memory: bool,
+}
+
+impl Default for EngineParams {
+    fn default() -> Self {
+        Self {
+            period: 1e-3,
+            servo: ServoParams::default(),
+            tissue: TissueParams::default(),
+            spin: 0.0,
+            servo_wish: Wish {
+                priority: Priority::RealTime(80),
+                core: None,
+            },
+            tissue_wish: Wish::NORMAL,
+            background_wish: Wish {
+                priority: Priority::Nice(10),
+                core: None,
+            },
+            lock_memory: true,
+        }
+    }
+}
+
+/// Why an engine cannot start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StartError {
+    /// No device, or more than the law can serve.
+    #[error("{found} devices; from 1 to {MAX_TOOLS} can be served")]
+    Devices {
+        /// How many there were.
+        found: usize,
+    },
+    /// The period is no time, s.
+    #[error("a period of {period} s; expected more than 0 and at most 0.1 s")]
+    Period {
+        /// What it was.
+        period: f64,
+    },
+    /// The log cannot be created.
+    #[error("{}: the log cannot be created: {source}", path.display())]
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: mcap::McapError,
+    },
+    /// The system gives no thread.
+    #[error("no thread: {0}")]
+    Thread(#[from] io::Error),
+}
+
+/// A running engine. Dropping it stops it: forces ramp down, devices are let go, the log is closed.
+#[derive(Debug)]
+pub struct Engine {
+    clock: RealClock,
+    granted: Vec<Granted>,
+    memory_locked: Result<(), String>,
+    faults: Arc<FaultHooks>,
+    loop_stats: Arc<LoopStats>,
+    tissue_stats: Arc<TissueStats>,
+    findings: Board,
+    tick_view: Reader<TickEntry>,
+    step_view: Reader<StepRecord>,
+    log: Option<PathBuf>,
+    /// In the order of their start: recorder, background, tissue, loop. Stopped from the last to the first, so that
+    /// whoever is spoken to outlives who speaks.
+    threads: Vec<Running>,
+    panicked: Vec<&'static str>,
+}
+
+#[derive(Debug)]
+struct Running {
+    name: &'static str,
+    stop: Arc<AtomicBool>,
+    handle: JoinHandle<()>,
+}
+
+/// The ends of the recorder's rings that the others push into.
+struct Rings {
+    ticks: Producer<TickEntry>,
+    steps: Producer<StepRecord>,
+    servo: Speaker,
+    tissue: Speaker,
+}
+
+/// The latest that is known of a running engine.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Snapshot {
+    /// The last tick; tick 0 before the first.
+    pub tick: TickEntry,
+    /// The tissue's last step; step 0 before the first.
+    pub step: StepRecord,
+}
+
+/// How a run went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// How long it ran, s.
+    pub duration: f64,
+    /// Ticks done.
+    pub ticks: u64,
+    /// Ticks left out: missed deadlines.
+    pub skipped: u64,
+    /// CPU time of a tick, s.
+    pub tick_cpu: Quantiles,
+    /// Lateness of a tick, s.
+    pub lateness: Quantiles,
+    /// Histogram of the CPU time of ticks: lower end, upper end (s), count.
+    pub tick_cpu_histogram: Vec<(f64, f64, u64)>,
+    /// Histogram of lateness.
+    pub lateness_histogram: Vec<(f64, f64, u64)>,
+    /// Force of each device.
+    pub forces: Vec<ForceReport>,
+    /// Steps of the tissue.
+    pub steps: u64,
+    /// Steps per second.
+    pub step_rate: f64,
+    /// CPU time of a step, s.
+    pub step_cpu: Quantiles,
+    /// Wall time of a step, s.
+    pub step_wall: Quantiles,
+    /// Steps whose patch was held back.
+    pub held_back: u64,
+    /// CPU time of background jobs, s each.
+    pub jobs: Quantiles,
+    /// CPU time of all background jobs as a share of the run.
+    pub background_cpu_share: f64,
+    /// Ticks and steps that are not in the log because a ring was full.
+    pub lost_records: [u64; 2],
+    /// Whether the log could not be written to its end.
+    pub has_log_failed: bool,
+    /// Threads that panicked.
+    pub panicked: Vec<&'static str>,
+    /// What happened.
+    pub events: Vec<EventRow>,
+    /// What the threads were granted.
+    pub granted: Vec<Granted>,
+    /// Whether memory was locked, or why not.
+    pub memory_locked: Result<(), String>,
+    /// The log.
+    pub log: Option<PathBuf>,
+}
+
+impl Engine {
+    /// Starts all threads.
+    ///
+    /// # Errors
+    /// [`StartError`]; then nothing runs.
+    pub fn start<T: Tissue + 'static>(
+        tissue: T,
+        devices: Vec<Box<dyn HapticDevice>>,
+        params: &EngineParams,
+        recorder: &RecorderParams,
+    ) -> Result<Self, StartError> {
+        let (mut engine, mut servo_loop) = Self::start_driven(tissue, devices, params, recorder)?;
+        let (clock, period, faults) = (engine.clock, params.period, engine.faults.clone());
+        engine.spawn("palpa-servo", params.servo_wish, SMALL_STACK, move |stop| {
+            servo_loop.run(&clock, period, &faults, stop);
+        })?;
+        Ok(engine)
+    }
+
+    /// Starts all threads but that of the loop: whoever gets the [`ServoLoop`] calls it, as from a vendor's callback,
+    /// with times of [`Engine::now`].
+    ///
+    /// # Errors
+    /// [`StartError`]; then nothing runs.
+    pub fn start_driven<T: Tissue + 'static>(
+        tissue: T,
+        devices: Vec<Box<dyn HapticDevice>>,
+        params: &EngineParams,
+        recorder: &RecorderParams,
+    ) -> Result<(Self, ServoLoop), StartError> {
+        if devices.is_empty() || devices.len() > MAX_TOOLS {
+            return Err(StartError::Devices {
+                found: devices.len(),
+            });
+        }
+        if !(params.period > 0.0 && params.period <= 0.1) {
+            return Err(StartError::Period {
+                period: params.period,
+            });
+        }
+        let specs: Vec<DeviceSpec> = devices.iter().map(|d| d.spec()).collect();
+        let (tick_writer, tick_view) = mailbox([(); 3].map(|()| Box::<TickEntry>::default()));
+        let (step_writer, step_view) = mailbox([(); 3].map(|()| Box::<StepRecord>::default()));
+        let mut engine = Self {
+            clock: RealClock::new(params.spin),
+            granted: Vec::new(),
+            memory_locked: Err("not asked for".to_owned()),
+            faults: Arc::default(),
+            loop_stats: Arc::default(),
+            tissue_stats: Arc::default(),
+            findings: Board::default(),
+            tick_view,
+            step_view,
+            log: recorder.path.clone(),
+            threads: Vec::new(),
+            panicked: Vec::new(),
+        };
+        let servo_params = ServoParams {
+            period: params.period,
+            ..params.servo
+        };
+        let rings = engine.start_recorder(params, &servo_params, recorder, &specs)?;
+        let background = engine.start_background::<T>(params)?;
+        let (patch_writer, patch_reader) = mailbox([(); 3].map(|()| empty_patch()));
+        let (pose_writer, pose_reader) = mailbox([(); 3].map(|()| Box::new(PoseSample::none())));
+        let tissue = TissueThread {
+            tissue,
+            clock: engine.clock,
+            params: params.tissue,
+            poses: pose_reader,
+            patches: patch_writer,
+            view: step_writer,
+            ring: rings.steps,
+            speaker: rings.tissue,
+            background,
+            faults: engine.faults.clone(),
+            stats: engine.tissue_stats.clone(),
+        };
+        engine.spawn("palpa-tissue", params.tissue_wish, TISSUE_STACK, |stop| {
+            tissue.run(stop);
+        })?;
+        let servo_loop = ServoLoop {
+            servo: Box::new(Servo::new(&servo_params, &specs)),
+            now: Now::new(devices.len()),
+            devices,
+            patches: patch_reader,
+            poses: pose_writer,
+            view: tick_writer,
+            ring: rings.ticks,
+            speaker: rings.servo,
+            stats: engine.loop_stats.clone(),
+        };
+        // Last: what was made above is locked too.
+        if params.lock_memory {
+            engine.memory_locked = lock_memory();
+        }
+        Ok((engine, servo_loop))
+    }
+
+    fn start_recorder(
+        &mut self,
+        params: &EngineParams,
+        servo: &ServoParams,
+        recorder: &RecorderParams,
+        specs: &[DeviceSpec],
+    ) -> Result<Rings, StartError> {
+        let create = |path: &PathBuf| {
+            LogFile::create(recorder, path, specs, servo, self.now()).map_err(|source| {
+                StartError::Log {
+                    path: path.clone(),
+                    source,
+                }
+            })
+        };
+        let file = recorder.path.as_ref().map(create).transpose()?;
+        let (tick_ring, ticks) = RingBuffer::new(RING);
+        let (step_ring, steps) = RingBuffer::new(RING);
+        let (servo_speaker, servo_events) = RingBuffer::new(EVENT_RING);
+        let (tissue, tissue_events) = RingBuffer::new(EVENT_RING);
+        let (loop_stats, tissue_stats) = (self.loop_stats.clone(), self.tissue_stats.clone());
+        let recorder = Recorder {
+            ticks,
+            steps,
+            events: vec![servo_events, tissue_events],
+            file,
+            forces: specs
+                .iter()
+                .map(|_| ForceStats::new(params.period))
+                .collect(),
+            findings: self.findings.clone(),
+            counts_lost: Box::new(move || {
+                [
+                    ("ticks", loop_stats.lost_records.load(Ordering::Relaxed)),
+                    (
+                        "tissue steps",
+                        tissue_stats.lost_records.load(Ordering::Relaxed),
+                    ),
+                ]
+            }),
+            said_lost: [0; 2],
+            last_time: 0.0,
+        };
+        self.spawn(
+            "palpa-recorder",
+            params.background_wish,
+            SMALL_STACK,
+            |stop| recorder.run(stop),
+        )?;
+        Ok(Rings {
+            ticks: tick_ring,
+            steps: step_ring,
+            servo: Speaker::new(servo_speaker),
+            tissue: Speaker::new(tissue),
+        })
+    }
+
+    fn start_background<T: Tissue>(
+        &mut self,
+        params: &EngineParams,
+    ) -> Result<Background<T>, StartError> {
+        let (job_ring, mut jobs) = RingBuffer::new(1);
+        let (mut done_ring, done) = RingBuffer::new(1);
+        let stats = self.tissue_stats.clone();
+        let thread = self.spawn(
+            "palpa-background",
+            params.background_wish,
+            TISSUE_STACK,
+            move |stop| {
+                run_background::<T>(&mut jobs, &mut done_ring, stop, &stats);
+            },
+        )?;
+        Ok(Background {
+            jobs: job_ring,
+            done,
+            thread,
+            is_busy: false,
+        })
+    }
+
+    /// Seconds since the start.
+    pub fn now(&self) -> f64 {
+        use crate::clock::Clock;
+        self.clock.now()
+    }
+
+    /// The latest tick and step.
+    pub fn snapshot(&mut self) -> Snapshot {
+        self.tick_view.take();
+        self.step_view.take();
+        Snapshot {
+            tick: *self.tick_view.current(),
+            step: *self.step_view.current(),
+        }
+    }
+
+    /// Switches for faults on purpose.
+    pub fn faults(&self) -> &FaultHooks {
+        &self.faults
+    }
+
+    /// How the loop fares.
+    pub fn loop_stats(&self) -> &LoopStats {
+        &self.loop_stats
+    }
+
+    /// How the tissue fares.
+    pub fn tissue_stats(&self) -> &TissueStats {
+        &self.tissue_stats
+    }
+
+    /// What the threads were granted.
+    pub fn granted(&self) -> &[Granted] {
+        &self.granted
+    }
+
+    /// Stops: forces ramp down, devices are let go, what is in the rings is written, the log is closed.
+    pub fn stop(mut self) -> Report {
+        self.shut_down();
+        self.report()
+    }
+
+    /// How the run went so far.
+    pub fn report(&self) -> Report {
+        let findings = self.findings.lock();
+        let duration = self.now();
+        let steps = self.tissue_stats.wall.count();
+        let jobs = self.tissue_stats.background.quantiles();
+        Report {
+            duration,
+            ticks: self.loop_stats.ticks.load(Ordering::Relaxed),
+            skipped: self.loop_stats.skipped.load(Ordering::Relaxed),
+            tick_cpu: self.loop_stats.cpu.quantiles(),
+            lateness: self.loop_stats.lateness.quantiles(),
+            tick_cpu_histogram: self.loop_stats.cpu.filled(),
+            lateness_histogram: self.loop_stats.lateness.filled(),
+            forces: findings.forces.clone(),
+            steps,
+            step_rate: steps as f64 / duration.max(1e-9),
+            step_cpu: self.tissue_stats.cpu.quantiles(),
+            step_wall: self.tissue_stats.wall.quantiles(),
+            held_back: self.tissue_stats.held_back.load(Ordering::Relaxed),
+            jobs,
+            background_cpu_share: jobs.mean * jobs.count as f64 / duration.max(1e-9),
+            lost_records: [
+                self.loop_stats.lost_records.load(Ordering::Relaxed),
+                self.tissue_stats.lost_records.load(Ordering::Relaxed),
+            ],
+            has_log_failed: findings.has_file_failed,
+            panicked: self.panicked.clone(),
+            events: findings.events.clone(),
+            granted: self.granted.clone(),
+            memory_locked: self.memory_locked.clone(),
+            log: self.log.clone(),
+        }
+    }
+
+    fn spawn(
+        &mut self,
+        name: &'static str,
+        wish: Wish,
+        stack: usize,
+        body: impl FnOnce(&AtomicBool) + Send + 'static,
+    ) -> Result<Thread, StartError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let its_stop = stop.clone();
+        #[expect(
+            clippy::disallowed_methods,
+            reason = "one answer before the thread does anything else"
+        )]
+        let (tell, told) = mpsc::channel();
+        let builder = thread::Builder::new()
+            .name(name.to_owned())
+            .stack_size(stack);
+        let handle = builder.spawn(move || {
+            // Only the thread itself can ask. Nobody listens any more: then nobody wants to know.
+            let _ = tell.send(wish.ask(name));
+            body(&its_stop);
+        })?;
+        let thread = handle.thread().clone();
+        self.threads.push(Running { name, stop, handle });
+        self.granted.extend(told.recv());
+        Ok(thread)
+    }
+
+    fn shut_down(&mut self) {
+        while let Some(running) = self.threads.pop() {
+            running.stop.store(true, Ordering::Release);
+            running.handle.thread().unpark();
+            if running.handle.join().is_err() {
+                self.panicked.push(running.name);
+            }
+        }
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.shut_down();
+    }
+}
+
+impl Report {
+    /// What happened that was an error or worse than it should be.
+    pub fn warnings(&self) -> impl Iterator<Item = &EventRow> {
+        self.events.iter().filter(|e| e.level >= Level::Warning)
+    }
+}

@@ -1,0 +1,176 @@
+//! Logs as tables: one file per channel, a column per number.
+
+#[cfg(feature = "parquet")]
+mod parquet;
+
+use crate::{
+    log::{LogError, Row, Rows},
+    record::{DeviceRecord, Record, StepRecord, TickRecord, Value},
+    recorder::EventRow,
+};
+use palpa_servo::MAX_TOOLS;
+use std::{
+    fs::File,
+    io,
+    path::{Path, PathBuf},
+};
+
+/// Kinds of table files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Table {
+    /// Comma-separated text; reals with as many digits as it takes to read the same bits.
+    Csv,
+    /// Apache Parquet, compressed with Snappy.
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+/// Why a log could not be exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The log cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A table cannot be written.
+    #[error("{}: cannot be written: {reason}", path.display())]
+    Write {
+        /// The table.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Writes a log as tables `ticks`, `device0`…, `steps` and, always as text, `events.csv` into a folder, which is made
+/// if need be. The log is read as it goes; memory does not grow with its length. Returns the files.
+///
+/// # Errors
+/// [`ExportError`]
+pub fn export(
+    log: impl AsRef<Path>,
+    folder: impl AsRef<Path>,
+    table: Table,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let folder = folder.as_ref();
+    let rows = Rows::open(log)?;
+    std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
+    let mut ticks = Sink::new::<TickRecord>(folder, "ticks", table)?;
+    let mut devices: [Option<Sink>; MAX_TOOLS] = Default::default();
+    let mut steps = Sink::new::<StepRecord>(folder, "steps", table)?;
+    let events_path = folder.join("events.csv");
+    let mut events = csv::Writer::from_path(&events_path).map_err(|e| failed(&events_path, &e))?;
+    (events.write_record(["time", "level", "text"])).map_err(|e| failed(&events_path, &e))?;
+    for row in rows {
+        match row? {
+            Row::Tick(tick) => ticks.add(&tick)?,
+            Row::Step(step) => steps.add(&step)?,
+            Row::Device(k, device) => {
+                let Some(place) = devices.get_mut(k) else {
+                    continue;
+                };
+                let sink = match place {
+                    Some(sink) => sink,
+                    None => place.insert(Sink::new::<DeviceRecord>(
+                        folder,
+                        &format!("device{k}"),
+                        table,
+                    )?),
+                };
+                sink.add(&device)?;
+            }
+            Row::Event(EventRow { time, level, text }) => {
+                let level = format!("{level:?}").to_lowercase();
+                (events.write_record([&time.to_string(), &level, &text]))
+                    .map_err(|e| failed(&events_path, &e))?;
+            }
+            Row::Header(_) | Row::Spec(_) | Row::Servo(_) => {}
+        }
+    }
+    events.flush().map_err(|e| failed(&events_path, &e))?;
+    let mut files = Vec::new();
+    for sink in [ticks, steps]
+        .into_iter()
+        .chain(devices.into_iter().flatten())
+    {
+        files.push(sink.finish()?);
+    }
+    files.push(events_path);
+    Ok(files)
+}
+
+/// A table being written.
+struct Sink {
+    path: PathBuf,
+    values: Vec<Value>,
+    file: Writer,
+}
+
+enum Writer {
+    Csv(Box<csv::Writer<File>>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::ParquetTable>),
+}
+
+impl Sink {
+    fn new<R: Record>(folder: &Path, name: &str, table: Table) -> Result<Self, ExportError> {
+        let (path, file) = match table {
+            Table::Csv => {
+                let path = folder.join(format!("{name}.csv"));
+                let mut writer = csv::Writer::from_path(&path).map_err(|e| failed(&path, &e))?;
+                writer
+                    .write_record(R::columns())
+                    .map_err(|e| failed(&path, &e))?;
+                (path, Writer::Csv(Box::new(writer)))
+            }
+            #[cfg(feature = "parquet")]
+            Table::Parquet => {
+                let path = folder.join(format!("{name}.parquet"));
+                let writer =
+                    parquet::ParquetTable::create::<R>(&path).map_err(|e| failed(&path, &e))?;
+                (path, Writer::Parquet(Box::new(writer)))
+            }
+        };
+        Ok(Self {
+            path,
+            values: Vec::new(),
+            file,
+        })
+    }
+
+    fn add(&mut self, record: &impl Record) -> Result<(), ExportError> {
+        self.values.clear();
+        record.values(&mut self.values);
+        let result = match &mut self.file {
+            Writer::Csv(writer) => {
+                let texts = self.values.iter().map(|value| match value {
+                    Value::F64(v) => v.to_string(),
+                    Value::U64(v) => v.to_string(),
+                    Value::Bool(v) => v.to_string(),
+                });
+                writer.write_record(texts).map_err(|e| e.to_string())
+            }
+            #[cfg(feature = "parquet")]
+            Writer::Parquet(writer) => writer.add(&self.values).map_err(|e| e.to_string()),
+        };
+        result.map_err(|reason| failed(&self.path, &reason))
+    }
+
+    fn finish(self) -> Result<PathBuf, ExportError> {
+        let result = match self.file {
+            Writer::Csv(mut writer) => writer.flush().map_err(|e: io::Error| e.to_string()),
+            #[cfg(feature = "parquet")]
+            Writer::Parquet(writer) => writer.finish().map_err(|e| e.to_string()),
+        };
+        result.map_err(|reason| failed(&self.path, &reason))?;
+        Ok(self.path)
+    }
+}
+
+fn failed(path: &Path, reason: &impl ToString) -> ExportError {
+    ExportError::Write {
+        path: path.to_owned(),
+        reason: reason.to_string(),
+    }
+}

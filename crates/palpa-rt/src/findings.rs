@@ -1,0 +1,27 @@
+//! What the recorder has found so far, for whoever asks.
+#![expect(
+    clippy::disallowed_types,
+    reason = "shared by the recorder and those who ask it; no thread of the 1 kHz path knows of it"
+)]
+
+use crate::{recorder::EventRow, smoothness::ForceReport};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What was found.
+#[derive(Debug, Default)]
+pub(crate) struct Findings {
+    pub(crate) forces: Vec<ForceReport>,
+    pub(crate) events: Vec<EventRow>,
+    pub(crate) has_file_failed: bool,
+}
+
+/// Where it is kept.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Board(Arc<Mutex<Findings>>);
+
+impl Board {
+    /// Whoever held it and panicked left only whole values behind.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Findings> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,344 @@
+//! Reading logs back.
+
+use crate::{
+    event::Level,
+    record::{DeviceRecord, Record, ServoRecord, SpecRecord, StepRecord, TickRecord},
+    recorder::{
+        EventRow, FORMAT, TOPIC_DEVICE, TOPIC_EVENT, TOPIC_HEADER, TOPIC_SERVO, TOPIC_SPEC,
+        TOPIC_STEP, TOPIC_TICK,
+    },
+    servo_loop::TickEntry,
+    smoothness::{ForceReport, ForceStats},
+};
+use mcap::{
+    McapError, parse_record,
+    records::Record as Mcap,
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
+};
+use palpa_servo::{DeviceSpec, MAX_TOOLS, ServoParams};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+/// Why a log cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// It is no MCAP file, or damaged where it should not be.
+    #[error("{}: not a readable log: {reason}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// A row of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Row {
+    /// What the log was made with.
+    Header(Header),
+    /// A device and what it can do.
+    Spec(SpecRecord),
+    /// Settings of the law.
+    Servo(ServoRecord),
+    /// A tick.
+    Tick(TickRecord),
+    /// A device in the tick just before.
+    Device(usize, DeviceRecord),
+    /// A step of the tissue.
+    Step(StepRecord),
+    /// Something that happened.
+    Event(EventRow),
+}
+
+/// What a log was made with.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Header {
+    /// Version of palpa.
+    pub palpa: String,
+    /// Features of the processor; on others a replay need not agree to the bit.
+    pub cpu: String,
+    /// Period of the loop, s.
+    pub period: f64,
+    /// The scene, as text.
+    pub scene: String,
+    /// Whatever else was noted.
+    pub notes: BTreeMap<String, String>,
+}
+
+/// The rows of a log, in the order in which they were written, read as they are asked for.
+pub struct Rows {
+    path: PathBuf,
+    file: File,
+    reader: LinearReader,
+    topics: BTreeMap<u16, Topic>,
+    is_whole: bool,
+    is_over: bool,
+}
+
+/// A whole log in memory.
+#[derive(Debug, Clone, Default)]
+pub struct Log {
+    /// What it was made with.
+    pub header: Header,
+    /// Its devices.
+    pub specs: Vec<DeviceSpec>,
+    /// Settings of the law.
+    pub servo: ServoParams,
+    /// Its ticks with their devices.
+    pub ticks: Vec<TickEntry>,
+    /// The tissue's steps.
+    pub steps: Vec<StepRecord>,
+    /// What happened.
+    pub events: Vec<EventRow>,
+    /// Whether it was closed properly; if not, it reaches to the last chunk that was written whole.
+    pub is_whole: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Topic {
+    Header,
+    Spec,
+    Servo,
+    Tick,
+    Device(usize),
+    Step,
+    Event,
+    Other,
+}
+
+impl Log {
+    /// Reads a log into memory: about 0.5 MB per second of recording.
+    ///
+    /// # Errors
+    /// [`LogError`]; a log that ends too early is none.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
+        let mut log = Self::default();
+        let mut rows = Rows::open(path)?;
+        for row in &mut rows {
+            match row? {
+                Row::Header(header) => log.header = header,
+                Row::Spec(spec) => log.specs.push(spec.spec()),
+                Row::Servo(servo) => log.servo = (&servo).into(),
+                Row::Tick(tick) => log.ticks.push(TickEntry {
+                    tick,
+                    ..TickEntry::default()
+                }),
+                Row::Device(k, device) => {
+                    if let Some(entry) = log.ticks.last_mut().filter(|e| e.tick.tick == device.tick)
+                        && let Some(place) = entry.devices.get_mut(k)
+                    {
+                        *place = device;
+                    }
+                }
+                Row::Step(step) => log.steps.push(step),
+                Row::Event(event) => log.events.push(event),
+            }
+        }
+        log.is_whole = rows.is_whole;
+        Ok(log)
+    }
+
+    /// Smoothness and energy of each device's force.
+    pub fn forces(&self) -> Vec<ForceReport> {
+        (0..self.specs.len())
+            .map(|k| {
+                let mut stats = ForceStats::new(self.header.period);
+                for entry in &self.ticks {
+                    stats.add(entry, k);
+                }
+                stats.report()
+            })
+            .collect()
+    }
+}
+
+impl Rows {
+    /// Opens a log.
+    ///
+    /// # Errors
+    /// [`LogError::Io`] if there is no such file.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
+        let path = path.as_ref().to_owned();
+        let file = File::open(&path).map_err(|source| LogError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        // A chunk is checked before any of it is used: one that was cut off is left out whole.
+        let options = LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(1 << 30);
+        Ok(Self {
+            path,
+            file,
+            reader: LinearReader::new_with_options(options),
+            topics: BTreeMap::new(),
+            is_whole: false,
+            is_over: false,
+        })
+    }
+
+    fn broken(&self, reason: impl Into<String>) -> LogError {
+        LogError::Broken {
+            path: self.path.clone(),
+            reason: reason.into(),
+        }
+    }
+
+    fn read_on(&mut self) -> Result<Option<Row>, LogError> {
+        loop {
+            let row = match self.reader.next_event() {
+                None => {
+                    self.is_whole = true;
+                    return Ok(None);
+                }
+                Some(Err(McapError::UnexpectedEof)) => return self.end_early(),
+                Some(Err(error)) => {
+                    // A chunk half written: what comes before it is good.
+                    return if self.topics.is_empty() {
+                        Err(self.broken(error.to_string()))
+                    } else {
+                        Ok(None)
+                    };
+                }
+                Some(Ok(LinearReadEvent::ReadRequest(n))) => {
+                    let read = self.file.read(self.reader.insert(n));
+                    let n = read.map_err(|source| LogError::Io {
+                        path: self.path.clone(),
+                        source,
+                    })?;
+                    self.reader.notify_read(n);
+                    continue;
+                }
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                    let record = parse_record(opcode, data).map_err(|e| e.to_string());
+                    row_of(&mut self.topics, record)
+                }
+            };
+            match row {
+                Ok(Some(row)) => return Ok(Some(row)),
+                Ok(None) => {}
+                Err(reason) => return Err(self.broken(reason)),
+            }
+        }
+    }
+
+    fn end_early(&self) -> Result<Option<Row>, LogError> {
+        if self.topics.is_empty() {
+            return Err(self.broken("it ends before its first channel"));
+        }
+        Ok(None)
+    }
+}
+
+impl fmt::Debug for Rows {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Rows")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Iterator for Rows {
+    type Item = Result<Row, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        let row = self.read_on().transpose();
+        self.is_over = !matches!(row, Some(Ok(_)));
+        row
+    }
+}
+
+fn row_of(
+    topics: &mut BTreeMap<u16, Topic>,
+    record: Result<Mcap<'_>, String>,
+) -> Result<Option<Row>, String> {
+    match record? {
+        Mcap::Channel(channel) => {
+            topics.insert(channel.id, topic_of(&channel.topic));
+            Ok(None)
+        }
+        Mcap::Message { header, data } => {
+            let topic = *topics.get(&header.channel_id).unwrap_or(&Topic::Other);
+            let short = || format!("message {} on {topic:?} is too short", header.sequence);
+            Ok(Some(match topic {
+                Topic::Header => Row::Header(header_of(&data)?),
+                Topic::Spec => Row::Spec(Record::decode(&data).ok_or_else(short)?),
+                Topic::Servo => Row::Servo(Record::decode(&data).ok_or_else(short)?),
+                Topic::Tick => Row::Tick(Record::decode(&data).ok_or_else(short)?),
+                Topic::Device(k) => Row::Device(k, Record::decode(&data).ok_or_else(short)?),
+                Topic::Step => Row::Step(Record::decode(&data).ok_or_else(short)?),
+                Topic::Event => Row::Event(event_of(&data).ok_or_else(short)?),
+                Topic::Other => return Ok(None),
+            }))
+        }
+        _ => Ok(None),
+    }
+}
+
+fn topic_of(name: &str) -> Topic {
+    match name {
+        TOPIC_HEADER => Topic::Header,
+        TOPIC_SPEC => Topic::Spec,
+        TOPIC_SERVO => Topic::Servo,
+        TOPIC_TICK => Topic::Tick,
+        TOPIC_STEP => Topic::Step,
+        TOPIC_EVENT => Topic::Event,
+        _ => (name.strip_prefix(TOPIC_DEVICE))
+            .and_then(|k| k.parse().ok())
+            .filter(|k| *k < MAX_TOOLS)
+            .map_or(Topic::Other, Topic::Device),
+    }
+}
+
+fn header_of(bytes: &[u8]) -> Result<Header, String> {
+    let json: serde_json::Value =
+        serde_json::from_slice(bytes).map_err(|e| format!("header: {e}"))?;
+    let format = json["format"].as_u64().unwrap_or(0);
+    if format != FORMAT {
+        return Err(format!(
+            "header: layout {format}, this version reads {FORMAT}"
+        ));
+    }
+    let text = |key: &str| json[key].as_str().unwrap_or_default().to_owned();
+    let notes = json["notes"].as_object().into_iter().flatten();
+    Ok(Header {
+        palpa: text("palpa"),
+        cpu: text("cpu"),
+        period: json["period"].as_f64().unwrap_or_default(),
+        scene: text("scene"),
+        notes: notes
+            .map(|(k, v)| (k.clone(), v.as_str().unwrap_or_default().to_owned()))
+            .collect(),
+    })
+}
+
+fn event_of(mut bytes: &[u8]) -> Option<EventRow> {
+    use crate::record::Field;
+    let time = f64::get(&mut bytes)?;
+    let level = match u8::get(&mut bytes)? {
+        0 => Level::Info,
+        1 => Level::Warning,
+        _ => Level::Error,
+    };
+    let n = u32::get(&mut bytes)? as usize;
+    let text = String::from_utf8_lossy(bytes.get(..n)?).into_owned();
+    Some(EventRow { time, level, text })
+}

@@ -1,0 +1,426 @@
+//! The 1 kHz loop: read the devices, ask the law, write the devices, leave a record.
+
+use crate::{
+    clock::{Clock, thread_cpu},
+    event::{Happening, Speaker},
+    fault::FaultHooks,
+    histogram::Histogram,
+    mailbox::{Reader, Writer},
+    record::{DeviceRecord, TickRecord},
+    tissue_thread::PoseSample,
+};
+use palpa_device::{DeviceFault, HapticDevice};
+use palpa_servo::{
+    ContactPatch, DeviceState, Faults, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo,
+    TickReport, ToolReport,
+};
+use rtrb::Producer;
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+};
+
+/// When the loop is told to stop, forces ramp down for at most so many ticks before the devices are let go.
+const LAST_TICKS: u32 = 200;
+/// Missed deadlines are said at most so often, s.
+const SAY_EVERY: f64 = 0.1;
+
+/// Everything that a tick leaves behind.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TickEntry {
+    /// The tick.
+    pub tick: TickRecord,
+    /// Its devices; those past `tick.n_devices` mean nothing.
+    pub devices: [DeviceRecord; MAX_TOOLS],
+}
+
+/// How the loop fared; read by anyone at any time.
+#[derive(Debug, Default)]
+pub struct LoopStats {
+    /// CPU time of ticks.
+    pub cpu: Histogram,
+    /// How late ticks began.
+    pub lateness: Histogram,
+    /// Ticks done.
+    pub ticks: AtomicU64,
+    /// Ticks left out because the one before them took too long or the thread was woken too late.
+    pub skipped: AtomicU64,
+    /// Ticks not recorded because the ring was full.
+    pub lost_records: AtomicU64,
+}
+
+/// The 1 kHz loop without its thread: whoever owns the moment of a tick, we or a vendor's callback, calls
+/// [`ServoLoop::tick_once`]. Dropping it writes zero to the devices.
+pub struct ServoLoop {
+    pub(crate) servo: Box<Servo>,
+    pub(crate) devices: Vec<Box<dyn HapticDevice>>,
+    pub(crate) patches: Reader<ContactPatch>,
+    pub(crate) poses: Writer<PoseSample>,
+    pub(crate) view: Writer<TickEntry>,
+    pub(crate) ring: Producer<TickEntry>,
+    pub(crate) speaker: Speaker,
+    pub(crate) stats: Arc<LoopStats>,
+    pub(crate) now: Now,
+}
+
+/// What lasts from tick to tick.
+pub(crate) struct Now {
+    tick: u64,
+    time: f64,
+    sample: PoseSample,
+    states: [Option<DeviceState>; MAX_TOOLS],
+    commands: [ForceCommand; MAX_TOOLS],
+    /// For how many ticks a device has been away.
+    away: [u64; MAX_TOOLS],
+    is_written: [bool; MAX_TOOLS],
+    faults: Faults,
+    skipped: u64,
+    longest_gap: f64,
+    said_at: f64,
+    is_letting_go: bool,
+}
+
+impl Now {
+    pub(crate) fn new(n_devices: usize) -> Self {
+        Self {
+            tick: 0,
+            time: 0.0,
+            sample: PoseSample {
+                n_tools: n_devices,
+                ..PoseSample::none()
+            },
+            states: [None; MAX_TOOLS],
+            commands: [ForceCommand::ZERO; MAX_TOOLS],
+            away: [0; MAX_TOOLS],
+            is_written: [true; MAX_TOOLS],
+            faults: Faults::NONE,
+            skipped: 0,
+            longest_gap: 0.0,
+            said_at: f64::NEG_INFINITY,
+            is_letting_go: false,
+        }
+    }
+}
+
+impl ServoLoop {
+    /// One tick. `now` is the moment it begins, s; `lateness` how much that is past the moment it was due, s; `skipped`
+    /// how many ticks are left out for that lateness.
+    ///
+    /// Does not allocate, wait or panic, whatever the devices and the tissue say; a device's driver has its own rules.
+    #[cfg_attr(feature = "rtsan", rtsan_standalone::nonblocking)]
+    pub fn tick_once(&mut self, now: f64, lateness: f64, skipped: u32) {
+        let cpu_t0 = thread_cpu();
+        self.count(now, lateness, skipped);
+        self.read(now);
+        self.post_poses(now);
+        let n = self.devices.len().min(MAX_TOOLS);
+        let mut arrival = Arrival::new(&mut self.patches);
+        let (states, commands) = (self.now.states.get(..n), self.now.commands.get_mut(..n));
+        let report = match (states, commands) {
+            (Some(states), Some(commands)) => self.servo.tick(now, states, &mut arrival, commands),
+            _ => TickReport::ZERO,
+        };
+        let (offered, taken) = (arrival.offered, arrival.taken);
+        self.write(now);
+        self.notice(now, &report);
+        let mut entry = TickEntry {
+            tick: TickRecord {
+                tick: self.now.tick,
+                now,
+                lateness,
+                skipped,
+                offered,
+                taken,
+                patch: self.patches.current().id,
+                n_devices: n as u32,
+                ..TickRecord::of(&report)
+            },
+            devices: [DeviceRecord::default(); MAX_TOOLS],
+        };
+        self.fill_devices(&mut entry, &report);
+        entry.tick.cpu = thread_cpu() - cpu_t0;
+        self.stats.cpu.add(entry.tick.cpu);
+        *self.view.slot() = entry;
+        self.view.publish();
+        if self.ring.push(entry).is_err() {
+            self.stats.lost_records.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Ticks every `period` seconds until told to stop, then ramps down.
+    ///
+    /// A tick that comes too late for the next ones leaves them out: it never makes up for them in a burst.
+    pub(crate) fn run(
+        &mut self,
+        clock: &impl Clock,
+        period: f64,
+        faults: &FaultHooks,
+        stop: &AtomicBool,
+    ) {
+        let start = clock.now();
+        self.speaker.say(start, Happening::LoopStarted);
+        let mut slot = 0_u64;
+        let mut rest = LAST_TICKS;
+        while rest > 0 {
+            if stop.load(Ordering::Relaxed) {
+                self.let_go();
+                rest = if self.is_at_rest() { 0 } else { rest - 1 };
+            }
+            slot += 1;
+            let due = start + slot as f64 * period;
+            clock.wait_until(due);
+            if let Some(delay) = faults.take_loop_delay() {
+                self.speaker
+                    .say(clock.now(), Happening::Injected("the loop wakes up late"));
+                clock.wait_until(due + delay);
+            }
+            let now = clock.now();
+            // Saturates; never negative, as a wait is never early.
+            let skipped = ((now - due) / period) as u64;
+            slot += skipped;
+            self.tick_once(now, now - due, u32::try_from(skipped).unwrap_or(u32::MAX));
+        }
+        self.disarm(clock.now());
+        let ticks = self.now.tick;
+        self.speaker.say(clock.now(), Happening::LoopStopped(ticks));
+    }
+
+    /// From here on no device is read: the law ramps all forces down.
+    fn let_go(&mut self) {
+        self.now.is_letting_go = true;
+    }
+
+    fn is_at_rest(&self) -> bool {
+        let zero =
+            |c: &ForceCommand| c.force.norm_squared() == 0.0 && c.torque.norm_squared() == 0.0;
+        self.now.commands.iter().all(zero)
+    }
+
+    fn count(&mut self, now: f64, lateness: f64, skipped: u32) {
+        let n = &mut self.now;
+        n.tick += 1;
+        self.stats.ticks.store(n.tick, Ordering::Relaxed);
+        let gap = if n.tick > 1 { now - n.time } else { 0.0 };
+        n.time = now;
+        self.stats.lateness.add(lateness);
+        if skipped > 0 {
+            self.stats
+                .skipped
+                .fetch_add(skipped.into(), Ordering::Relaxed);
+            n.skipped += u64::from(skipped);
+            n.longest_gap = n.longest_gap.max(gap);
+        }
+        if n.skipped > 0 && now - n.said_at > SAY_EVERY {
+            let what = Happening::DeadlineMissed {
+                skipped: n.skipped,
+                longest: n.longest_gap,
+            };
+            (n.skipped, n.longest_gap, n.said_at) = (0, 0.0, now);
+            self.speaker.say(now, what);
+        }
+    }
+
+    fn read(&mut self, now: f64) {
+        let n = &mut self.now;
+        for (k, device) in self.devices.iter_mut().enumerate().take(MAX_TOOLS) {
+            let (Some(state), Some(away)) = (n.states.get_mut(k), n.away.get_mut(k)) else {
+                continue;
+            };
+            let read = device.read(now);
+            *state = if n.is_letting_go { None } else { read.ok() };
+            match read {
+                Ok(_) if *away > 0 => {
+                    self.speaker
+                        .say(now, Happening::DeviceBack(k as u32, *away));
+                    *away = 0;
+                }
+                Ok(_) => {}
+                Err(fault) => {
+                    if *away == 0 {
+                        self.speaker
+                            .say(now, Happening::DeviceLost(k as u32, reason(fault)));
+                    }
+                    *away += 1;
+                }
+            }
+        }
+    }
+
+    /// Tells the tissue where the tools are; one that is away or says nonsense stays where it was last.
+    fn post_poses(&mut self, now: f64) {
+        let n = &mut self.now;
+        n.sample.tick = n.tick;
+        n.sample.time = now;
+        for (pose, state) in n.sample.poses.iter_mut().zip(&n.states) {
+            if let Some(state) = state
+                && is_finite(&state.pose)
+            {
+                *pose = state.pose;
+            }
+        }
+        *self.poses.slot() = n.sample;
+        self.poses.publish();
+    }
+
+    fn write(&mut self, now: f64) {
+        let n = &mut self.now;
+        for (k, device) in self.devices.iter_mut().enumerate().take(MAX_TOOLS) {
+            let (Some(command), Some(is_written)) = (n.commands.get(k), n.is_written.get_mut(k))
+            else {
+                continue;
+            };
+            let result = device.write(now, command);
+            if let Err(fault) = result
+                && *is_written
+            {
+                self.speaker
+                    .say(now, Happening::WriteFailed(k as u32, reason(fault)));
+            }
+            *is_written = result.is_ok();
+        }
+    }
+
+    fn notice(&mut self, now: f64, report: &TickReport) {
+        // Letting go is no fault, though the law is told as if all devices were gone.
+        if report.faults != self.now.faults && !self.now.is_letting_go {
+            self.now.faults = report.faults;
+            self.speaker.say(now, Happening::LawFaults(report.faults));
+        }
+    }
+
+    fn fill_devices(&self, entry: &mut TickEntry, report: &TickReport) {
+        let n = &self.now;
+        for (k, (record, tool)) in entry.devices.iter_mut().zip(&report.tools).enumerate() {
+            let (Some(state), Some(command)) = (n.states.get(k), n.commands.get(k)) else {
+                continue;
+            };
+            *record = DeviceRecord::of(tool);
+            record.tick = n.tick;
+            record.set_state(state.as_ref());
+            record.force = command.force.into();
+            record.torque = command.torque.into();
+            record.is_written = n.is_written.get(k).copied().unwrap_or(false);
+        }
+    }
+
+    /// Writes zero, whatever the law said last.
+    fn disarm(&mut self, now: f64) {
+        for device in &mut self.devices {
+            // A device that is gone cannot be told; its own watchdog has to do.
+            let _ = device.write(now, &ForceCommand::ZERO);
+        }
+    }
+}
+
+impl Drop for ServoLoop {
+    fn drop(&mut self) {
+        self.disarm(self.now.time);
+    }
+}
+
+impl fmt::Debug for ServoLoop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ServoLoop")
+            .field("tick", &self.now.tick)
+            .finish_non_exhaustive()
+    }
+}
+
+impl TickRecord {
+    fn of(report: &TickReport) -> Self {
+        Self {
+            patch_age: report.patch_age,
+            n_active: report.n_active,
+            n_sliding: report.n_sliding,
+            sweeps: report.sweeps,
+            residual: report.residual,
+            gain: report.gain,
+            energy_budget: report.energy_budget,
+            faults: report.faults.bits().into(),
+            limits: report.limits.bits().into(),
+            ..Self::default()
+        }
+    }
+}
+
+impl DeviceRecord {
+    fn of(tool: &ToolReport) -> Self {
+        Self {
+            tissue_force: tool.tissue_force.into(),
+            transfer: tool.transfer.into(),
+            stiffness: tool.stiffness,
+            stretch: tool.stretch,
+            softening: tool.softening,
+            damping: tool.damping,
+            energy_in: tool.energy_in,
+            energy_out: tool.energy_out,
+            bank: tool.bank,
+            faults: tool.faults.bits().into(),
+            limits: tool.limits.bits().into(),
+            ..Self::default()
+        }
+    }
+
+    fn set_state(&mut self, state: Option<&DeviceState>) {
+        self.is_there = state.is_some();
+        if let Some(s) = state {
+            self.time = s.time;
+            self.position = s.pose.translation.vector.into();
+            self.orientation = s.pose.rotation.coords.into();
+            self.velocity = s.velocity.into();
+            self.buttons = s.buttons;
+        }
+    }
+}
+
+/// A mailbox seen by the law during one tick: what is offered is decided when the tick begins, so that the log can say
+/// all there is to know of it.
+struct Arrival<'a> {
+    patches: &'a mut Reader<ContactPatch>,
+    offered: bool,
+    taken: bool,
+}
+
+impl<'a> Arrival<'a> {
+    fn new(patches: &'a mut Reader<ContactPatch>) -> Self {
+        Self {
+            offered: patches.is_newer(),
+            patches,
+            taken: false,
+        }
+    }
+}
+
+impl PatchSource for Arrival<'_> {
+    fn current(&self) -> &ContactPatch {
+        self.patches.current()
+    }
+
+    fn is_newer(&self) -> bool {
+        self.offered && !self.taken
+    }
+
+    fn take(&mut self) {
+        if self.is_newer() {
+            self.taken = self.patches.take();
+        }
+    }
+}
+
+fn is_finite(pose: &Pose) -> bool {
+    pose.translation.vector.iter().all(|v| v.is_finite())
+        && pose.rotation.coords.iter().all(|v| v.is_finite())
+}
+
+/// In words that live as long as an event.
+fn reason(fault: DeviceFault) -> &'static str {
+    match fault {
+        DeviceFault::Unplugged => "not connected",
+        DeviceFault::TimedOut => "no answer in time",
+        DeviceFault::Garbled => "its answer cannot be understood",
+        _ => "not usable",
+    }
+}

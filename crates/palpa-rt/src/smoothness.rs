@@ -1,0 +1,258 @@
+//! How smooth the forces are and what energy they give: from ticks, as they come or from a log.
+
+use crate::{histogram::Histogram, record::DeviceRecord, servo_loop::TickEntry};
+use std::collections::VecDeque;
+
+/// The band in which hands feel vibration, Hz.
+const BAND: [f64; 2] = [20.0, 400.0];
+/// The RMS is taken over so many seconds.
+const WINDOW: f64 = 2.0;
+
+/// Smoothness and energy of one device's force. Changes of force are counted in [`Histogram`]s with newtons for seconds.
+#[derive(Debug)]
+pub struct ForceStats {
+    period: f64,
+    filters: [[Biquad; 2]; 3],
+    last: Option<DeviceRecord>,
+    /// Squares of the filtered force in the window, N².
+    squares: VecDeque<f64>,
+    worst_sum: f64,
+    arrivals: Histogram,
+    others: Histogram,
+    max_force: f64,
+    work: f64,
+    max_work: f64,
+}
+
+/// What [`ForceStats`] found.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ForceReport {
+    /// RMS of the force between 20 and 400 Hz over the last 2 s, N.
+    pub rms_band: f64,
+    /// The largest such RMS over any 2 s, N.
+    pub rms_band_worst: f64,
+    /// Largest change of force from one tick to the next where a patch arrived, N.
+    pub arrival_max: f64,
+    /// The change that 999 of 1000 such ticks stay below, N.
+    pub arrival_p999: f64,
+    /// The change that 999 of 1000 other ticks stay below, N.
+    pub other_p999: f64,
+    /// Largest change at other ticks, N.
+    pub other_max: f64,
+    /// Largest force, N.
+    pub max_force: f64,
+    /// Work done on the hand in all, J: positive if the device gave more than it took.
+    pub work: f64,
+    /// The most that this work ever was, J.
+    pub max_work: f64,
+}
+
+impl ForceStats {
+    /// For a loop of this period, s.
+    pub fn new(period: f64) -> Self {
+        let [low, high] = BAND;
+        // The upper edge cannot lie beyond half the rate.
+        let high = high.min(0.49 / period);
+        let pair = [
+            Biquad::high_pass(low * period),
+            Biquad::low_pass(high * period),
+        ];
+        Self {
+            period,
+            filters: [pair; 3],
+            last: None,
+            squares: VecDeque::new(),
+            worst_sum: 0.0,
+            arrivals: Histogram::new(),
+            others: Histogram::new(),
+            max_force: 0.0,
+            work: 0.0,
+            max_work: 0.0,
+        }
+    }
+
+    /// Takes in a tick of device `k`.
+    pub fn add(&mut self, entry: &TickEntry, k: usize) {
+        let Some(device) = entry.devices.get(k) else {
+            return;
+        };
+        let force = device.force;
+        let filtered: f64 = (self.filters.iter_mut().zip(force))
+            .map(|([high, low], f)| low.next(high.next(f)).powi(2))
+            .sum();
+        self.squares.push_back(filtered);
+        let window = (WINDOW / self.period) as usize;
+        if self.squares.len() > window {
+            self.squares.pop_front();
+        }
+        if self.squares.len() == window && entry.tick.tick.is_multiple_of(100) {
+            self.worst_sum = self.worst_sum.max(self.squares.iter().sum());
+        }
+        self.max_force = self.max_force.max(norm(force));
+        if let Some(last) = self.last {
+            let step = std::array::from_fn(|i| force[i] - last.force[i]);
+            let changes = if entry.tick.taken {
+                &self.arrivals
+            } else {
+                &self.others
+            };
+            changes.add(norm(step));
+            if device.is_there && last.is_there {
+                // The force of the last tick acted while the hand moved to here.
+                let work: f64 = (0..3)
+                    .map(|i| last.force[i] * (device.position[i] - last.position[i]))
+                    .sum();
+                if work.is_finite() {
+                    self.work += work;
+                    self.max_work = self.max_work.max(self.work);
+                }
+            }
+        }
+        self.last = Some(*device);
+    }
+
+    /// What was found so far.
+    pub fn report(&self) -> ForceReport {
+        let mean = |sum: f64| (sum / self.squares.len().max(1) as f64).sqrt();
+        let now: f64 = self.squares.iter().sum();
+        ForceReport {
+            rms_band: mean(now),
+            rms_band_worst: mean(self.worst_sum.max(now)),
+            arrival_max: self.arrivals.max(),
+            arrival_p999: self.arrivals.quantile(0.999),
+            other_p999: self.others.quantile(0.999),
+            other_max: self.others.max(),
+            max_force: self.max_force,
+            work: self.work,
+            max_work: self.max_work,
+        }
+    }
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// A second-order Butterworth filter, direct form II transposed. From the bilinear transform: Zölzer, DAFX (2011), 2.3.
+#[derive(Debug, Clone, Copy)]
+struct Biquad {
+    b: [f64; 3],
+    a: [f64; 2],
+    state: [f64; 2],
+}
+
+impl Biquad {
+    /// `f` is the corner in cycles per sample.
+    fn low_pass(f: f64) -> Self {
+        let k = (std::f64::consts::PI * f).tan();
+        Self::new([k * k, 2.0 * k * k, k * k], k)
+    }
+
+    fn high_pass(f: f64) -> Self {
+        Self::new([1.0, -2.0, 1.0], (std::f64::consts::PI * f).tan())
+    }
+
+    fn new(b: [f64; 3], k: f64) -> Self {
+        let scale = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
+        Self {
+            b: b.map(|b| b * scale),
+            a: [
+                2.0 * (k * k - 1.0) * scale,
+                (1.0 - std::f64::consts::SQRT_2 * k + k * k) * scale,
+            ],
+            state: [0.0; 2],
+        }
+    }
+
+    fn next(&mut self, x: f64) -> f64 {
+        let y = self.b[0] * x + self.state[0];
+        self.state = [
+            self.b[1] * x - self.a[0] * y + self.state[1],
+            self.b[2] * x - self.a[1] * y,
+        ];
+        y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::TickRecord;
+
+    fn feed(
+        stats: &mut ForceStats,
+        n: u64,
+        taken: impl Fn(u64) -> bool,
+        at: impl Fn(f64) -> (f64, f64),
+    ) {
+        for tick in 1..=n {
+            let (position, force) = at(tick as f64 * 1e-3);
+            let mut entry = TickEntry {
+                tick: TickRecord {
+                    tick,
+                    taken: taken(tick),
+                    ..TickRecord::default()
+                },
+                ..TickEntry::default()
+            };
+            entry.devices[0].is_there = true;
+            entry.devices[0].position[0] = position;
+            entry.devices[0].force[0] = force;
+            stats.add(&entry, 0);
+        }
+    }
+
+    #[test]
+    fn the_band_lets_through_what_hands_feel_as_vibration() {
+        // Gain of both filters in a row, from their formula, warped as the bilinear transform does.
+        let warp = |f: f64| (std::f64::consts::PI * f * 1e-3).tan();
+        let gain = |f: f64| {
+            let low = 1.0 / (1.0 + (warp(f) / warp(400.0)).powi(4)).sqrt();
+            let high = 1.0 / (1.0 + (warp(20.0) / warp(f)).powi(4)).sqrt();
+            low * high
+        };
+        for f in [2.0, 20.0, 100.0, 300.0, 450.0] {
+            let mut stats = ForceStats::new(1e-3);
+            feed(
+                &mut stats,
+                4000,
+                |_| false,
+                |t| (0.0, (std::f64::consts::TAU * f * t).sin()),
+            );
+            let want = gain(f) / 2.0_f64.sqrt();
+            let got = stats.report().rms_band;
+            assert!((got - want).abs() < 0.005, "{f} Hz: {got} for {want}");
+        }
+    }
+
+    #[test]
+    fn jumps_are_told_apart_by_whether_a_patch_came() {
+        let mut stats = ForceStats::new(1e-3);
+        feed(
+            &mut stats,
+            500,
+            |k| k == 300,
+            |t| (0.0, if t > 0.2995 { 1.0 + t } else { t }),
+        );
+        let r = stats.report();
+        assert!((r.arrival_max - 1.001).abs() < 1e-6);
+        assert!((r.other_max - 0.001).abs() < 1e-6);
+        assert!((r.max_force - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn work_of_a_spring_comes_back_and_that_of_a_lag_is_given() {
+        let mut stats = ForceStats::new(1e-3);
+        let x = |t: f64| 1e-3 * (std::f64::consts::TAU * 10.0 * t).sin();
+        feed(&mut stats, 1000, |_| false, |t| (x(t), -100.0 * x(t)));
+        let spring = stats.report();
+        // Held from tick to tick, a spring gives ½ K T v² per tick: π² K X² f T per cycle of ten.
+        let want = std::f64::consts::PI.powi(2) * 100.0 * 1e-6 * 2.0 * 10.0 * 10.0 * 1e-3 / 2.0;
+        assert!(
+            (spring.work / want - 1.0).abs() < 0.02,
+            "{} for {want}",
+            spring.work
+        );
+        assert!(spring.max_work >= spring.work);
+    }
+}

@@ -1,0 +1,186 @@
+//! What a thread asks of the system at its start, and what it got.
+
+use std::fmt;
+
+/// How a thread wishes to be scheduled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Priority {
+    /// First in, first out, before all ordinary threads; 1 to 99.
+    RealTime(u8),
+    /// Ordinary.
+    Normal,
+    /// Ordinary, behind the others; 1 to 19.
+    Nice(u8),
+}
+
+/// What a thread wishes for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wish {
+    /// How it is scheduled.
+    pub priority: Priority,
+    /// The only core that it shall run on.
+    pub core: Option<usize>,
+}
+
+/// What a thread was granted. A wish that was refused is no error: the machine's owner decides.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Granted {
+    /// The thread's name.
+    pub thread: &'static str,
+    /// What it had wished for.
+    pub wish: Wish,
+    /// Whether it is scheduled as wished, or why not.
+    pub priority: Result<(), String>,
+    /// Whether it is bound to its core, or why not; granted when there was no wish.
+    pub pinned: Result<(), String>,
+}
+
+impl Wish {
+    /// Nothing special.
+    pub const NORMAL: Self = Self {
+        priority: Priority::Normal,
+        core: None,
+    };
+
+    /// Asks for it, for the thread that calls.
+    pub fn ask(self, thread: &'static str) -> Granted {
+        Granted {
+            thread,
+            wish: self,
+            priority: system::schedule(self.priority),
+            pinned: self.core.map_or(Ok(()), system::pin),
+        }
+    }
+}
+
+/// Keeps the memory of the process in RAM: what it has now, and, where the system sets no limit, what is to come.
+///
+/// # Errors
+/// The system's reason.
+pub fn lock_memory() -> Result<(), String> {
+    system::lock_memory()
+}
+
+impl fmt::Display for Granted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let outcome = |r: &Result<(), String>| match r {
+            Ok(()) => "granted".to_owned(),
+            Err(why) => format!("refused ({why})"),
+        };
+        match self.wish.priority {
+            Priority::RealTime(p) => write!(f, "{}: real-time priority {p} ", self.thread)?,
+            Priority::Normal => write!(f, "{}: ordinary priority ", self.thread)?,
+            Priority::Nice(n) => write!(f, "{}: nice {n} ", self.thread)?,
+        }
+        write!(f, "{}", outcome(&self.priority))?;
+        if let Some(core) = self.wish.core {
+            write!(f, ", core {core} {}", outcome(&self.pinned))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(target_os = "linux")]
+mod system {
+    use super::Priority;
+    use rustix::{
+        mm::{MlockAllFlags, mlockall},
+        process::{Resource, getrlimit, setpriority_process},
+        thread::{CpuSet, gettid, sched_setaffinity, set_current_timer_slack},
+    };
+    use std::num::NonZeroU64;
+    use thread_priority::{
+        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+        set_thread_priority_and_policy, thread_native_id,
+    };
+
+    pub(super) fn schedule(priority: Priority) -> Result<(), String> {
+        match priority {
+            Priority::RealTime(p) => {
+                // Without the privilege, at least the sleep of an ordinary thread shall end on time.
+                let _ = set_current_timer_slack(NonZeroU64::new(1));
+                let value = ThreadPriorityValue::try_from(p)?;
+                let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+                set_thread_priority_and_policy(
+                    thread_native_id(),
+                    ThreadPriority::Crossplatform(value),
+                    policy,
+                )
+                .map_err(|e| e.to_string())
+            }
+            Priority::Normal => Ok(()),
+            // On Linux niceness is the thread's, whatever the call is named.
+            Priority::Nice(n) => {
+                setpriority_process(Some(gettid()), i32::from(n)).map_err(|e| e.to_string())
+            }
+        }
+    }
+
+    pub(super) fn pin(core: usize) -> Result<(), String> {
+        if core >= CpuSet::MAX_CPU {
+            return Err(format!(
+                "core {core} is past the last that the system can name"
+            ));
+        }
+        let mut set = CpuSet::new();
+        set.set(core);
+        sched_setaffinity(None, &set).map_err(|e| e.to_string())
+    }
+
+    pub(super) fn lock_memory() -> Result<(), String> {
+        // With a limit, memory to come must not be locked: past the limit the allocation itself would fail.
+        let is_unlimited = getrlimit(Resource::Memlock).current.is_none();
+        let flags = if is_unlimited {
+            MlockAllFlags::CURRENT | MlockAllFlags::FUTURE
+        } else {
+            MlockAllFlags::CURRENT
+        };
+        mlockall(flags).map_err(|e| e.to_string())
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod system {
+    use super::Priority;
+    use thread_priority::{ThreadPriority, ThreadPriorityValue};
+
+    pub(super) fn schedule(priority: Priority) -> Result<(), String> {
+        let wish = match priority {
+            Priority::RealTime(p) => {
+                ThreadPriority::Crossplatform(ThreadPriorityValue::try_from(p)?)
+            }
+            Priority::Normal => return Ok(()),
+            Priority::Nice(_) => ThreadPriority::Min,
+        };
+        wish.set_for_current().map_err(|e| format!("{e:?}"))
+    }
+
+    pub(super) fn pin(_core: usize) -> Result<(), String> {
+        Err("not available on this system".to_owned())
+    }
+
+    pub(super) fn lock_memory() -> Result<(), String> {
+        Err("not available on this system".to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wish_that_cannot_be_granted_says_why() {
+        let wish = Wish {
+            priority: Priority::Normal,
+            core: Some(900),
+        };
+        let granted = std::thread::spawn(move || wish.ask("test")).join().unwrap();
+        assert_eq!(granted.priority, Ok(()));
+        let why = granted.pinned.clone().unwrap_err();
+        assert!(
+            granted
+                .to_string()
+                .contains(&format!("core 900 refused ({why})"))
+        );
+    }
+}

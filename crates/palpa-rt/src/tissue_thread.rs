@@ -1,0 +1,338 @@
+//! The tissue thread and the background thread beside it.
+
+use crate::{
+    clock::{Clock, rest, thread_cpu},
+    event::{Happening, Speaker},
+    fault::FaultHooks,
+    histogram::Histogram,
+    mailbox::{Reader, Writer},
+    record::StepRecord,
+    tissue::{StepStatus, Tissue, TissueInput, TissueStep, patch_hash},
+};
+use palpa_servo::{ContactPatch, MAX_TOOLS, Pose};
+use rtrb::{Consumer, Producer};
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread::Thread,
+    time::Duration,
+};
+
+/// How the tissue thread goes about its steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TissueParams {
+    /// Steps are at least this far apart, s: no more than the device can feel, and a core that others may use too.
+    pub min_period: f64,
+    /// Cap on the time that the tissue is moved on by in a step, s. Beyond it a stall would inject a jump.
+    pub max_dt: f64,
+}
+
+impl Default for TissueParams {
+    fn default() -> Self {
+        Self {
+            min_period: 1e-3,
+            max_dt: 0.02,
+        }
+    }
+}
+
+/// Where the tools were at a tick.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PoseSample {
+    pub(crate) tick: u64,
+    pub(crate) time: f64,
+    pub(crate) poses: [Pose; MAX_TOOLS],
+    pub(crate) n_tools: usize,
+}
+
+impl PoseSample {
+    pub(crate) fn none() -> Self {
+        Self {
+            tick: 0,
+            time: 0.0,
+            poses: [Pose::identity(); MAX_TOOLS],
+            n_tools: 0,
+        }
+    }
+}
+
+/// How the tissue thread fared; read by anyone at any time.
+#[derive(Debug, Default)]
+pub struct TissueStats {
+    /// CPU time of steps.
+    pub cpu: Histogram,
+    /// Wall time of steps.
+    pub wall: Histogram,
+    /// CPU time of background jobs.
+    pub background: Histogram,
+    /// Steps whose patch was not published.
+    pub held_back: AtomicU64,
+    /// Steps not recorded because the ring was full.
+    pub lost_records: AtomicU64,
+}
+
+/// All that the tissue thread holds.
+pub(crate) struct TissueThread<T: Tissue, C: Clock> {
+    pub(crate) tissue: T,
+    pub(crate) clock: C,
+    pub(crate) params: TissueParams,
+    pub(crate) poses: Reader<PoseSample>,
+    pub(crate) patches: Writer<ContactPatch>,
+    pub(crate) view: Writer<StepRecord>,
+    pub(crate) ring: Producer<StepRecord>,
+    pub(crate) speaker: Speaker,
+    pub(crate) background: Background<T>,
+    pub(crate) faults: Arc<FaultHooks>,
+    pub(crate) stats: Arc<TissueStats>,
+}
+
+/// The tissue thread's side of the background.
+pub(crate) struct Background<T: Tissue> {
+    pub(crate) jobs: Producer<T::Job>,
+    /// What came of a job; nothing if it panicked.
+    pub(crate) done: Consumer<Option<T::Done>>,
+    pub(crate) thread: Thread,
+    pub(crate) is_busy: bool,
+}
+
+impl<T: Tissue, C: Clock> TissueThread<T, C> {
+    /// Steps until it is told to stop or the tissue panics.
+    pub(crate) fn run(mut self, stop: &AtomicBool) {
+        if catch_unwind(AssertUnwindSafe(|| self.tissue.prepare())).is_err() {
+            self.speaker
+                .say(self.clock.now(), Happening::TissuePanicked(0));
+            return;
+        }
+        self.speaker.say(self.clock.now(), Happening::TissueStarted);
+        // Before the first pose there is nothing to press.
+        while !self.poses.take() && !stop.load(Ordering::Relaxed) {
+            rest(Duration::from_micros(200));
+        }
+        let mut step = 0;
+        let mut due = self.clock.now();
+        let mut last_start = due - self.params.min_period;
+        let mut period = self.params.min_period;
+        let mut status = StepStatus::Converged;
+        let mut lost = Lost::default();
+        while !stop.load(Ordering::Relaxed) {
+            if self.faults.is_tissue_paused() {
+                self.wait_out_pause(stop);
+                continue;
+            }
+            self.clock.wait_until(due);
+            let now = self.clock.now();
+            // On a grid while steps are short enough for it; late steps are not made up for.
+            due = (due + self.params.min_period).max(now);
+            let elapsed = now - last_start;
+            last_start = now;
+            // Smoothed, so that one late step does not make the loop expect the next ones late.
+            period += 0.1 * (elapsed.min(self.params.max_dt) - period);
+            lost.add(elapsed - self.params.max_dt, now, &mut self.speaker);
+            step += 1;
+            // Its state may be half changed after a panic, so there is no going on; the loop ramps down as patches age.
+            let result = catch_unwind(AssertUnwindSafe(|| self.step(step, now, elapsed, period)));
+            let Ok((new_status, record)) = result else {
+                self.speaker
+                    .say(self.clock.now(), Happening::TissuePanicked(step));
+                return;
+            };
+            if new_status != status {
+                status = new_status;
+                self.speaker
+                    .say(self.clock.now(), Happening::StepStatus(step, status.name()));
+            }
+            if self.ring.push(record).is_err() {
+                self.stats.lost_records.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        self.speaker
+            .say(self.clock.now(), Happening::TissueStopped(step));
+    }
+
+    /// One step with all round it.
+    fn step(&mut self, step: u64, now: f64, elapsed: f64, period: f64) -> (StepStatus, StepRecord) {
+        let cpu_t0 = thread_cpu();
+        let installed = self.install();
+        self.poses.take();
+        let sample = *self.poses.current();
+        let input = TissueInput {
+            step,
+            tick: sample.tick,
+            sampled_at: sample.time,
+            now,
+            dt: elapsed.min(self.params.max_dt),
+            period,
+            poses: sample.poses,
+            n_tools: sample.n_tools,
+        };
+        if self.faults.take_panic() {
+            self.speaker
+                .say(now, Happening::Injected("the tissue panics"));
+            panic!("a panic on purpose");
+        }
+        let patch = self.patches.slot();
+        let result = self.tissue.step(&input, patch);
+        stamp(patch, &input);
+        let is_spoilt = self.faults.take_spoil();
+        if is_spoilt {
+            spoil(patch);
+            self.speaker
+                .say(now, Happening::Injected("a patch with NaN"));
+        }
+        let mut record = step_record(&input, &result, patch);
+        if let Some(delay) = self.faults.take_tissue_delay() {
+            self.speaker
+                .say(now, Happening::Injected("the tissue's patch is late"));
+            self.clock.wait_until(self.clock.now() + delay);
+        }
+        if record.published {
+            self.patches.publish();
+        } else {
+            self.stats.held_back.fetch_add(1, Ordering::Relaxed);
+        }
+        record.installed = installed;
+        record.spoilt = u8::from(is_spoilt);
+        record.lost = elapsed - input.dt;
+        record.job_taken = self.hand_out_job();
+        record.cpu = thread_cpu() - cpu_t0;
+        record.wall = self.clock.now() - now;
+        self.stats.cpu.add(record.cpu);
+        self.stats.wall.add(record.wall);
+        *self.view.slot() = record;
+        self.view.publish();
+        (result.status, record)
+    }
+
+    fn install(&mut self) -> bool {
+        match self.background.done.pop() {
+            Ok(Some(done)) => {
+                self.background.is_busy = false;
+                self.tissue.install(done);
+                true
+            }
+            Ok(None) => {
+                self.background.is_busy = false;
+                self.speaker.say(self.clock.now(), Happening::JobPanicked);
+                false
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn hand_out_job(&mut self) -> bool {
+        if self.background.is_busy {
+            return false;
+        }
+        let Some(job) = self.tissue.take_job() else {
+            return false;
+        };
+        // Never full: one job at a time.
+        self.background.is_busy = self.background.jobs.push(job).is_ok();
+        self.background.thread.unpark();
+        self.background.is_busy
+    }
+
+    fn wait_out_pause(&mut self, stop: &AtomicBool) {
+        self.speaker
+            .say(self.clock.now(), Happening::Injected("the tissue pauses"));
+        while self.faults.is_tissue_paused() && !stop.load(Ordering::Relaxed) {
+            rest(Duration::from_micros(500));
+        }
+        self.speaker
+            .say(self.clock.now(), Happening::Injected("the tissue goes on"));
+    }
+}
+
+/// Runs jobs until it is told to stop and none is left.
+pub(crate) fn run_background<T: Tissue>(
+    jobs: &mut Consumer<T::Job>,
+    done: &mut Producer<Option<T::Done>>,
+    stop: &AtomicBool,
+    stats: &TissueStats,
+) {
+    loop {
+        if let Ok(job) = jobs.pop() {
+            let t0 = thread_cpu();
+            let result = catch_unwind(AssertUnwindSafe(|| T::run(job))).ok();
+            stats.background.add(thread_cpu() - t0);
+            // As many places as jobs that may be under way; and if the tissue is gone, nobody wants it.
+            let _ = done.push(result);
+        } else if stop.load(Ordering::Relaxed) {
+            return;
+        } else {
+            // Woken by whoever hands out a job; the time only bounds how long stopping takes.
+            rest(Duration::from_millis(20));
+        }
+    }
+}
+
+/// What the engine knows of a patch and the tissue does not.
+pub(crate) fn stamp(patch: &mut ContactPatch, input: &TissueInput) {
+    patch.id = input.step;
+    patch.sampled_at = input.sampled_at;
+    patch.period = input.period;
+}
+
+/// The fault that [`FaultHooks::spoil_patches`] asks for.
+pub(crate) fn spoil(patch: &mut ContactPatch) {
+    for tool in &mut patch.tools {
+        tool.force.x = f64::NAN;
+    }
+    patch.contacts[0].position.z = f64::NAN;
+    patch.compliance[0] = f64::NAN;
+}
+
+/// What is known of a step once its patch is made; the rest is filled in by who runs it.
+pub(crate) fn step_record(
+    input: &TissueInput,
+    result: &TissueStep,
+    patch: &ContactPatch,
+) -> StepRecord {
+    let mut record = StepRecord {
+        step: input.step,
+        tick: input.tick,
+        sampled_at: input.sampled_at,
+        now: input.now,
+        dt: input.dt,
+        period: input.period,
+        n_tools: input.n_tools as u32,
+        status: result.status as u8,
+        published: result.status.is_published(),
+        iterations: result.iterations,
+        residual: result.residual,
+        factor: result.factor,
+        zone: result.zone,
+        energy: result.energy,
+        n_contacts: patch.n_contacts as u32,
+        hash: patch_hash(patch),
+        ..StepRecord::default()
+    };
+    for (k, pose) in input.poses.iter().enumerate() {
+        record.positions[3 * k..][..3].copy_from_slice(pose.translation.vector.as_slice());
+        record.orientations[4 * k..][..4].copy_from_slice(pose.rotation.coords.as_slice());
+    }
+    record
+}
+
+/// Time that the cap on steps took from the tissue; said at most ten times a second.
+#[derive(Default)]
+struct Lost {
+    sum: f64,
+    said_at: f64,
+}
+
+impl Lost {
+    fn add(&mut self, lost: f64, now: f64, speaker: &mut Speaker) {
+        self.sum += lost.max(0.0);
+        if self.sum > 0.0 && now - self.said_at > 0.1 {
+            speaker.say(now, Happening::TimeLost(self.sum));
+            *self = Self {
+                sum: 0.0,
+                said_at: now,
+            };
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Whole runs: threads, forces, log, replay, tables.
+
+use crate::{
+    devices::{Hand, Ill, SPEC, Scripted},
+    toy::{Bed, RADIUS},
+};
+use palpa_device::{DeviceModel, Grip, HapticDevice, Path as Path3, SimulatedDevice};
+use palpa_rt::{
+    Clock, Engine, EngineParams, Log, RealClock, RecorderParams, ReplayParams, Report, StartError,
+    StepRecord, Verdict, replay,
+};
+use palpa_servo::Vec3;
+use std::path::Path;
+
+/// As the tests run everywhere: without privileges that a machine may or may not give.
+pub(crate) fn params() -> EngineParams {
+    EngineParams {
+        lock_memory: false,
+        ..EngineParams::default()
+    }
+}
+
+pub(crate) fn recorder(path: &Path) -> RecorderParams {
+    RecorderParams {
+        path: Some(path.to_owned()),
+        scene: "[tool]\nshape = \"sphere\"\n".to_owned(),
+        notes: [("made by".to_owned(), "a test".to_owned())].into(),
+    }
+}
+
+pub(crate) fn wait(seconds: f64) {
+    let clock = RealClock::new(0.0);
+    clock.wait_until(seconds);
+}
+
+/// Runs the bed under a scripted hand; `act` does what it likes meanwhile.
+pub(crate) fn run(path: &Path, bed: Bed, act: impl FnOnce(&mut Engine, &Hand)) -> (Report, Log) {
+    let hand = Hand::default();
+    let device = Box::new(Scripted::new(&hand));
+    let mut engine = Engine::start(bed, vec![device], &params(), &recorder(path)).unwrap();
+    act(&mut engine, &hand);
+    let report = engine.stop();
+    assert!(hand.force() == 0.0, "the device was let go under force");
+    (report, Log::open(path).unwrap())
+}
+
+/// What holds in every run: nothing is lost or out of order, and each force is finite and within limits.
+pub(crate) fn check_records(report: &Report, log: &Log) {
+    assert!(log.is_whole);
+    assert_eq!(report.lost_records, [0, 0]);
+    assert!(!report.has_log_failed);
+    assert_eq!(log.ticks.len() as u64, report.ticks);
+    for (k, entry) in log.ticks.iter().enumerate() {
+        assert_eq!(entry.tick.tick, k as u64 + 1);
+        let force = entry.devices[0].force;
+        let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
+        assert!(
+            size <= SPEC.max_force * (1.0 + 1e-12),
+            "{size} N at tick {}",
+            k + 1
+        );
+    }
+    for pair in log.ticks.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        let change = (0..3)
+            .map(|i| (b.devices[0].force[i] - a.devices[0].force[i]).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let longest = (b.tick.now - a.tick.now).max(1e-3);
+        assert!(
+            change <= SPEC.max_slew * longest + 1e-9,
+            "{change} N at tick {}",
+            b.tick.tick
+        );
+        assert!(b.tick.now > a.tick.now);
+        assert!(b.tick.patch >= a.tick.patch);
+    }
+    for (k, step) in log.steps.iter().enumerate() {
+        assert_eq!(step.step, k as u64 + 1);
+        assert!(step.dt > 0.0 && step.dt <= 0.02);
+    }
+    assert_eq!(log.events.len(), report.events.len());
+}
+
+#[test]
+fn two_seconds_are_recorded_whole_and_replayed_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (report, log) = run(&path, Bed::new(), |engine, _| {
+        wait(1.0);
+        let snapshot = engine.snapshot();
+        assert!(snapshot.tick.tick.tick > 100 && snapshot.step.step > 10);
+        assert!(snapshot.tick.devices[0].position[2] < crate::toy::RADIUS);
+        wait(1.0);
+    });
+    check_records(&report, &log);
+    assert!(
+        report.ticks + report.skipped > 1900,
+        "{} ticks",
+        report.ticks
+    );
+    assert!(report.steps as usize == log.steps.len() && report.steps > 200);
+    assert_eq!(report.tick_cpu.count, report.ticks);
+    assert!(report.jobs.count > 5 && report.background_cpu_share > 0.0);
+    assert!(report.forces[0].max_force > 0.5, "{:?}", report.forces);
+    let names: Vec<_> = report.granted.iter().map(|g| g.thread).collect();
+    assert_eq!(
+        names,
+        [
+            "palpa-recorder",
+            "palpa-background",
+            "palpa-tissue",
+            "palpa-servo"
+        ]
+    );
+    assert!(report.panicked.is_empty());
+    assert_eq!(log.header.scene, "[tool]\nshape = \"sphere\"\n");
+    assert_eq!(log.header.notes["made by"], "a test");
+    assert_eq!(log.specs, [SPEC]);
+
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+    assert_eq!((again.ticks, again.steps), (report.ticks, report.steps));
+    assert!(again.jobs > 5 && again.is_same_cpu);
+}
+
+#[test]
+fn two_devices_are_recorded_and_replayed_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let hands = [Hand::default(), Hand::default()];
+    let devices = hands
+        .iter()
+        .map(|hand| Box::new(Scripted::new(hand)) as Box<dyn HapticDevice>);
+    let engine = Engine::start(Bed::new(), devices.collect(), &params(), &recorder(&path)).unwrap();
+    wait(0.3);
+    hands[1].make(Ill::Unplugged);
+    wait(0.3);
+    let report = engine.stop();
+    let log = Log::open(&path).unwrap();
+    check_records(&report, &log);
+    assert_eq!((log.specs.len(), report.forces.len()), (2, 2));
+    assert!(
+        log.ticks
+            .iter()
+            .all(|e| e.tick.n_devices == 2 && e.devices[1].tick == e.tick.tick)
+    );
+    assert!(
+        log.ticks
+            .iter()
+            .any(|e| e.devices[0].is_there && !e.devices[1].is_there)
+    );
+    assert!(log.steps.iter().skip(1).all(|s| s.n_tools == 2));
+    assert_eq!(log.forces(), report.forces);
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+}
+
+#[test]
+fn a_simulated_device_in_a_simulated_hand_is_replayed_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let above = Vec3::new(0.0, 0.0, RADIUS + 0.005);
+    let press = Path3::press(above, -Vec3::z(), 0.009, 0.03, 5.0);
+    let device = SimulatedDevice::new(DeviceModel::FALCON, Grip::MEDIUM, press);
+    let engine = Engine::start(
+        Bed::new(),
+        vec![Box::new(device)],
+        &params(),
+        &recorder(&path),
+    )
+    .unwrap();
+    wait(1.5);
+    let report = engine.stop();
+    let log = Log::open(&path).unwrap();
+    assert!(log.is_whole && log.ticks.len() as u64 == report.ticks);
+    // The hand is held up by the bed, with a force that the device can exert.
+    let force = report.forces[0];
+    assert!(
+        force.max_force > 0.3 && force.max_force <= DeviceModel::FALCON.spec.max_force,
+        "{force:?}"
+    );
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+}
+
+#[test]
+fn a_replay_finds_what_was_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |_, _| wait(0.7));
+    let params = ReplayParams::default();
+
+    // One bit of one reading in the middle: forces from there on, but no patch made of it.
+    let mut other = log.clone();
+    let at = other.ticks.len() / 2;
+    let z = &mut other.ticks[at].devices[0].position[2];
+    *z = f64::from_bits(z.to_bits() ^ (1 << 20));
+    let report = replay(&other, Bed::new(), &params);
+    assert_eq!(report.verdict, Verdict::Different);
+    // Later only if a machine too busy had the force at zero just then.
+    assert!(report.first_force.unwrap().tick > at as u64);
+    assert_eq!(report.first_patch, None);
+    assert!(report.max_force_difference > 0.0 && report.max_force_difference < 1e-6);
+
+    // The same log from a processor with other features: that is within the tolerance.
+    other.header.cpu = "another".to_owned();
+    let report = replay(&other, Bed::new(), &params);
+    assert_eq!(
+        (report.verdict, report.is_same_cpu),
+        (Verdict::WithinTolerance, false)
+    );
+
+    // A job that was installed one step later: its patches differ.
+    let mut other = log.clone();
+    let alone = |p: &[StepRecord]| p[0].installed && !p[0].job_taken && !p[1].installed;
+    let k = other.steps.windows(2).position(alone).unwrap();
+    other.steps[k].installed = false;
+    other.steps[k + 1].installed = true;
+    let report = replay(&other, Bed::new(), &params);
+    assert_eq!(report.verdict, Verdict::Different);
+    assert_eq!(report.first_patch, Some(k as u64 + 1));
+
+    // A step that is not there: said, not guessed.
+    let mut other = log;
+    other.steps.remove(20);
+    let report = replay(&other, Bed::new(), &params);
+    assert_eq!(report.verdict, Verdict::Incomplete);
+    assert!(
+        report
+            .stopped
+            .as_ref()
+            .unwrap()
+            .contains("21 is not in the log"),
+        "{report:?}"
+    );
+}
+
+#[test]
+fn what_cannot_start_says_why() {
+    let start = |devices, params: &EngineParams, recorder: &RecorderParams| {
+        Engine::start(Bed::new(), devices, params, recorder).unwrap_err()
+    };
+    let device = || Box::new(Scripted::new(&Hand::default()));
+    let none = RecorderParams::default();
+    assert!(matches!(
+        start(vec![], &params(), &none),
+        StartError::Devices { found: 0 }
+    ));
+    let slow = EngineParams {
+        period: f64::NAN,
+        ..params()
+    };
+    assert!(matches!(
+        start(vec![device()], &slow, &none),
+        StartError::Period { .. }
+    ));
+    let nowhere = recorder(Path::new("/nowhere/run.mcap"));
+    let error = start(vec![device()], &params(), &nowhere);
+    assert!(
+        error
+            .to_string()
+            .starts_with("/nowhere/run.mcap: the log cannot be created"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_engine_that_is_dropped_lets_go_of_its_devices() {
+    let hand = Hand::default();
+    let device = Box::new(Scripted::new(&hand));
+    let engine = Engine::start(
+        Bed::new(),
+        vec![device],
+        &params(),
+        &RecorderParams::default(),
+    )
+    .unwrap();
+    let clock = RealClock::new(0.0);
+    while hand.force() < 0.1 {
+        clock.wait_until(clock.now() + 1e-3);
+        assert!(clock.now() < 20.0, "no force after 20 s");
+    }
+    drop(engine);
+    assert!(hand.force() == 0.0);
+}

@@ -1,0 +1,323 @@
+//! The faults of a haptic session, made on purpose through the real mailboxes, threads and devices. In each the force is
+//! finite and limited in size and slew, goes to zero, comes back; nothing recorded is lost, the log says what happened, and
+//! a replay goes through the same faults to the bit.
+
+use crate::{
+    devices::{Hand, Ill, Scripted},
+    engine::{check_records, params, recorder, run, wait},
+    toy::Bed,
+};
+use palpa_rt::{Clock, Engine, Level, Log, RealClock, ReplayParams, Report, Verdict, replay};
+
+/// A force that a hand feels, N; the script never presses with less.
+const FELT: f64 = 0.3;
+
+/// Waits for something to be so, as long as a test may hang.
+fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let clock = RealClock::new(0.0);
+    while !is_so() {
+        clock.wait_until(clock.now() + 1e-3);
+        assert!(clock.now() < 30.0, "30 s and still not so: {what}");
+    }
+}
+
+fn until_felt(hand: &Hand) {
+    until("a force is felt", || hand.force() > FELT);
+}
+
+fn until_zero(hand: &Hand) {
+    until("the force is zero", || hand.force() < 1e-9);
+}
+
+/// Runs, checks all that holds in every run, and replays.
+fn faulty(bed: &Bed, act: impl FnOnce(&mut Engine, &Hand)) -> (Report, Log) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (report, log) = run(&path, bed.clone(), |engine, hand| {
+        until_felt(hand);
+        act(engine, hand);
+    });
+    check_records(&report, &log);
+    let again = replay(&log, bed.clone(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+    assert_eq!(
+        (again.ticks, again.steps),
+        (report.ticks, log.steps.len() as u64)
+    );
+    (report, log)
+}
+
+/// The events that hold a text, all texts in this order.
+fn check_said(log: &Log, texts: &[&str]) {
+    let mut events = log.events.iter();
+    for text in texts {
+        assert!(
+            events.any(|e| e.text.contains(text)),
+            "{text:?} is not said, or not there:\n{:#?}",
+            log.events
+        );
+    }
+}
+
+#[test]
+fn a_tissue_that_stops_lets_the_force_go_and_brings_it_back() {
+    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+        engine.faults().pause_tissue(true);
+        until_zero(hand);
+        engine.faults().pause_tissue(false);
+        until_felt(hand);
+    });
+    check_said(
+        &log,
+        &[
+            "the tissue pauses",
+            "stale patch",
+            "the tissue goes on",
+            "no fault any more",
+        ],
+    );
+    // The pause is not made up for: its time is lost, and said to be.
+    let lost: f64 = log.steps.iter().map(|s| s.lost).sum();
+    assert!(lost > 0.02, "{lost} s");
+    check_said(&log, &["of time lost"]);
+}
+
+#[test]
+fn a_patch_that_comes_late_is_a_stall_and_no_jump() {
+    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+        engine.faults().delay_tissue(0.1);
+        until("the late patch came", || {
+            engine.tissue_stats().wall.max() > 0.1
+        });
+        until_felt(hand);
+        // One that is so late that it must not be felt at all.
+        engine.faults().delay_tissue(0.4);
+        until_zero(hand);
+        until_felt(hand);
+    });
+    check_said(
+        &log,
+        &[
+            "patch is late",
+            "stale patch",
+            "no fault any more",
+            "patch is late",
+            "stale patch",
+        ],
+    );
+}
+
+#[test]
+fn patches_with_nan_never_reach_the_hand() {
+    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+        engine.faults().spoil_patches(400);
+        until_zero(hand);
+        engine.faults().spoil_patches(0);
+        until_felt(hand);
+        // A single one among good ones.
+        engine.faults().spoil_patches(1);
+        wait(0.1);
+        until_felt(hand);
+    });
+    check_said(
+        &log,
+        &["a patch with NaN", "patch not usable", "no fault any more"],
+    );
+    assert!(log.steps.iter().filter(|s| s.spoilt == 1).count() > 1);
+    let all = log.ticks.iter().flat_map(|e| e.devices[0].force);
+    assert!(all.into_iter().all(f64::is_finite));
+}
+
+#[test]
+fn a_tissue_that_panics_is_gone_and_the_loop_is_not() {
+    let (report, log) = faulty(&Bed::new(), |engine, hand| {
+        engine.faults().panic_tissue();
+        until_zero(hand);
+        wait(0.1);
+        assert!(hand.force() < 1e-9);
+    });
+    check_said(
+        &log,
+        &[
+            "fault on purpose: the tissue panics",
+            "tissue panicked",
+            "stale patch",
+            "haptic loop stopped",
+        ],
+    );
+    assert!(report.warnings().any(|e| e.level == Level::Error));
+    // Caught: the thread ended by itself.
+    assert!(report.panicked.is_empty());
+}
+
+#[test]
+fn steps_that_fail_are_held_back_and_said() {
+    let mut bed = Bed::new();
+    bed.fails_at = Some(300);
+    let (report, log) = faulty(&bed, |engine, hand| {
+        until("the steps failed", || engine.snapshot().step.step > 330);
+        until_felt(hand);
+    });
+    assert_eq!(report.held_back, 20);
+    assert!(
+        log.steps
+            .iter()
+            .all(|s| s.published != (300..320).contains(&s.step))
+    );
+    assert!(
+        log.ticks
+            .iter()
+            .all(|e| !(300..320).contains(&e.tick.patch))
+    );
+    check_said(
+        &log,
+        &["tissue step 300: failed", "tissue step 320: converged"],
+    );
+}
+
+#[test]
+fn a_job_that_panics_is_said_and_the_next_one_runs() {
+    let mut bed = Bed::new();
+    bed.panics_in = Some(3);
+    let (report, log) = faulty(&bed, |engine, _| {
+        until("jobs ran after it", || engine.snapshot().step.factor > 5);
+    });
+    check_said(&log, &["a background job panicked", "tissue stopped"]);
+    assert!(log.steps.iter().all(|s| s.factor != 3));
+    assert!(report.panicked.is_empty());
+}
+
+#[test]
+fn devices_fail_in_all_ways_and_come_back() {
+    let (_, log) = faulty(&Bed::new(), |_, hand| {
+        for ill in [Ill::Unplugged, Ill::NaN, Ill::Stalled, Ill::Jumped] {
+            hand.make(ill);
+            until_zero(hand);
+            hand.make(Ill::No);
+            until_felt(hand);
+        }
+    });
+    check_said(
+        &log,
+        &[
+            "device 0 lost: not connected",
+            "device lost",
+            "device 0 is back",
+            "reading not a number",
+            "device stalled",
+            "device jumped",
+            "no fault any more",
+        ],
+    );
+    // What could not be read is recorded as such, and the tissue never sees a pose that is no number.
+    assert!(
+        log.ticks
+            .iter()
+            .any(|e| !e.devices[0].is_there && !e.devices[0].is_written)
+    );
+    assert!(
+        log.steps
+            .iter()
+            .flat_map(|s| s.positions)
+            .all(f64::is_finite)
+    );
+    assert!(
+        log.ticks
+            .iter()
+            .flat_map(|e| e.devices[0].position)
+            .any(f64::is_nan)
+    );
+}
+
+#[test]
+fn what_takes_too_long_leaves_ticks_out_and_never_bunches_them() {
+    let (report, log) = faulty(&Bed::new(), |engine, hand| {
+        engine.faults().delay_loop(0.05);
+        until("the hiccup is over", || {
+            engine.loop_stats().lateness.max() > 0.05
+        });
+        until_felt(hand);
+        hand.make(Ill::Slow);
+        wait(0.2);
+        hand.make(Ill::No);
+        until_felt(hand);
+    });
+    check_said(
+        &log,
+        &[
+            "the loop wakes up late",
+            "ticks left out",
+            "missed deadline",
+            "no fault any more",
+        ],
+    );
+    assert!(report.skipped >= 49 + 50, "{}", report.skipped);
+    let skipped: u64 = log.ticks.iter().map(|e| u64::from(e.tick.skipped)).sum();
+    assert_eq!(skipped, report.skipped);
+    // All ticks lie on the grid that began with the first, one to a place: after a gap they do not come in a burst.
+    let due = |e: &palpa_rt::TickEntry| e.tick.now - e.tick.lateness;
+    let past = |e: &palpa_rt::TickEntry| e.tick.lateness - 1e-3 * f64::from(e.tick.skipped);
+    for pair in log.ticks.windows(2) {
+        let places = f64::from(pair[0].tick.skipped) + 1.0;
+        assert!((due(&pair[1]) - due(&pair[0]) - 1e-3 * places).abs() < 1e-9);
+        assert!((-1e-9..1e-3 + 1e-9).contains(&past(&pair[1])));
+    }
+    let longest = log
+        .ticks
+        .windows(2)
+        .map(|p| p[1].tick.now - p[0].tick.now)
+        .fold(0.0, f64::max);
+    assert!(longest > 0.049);
+}
+
+#[test]
+fn a_hand_at_a_metre_per_second_is_served_within_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let hand = Hand::default();
+    // 20 mm at 8 Hz: 1 m/s through the surface, in and out of contact.
+    let device = Scripted {
+        rate: 8.0,
+        amplitude: 0.02,
+        ..Scripted::new(&hand)
+    };
+    let engine = Engine::start(
+        Bed::new(),
+        vec![Box::new(device)],
+        &params(),
+        &recorder(&path),
+    )
+    .unwrap();
+    until_felt(&hand);
+    wait(1.0);
+    let report = engine.stop();
+    let log = Log::open(&path).unwrap();
+    check_records(&report, &log);
+    let speed = (log.ticks.windows(2))
+        .map(|p| {
+            (p[1].devices[0].position[2] - p[0].devices[0].position[2])
+                / (p[1].tick.now - p[0].tick.now)
+        })
+        .fold(0.0, f64::max);
+    assert!(speed > 0.95, "{speed} m/s");
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+}
+
+#[test]
+fn a_log_that_cannot_be_written_is_said_and_the_session_goes_on() {
+    // A device that takes no byte; where there is none, there is nothing to test.
+    let full = std::path::Path::new("/dev/full");
+    if !full.exists() {
+        return;
+    }
+    let hand = Hand::default();
+    let device = Box::new(Scripted::new(&hand));
+    let result = Engine::start(Bed::new(), vec![device], &params(), &recorder(full));
+    // The header is written at once: so it is known before anything moves.
+    let error = result.unwrap_err().to_string();
+    assert!(
+        error.contains("/dev/full: the log cannot be created"),
+        "{error}"
+    );
+}

@@ -1,0 +1,132 @@
+//! Logs that were cut off, and logs as tables.
+
+use crate::{
+    engine::{run, wait},
+    toy::Bed,
+};
+use palpa_rt::{Log, ReplayParams, Table, Verdict, export, replay};
+use std::fs;
+
+#[test]
+fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |_, _| wait(1.6));
+    let bytes = fs::read(&path).unwrap();
+    let cut = folder.path().join("cut.mcap");
+    let mut n_before = 0;
+    for share in [0.3, 0.5, 0.7, 0.9, 0.999] {
+        fs::write(&cut, &bytes[..(bytes.len() as f64 * share) as usize]).unwrap();
+        let part = Log::open(&cut).unwrap();
+        assert!(!part.is_whole);
+        assert_eq!(part.header, log.header);
+        let n = part.ticks.len();
+        assert_eq!(part.ticks[..], log.ticks[..n]);
+        assert_eq!(part.steps[..], log.steps[..part.steps.len()]);
+        // Chunks are a quarter of a second, more when the machine is busy.
+        assert!(
+            n >= n_before && n as f64 > log.ticks.len() as f64 * (share - 0.5),
+            "{n} ticks at {share}"
+        );
+        n_before = n;
+        let again = replay(&part, Bed::new(), &ReplayParams::default());
+        assert!(
+            matches!(again.verdict, Verdict::Same | Verdict::Incomplete),
+            "{again:?}"
+        );
+        assert!(again.first_force.is_none() && again.first_patch.is_none());
+    }
+    assert!(n_before > 0);
+    // Cut within the header there is nothing to read; that is an error with a reason.
+    fs::write(&cut, &bytes[..20]).unwrap();
+    assert!(Log::open(&cut).is_err());
+    fs::write(&cut, b"this is no log").unwrap();
+    assert!(
+        Log::open(&cut)
+            .unwrap_err()
+            .to_string()
+            .contains("not a readable log")
+    );
+}
+
+#[test]
+fn what_was_flushed_is_there_while_the_engine_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run(&path, Bed::new(), |engine, _| {
+        // As after a kill: the file as it is at this moment, whatever is still in memory.
+        wait(1.5);
+        let now = engine.now();
+        let log = Log::open(&path).unwrap();
+        let last = log.ticks.last().unwrap().tick.now;
+        assert!(!log.is_whole);
+        // Half a second is promised on a machine that lets the recorder run; a shared one may not.
+        assert!(now - last < 1.0, "{} s are not on disk", now - last);
+    });
+}
+
+#[test]
+fn tables_hold_the_same_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |_, _| wait(0.4));
+    let files = export(&path, folder.path().join("csv"), Table::Csv).unwrap();
+    let names: Vec<_> = files
+        .iter()
+        .map(|f| f.file_name().unwrap().to_str().unwrap())
+        .collect();
+    assert_eq!(
+        names,
+        ["ticks.csv", "steps.csv", "device0.csv", "events.csv"]
+    );
+    let mut rows = csv::Reader::from_path(&files[2]).unwrap();
+    let column = rows
+        .headers()
+        .unwrap()
+        .iter()
+        .position(|h| h == "force_z")
+        .unwrap();
+    let forces: Vec<f64> = rows
+        .records()
+        .map(|r| r.unwrap()[column].parse().unwrap())
+        .collect();
+    let want: Vec<f64> = log.ticks.iter().map(|e| e.devices[0].force[2]).collect();
+    assert_eq!(forces, want);
+    let events = fs::read_to_string(&files[3]).unwrap();
+    assert!(events.contains("info,haptic loop started"), "{events}");
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_holds_the_same_bits() {
+    use parquet::{
+        file::reader::{FileReader, SerializedFileReader},
+        record::RowAccessor,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |_, _| wait(0.4));
+    let files = export(&path, folder.path().join("parquet"), Table::Parquet).unwrap();
+    let steps = SerializedFileReader::new(fs::File::open(&files[1]).unwrap()).unwrap();
+    let schema = steps.metadata().file_metadata().schema().clone();
+    let column = |name: &str| {
+        schema
+            .get_fields()
+            .iter()
+            .position(|f| f.name() == name)
+            .unwrap()
+    };
+    let (hash, energy, published) = (column("hash"), column("energy"), column("published"));
+    let mut n = 0;
+    for (row, want) in steps.get_row_iter(None).unwrap().zip(&log.steps) {
+        let row = row.unwrap();
+        assert_eq!(row.get_ulong(hash).unwrap(), want.hash);
+        assert_eq!(
+            row.get_double(energy).unwrap().to_bits(),
+            want.energy.to_bits()
+        );
+        assert_eq!(row.get_bool(published).unwrap(), want.published);
+        n += 1;
+    }
+    assert_eq!(n, log.steps.len());
+}

@@ -1,0 +1,88 @@
+//! What a device says, checked: the border at which NaN, jumps and silence are stopped.
+
+use crate::velocity::VelocityEstimate;
+use crate::{DeviceState, Faults, Pose, ServoParams, Vec3};
+
+/// A hand-piece as the law believes it to be: always finite.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HandPiece {
+    pub(crate) pose: Pose,
+    /// Estimated, m/s.
+    pub(crate) velocity: Vec3,
+    /// How far it moved since the tick before, m; zero over anything that was no motion of a hand.
+    pub(crate) travel: Vec3,
+    /// When the reading last changed, by the loop's clock, and the device's time of that reading.
+    changed_at: f64,
+    read_at: f64,
+    is_known: bool,
+    estimate: VelocityEstimate,
+}
+
+impl HandPiece {
+    pub(crate) const fn new(at: Pose) -> Self {
+        Self {
+            pose: at,
+            velocity: Vec3::new(0.0, 0.0, 0.0),
+            travel: Vec3::new(0.0, 0.0, 0.0),
+            changed_at: 0.0,
+            read_at: f64::NAN,
+            is_known: false,
+            estimate: VelocityEstimate::new(),
+        }
+    }
+
+    pub(crate) fn update(
+        &mut self,
+        now: f64,
+        dt: f64,
+        state: Option<&DeviceState>,
+        params: &ServoParams,
+    ) -> Faults {
+        self.travel = Vec3::zeros();
+        let Some(state) = state else {
+            return self.lost(Faults::DEVICE_LOST);
+        };
+        let at = state.pose.translation.vector;
+        let turn = state.pose.rotation.coords;
+        let is_pose =
+            at.iter().all(|x| x.abs() < MAX_POSITION) && (turn.norm_squared() - 1.0).abs() < 1e-3;
+        if !is_pose || !state.time.is_finite() {
+            return self.lost(Faults::BAD_READING);
+        }
+        let mut faults = Faults::NONE;
+        if self.is_known {
+            self.travel = at - self.pose.translation.vector;
+            // A missed tick or two must not make a fast hand a jump.
+            if self.travel.norm() > params.max_speed * dt.max(params.period) {
+                faults |= Faults::DEVICE_JUMPED;
+                self.travel = Vec3::zeros();
+                self.estimate.clear();
+            }
+        }
+        if !self.is_known || state.time.to_bits() != self.read_at.to_bits() {
+            self.read_at = state.time;
+            self.changed_at = now;
+        } else if now - self.changed_at > params.stall_after {
+            faults |= Faults::DEVICE_STALLED;
+        }
+        self.pose = state.pose;
+        self.pose.rotation = nalgebra::UnitQuaternion::new_normalize(*state.pose.rotation);
+        self.is_known = true;
+        self.velocity = self.estimate.update(now, &at, params.resolution);
+        if !self.velocity.iter().all(|v| v.abs() < MAX_POSITION) {
+            self.velocity = Vec3::zeros();
+        }
+        faults
+    }
+
+    fn lost(&mut self, fault: Faults) -> Faults {
+        // Where it comes back is no jump of the hand, nor work done by it.
+        self.is_known = false;
+        self.velocity = Vec3::zeros();
+        self.estimate.clear();
+        fault
+    }
+}
+
+/// No hand is farther than this from the origin, m: larger readings are no positions.
+const MAX_POSITION: f64 = 1e3;

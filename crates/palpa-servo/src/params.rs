@@ -1,0 +1,64 @@
+//! What can be set in the law.
+
+/// Settings of the law; the defaults are what the tests show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ServoParams {
+    /// Period that the loop aims at, s. Lateness is counted from it.
+    pub period: f64,
+    /// The contact problem is solved when a sweep changes the forces by less than this share of their sum.
+    pub tolerance: f64,
+    /// Largest number of sweeps over the contacts in one tick.
+    pub max_sweeps: u32,
+    /// How often the gaps are linearised anew within a tick.
+    pub passes: u32,
+    /// Time in which a new patch takes over from the old one, in patch periods.
+    pub transfer_periods: f64,
+    /// Largest difference between two patches that is bridged, as a share of the device's largest force.
+    pub max_transfer: f64,
+    /// Age at which a patch is stale, in patch periods, and at least [`ServoParams::stale_after`].
+    pub stale_periods: f64,
+    /// Shortest age at which a patch may be called stale, s.
+    pub stale_after: f64,
+    /// Time between two ticks beyond which the deadline counts as missed, s.
+    pub late_after: f64,
+    /// Time for which a device may repeat the same reading before it counts as stalled, s.
+    pub stall_after: f64,
+    /// Speed beyond which a change of position is no hand's, m/s.
+    pub max_speed: f64,
+    /// Time in which the force falls to zero after a fault, s.
+    pub ramp_down: f64,
+    /// Time in which it comes back, s.
+    pub ramp_up: f64,
+    /// Energy that may be given out beyond what was taken in before damping is injected, J.
+    pub energy_budget: f64,
+    /// Time in which energy that was lost in the tissue is forgotten by the observer, s.
+    pub bank_time: f64,
+    /// Damping that is always rendered in contact, N s/m: 0 but for trials, since the tissue has its own.
+    pub damping: f64,
+    /// Step of the device's position sensor, m: differences below it say nothing of the velocity.
+    pub resolution: f64,
+}
+
+impl Default for ServoParams {
+    fn default() -> Self {
+        Self {
+            period: 1e-3,
+            tolerance: 1e-3,
+            max_sweeps: 60,
+            passes: 3,
+            transfer_periods: 2.0,
+            max_transfer: 0.25,
+            stale_periods: 4.0,
+            stale_after: 0.05,
+            late_after: 0.01,
+            stall_after: 0.02,
+            max_speed: 5.0,
+            ramp_down: 0.05,
+            ramp_up: 0.5,
+            energy_budget: 2e-3,
+            bank_time: 0.2,
+            damping: 0.0,
+            resolution: 5e-5,
+        }
+    }
+}

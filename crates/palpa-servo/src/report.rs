@@ -1,0 +1,216 @@
+//! What one tick says of itself.
+
+use crate::{MAX_TOOLS, Vec3};
+use core::fmt;
+use core::ops::{BitOr, BitOrAssign};
+
+macro_rules! flags {
+    ($(#[$doc:meta])* $name:ident { $($(#[$flag_doc:meta])* $flag:ident = $bit:expr, $text:expr;)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, Default)]
+        pub struct $name(u16);
+
+        impl $name {
+            /// None of them.
+            pub const NONE: Self = Self(0);
+            $($(#[$flag_doc])* pub const $flag: Self = Self(1 << $bit);)*
+
+            /// Whether all of `other` are set.
+            pub const fn contains(self, other: Self) -> bool {
+                self.0 & other.0 == other.0
+            }
+
+            /// Whether none is set.
+            pub const fn is_empty(self) -> bool {
+                self.0 == 0
+            }
+
+            /// As a bit mask, for records.
+            pub const fn bits(self) -> u16 {
+                self.0
+            }
+
+            /// From such a mask; bits that mean nothing are dropped.
+            pub const fn from_bits(bits: u16) -> Self {
+                Self(bits & (0 $(| 1 << $bit)*))
+            }
+
+            /// Calls `f` with the words for each that is set.
+            pub fn for_each_name(self, mut f: impl FnMut(&'static str)) {
+                $(if self.contains(Self::$flag) { f($text); })*
+            }
+        }
+
+        impl BitOr for $name {
+            type Output = Self;
+            fn bitor(self, other: Self) -> Self {
+                Self(self.0 | other.0)
+            }
+        }
+
+        impl BitOrAssign for $name {
+            fn bitor_assign(&mut self, other: Self) {
+                self.0 |= other.0;
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                let mut set = f.debug_set();
+                self.for_each_name(|name| { set.entry(&format_args!("{name}")); });
+                set.finish()
+            }
+        }
+    };
+}
+
+flags! {
+    /// Why the force is ramped to zero. Each is set in the ticks in which its cause is there.
+    Faults {
+        /// There was no patch yet.
+        NO_PATCH = 0, "no patch yet";
+        /// The newest patch is too old.
+        STALE_PATCH = 1, "stale patch";
+        /// The newest patch holds values that are no contact.
+        BAD_PATCH = 2, "patch not usable";
+        /// The time since the last tick was too long.
+        MISSED_DEADLINE = 3, "missed deadline";
+        /// The clock went back, stood or was not a number.
+        BAD_CLOCK = 4, "bad clock";
+        /// A device gave no reading.
+        DEVICE_LOST = 5, "device lost";
+        /// A device gave a reading that is not a number.
+        BAD_READING = 6, "reading not a number";
+        /// A device repeats the same reading.
+        DEVICE_STALLED = 7, "device stalled";
+        /// A position jumped as no hand can.
+        DEVICE_JUMPED = 8, "device jumped";
+        /// The contact problem gave no finite force.
+        NO_SOLUTION = 9, "contact not solved";
+    }
+}
+
+flags! {
+    /// Which limits a force met.
+    Limits {
+        /// Largest force of the device.
+        FORCE = 0, "force";
+        /// Largest moment of the device.
+        TORQUE = 1, "torque";
+        /// Largest change in time.
+        SLEW = 2, "slew";
+        /// The ramp held the force back.
+        RAMP = 3, "ramp";
+        /// The energy observer injected damping.
+        ENERGY = 4, "energy";
+        /// The coupling softened what is too stiff for the device.
+        STIFFNESS = 5, "stiffness";
+        /// The difference to a new patch was more than is bridged.
+        TRANSFER = 6, "transfer";
+        /// The sweeps ended before the tolerance was met.
+        SWEEPS = 7, "sweeps";
+    }
+}
+
+/// What one tick did for one tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolReport {
+    /// Force of the tissue on the tool by the local model, N, before anything is done to it.
+    pub tissue_force: Vec3,
+    /// Its moment about the tool's position, N m.
+    pub tissue_torque: Vec3,
+    /// Force that was commanded, N.
+    pub force: Vec3,
+    /// What is still bridged from the patch before, N; part of the force.
+    pub transfer: Vec3,
+    /// Velocity as estimated, m/s.
+    pub velocity: Vec3,
+    /// Stiffness of the tissue against the tool, N/m; 0 without contact.
+    pub stiffness: f64,
+    /// How far the tool stands off the device's position because of the coupling, m.
+    pub stretch: f64,
+    /// Share of the tissue's stiffness that the coupling takes away: 0 where the tissue's own is felt.
+    pub softening: f64,
+    /// Damping that the energy observer injected, N s/m.
+    pub damping: f64,
+    /// Energy taken from the hand since the start, J.
+    pub energy_in: f64,
+    /// Energy given to the hand since the start, J.
+    pub energy_out: f64,
+    /// What the observer has banked: negative is energy generated, J.
+    pub bank: f64,
+    /// The limits that were met.
+    pub limits: Limits,
+    /// What of this tool's device was wrong.
+    pub faults: Faults,
+}
+
+impl ToolReport {
+    /// Of a tool that does nothing.
+    pub const ZERO: Self = Self {
+        tissue_force: Vec3::new(0.0, 0.0, 0.0),
+        tissue_torque: Vec3::new(0.0, 0.0, 0.0),
+        force: Vec3::new(0.0, 0.0, 0.0),
+        transfer: Vec3::new(0.0, 0.0, 0.0),
+        velocity: Vec3::new(0.0, 0.0, 0.0),
+        stiffness: 0.0,
+        stretch: 0.0,
+        softening: 0.0,
+        damping: 0.0,
+        energy_in: 0.0,
+        energy_out: 0.0,
+        bank: 0.0,
+        limits: Limits::NONE,
+        faults: Faults::NONE,
+    };
+}
+
+/// What one tick did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TickReport {
+    /// Clock of the tick, s.
+    pub now: f64,
+    /// Patch that the force comes from.
+    pub patch_id: u64,
+    /// Whether that patch arrived in this tick.
+    pub is_new_patch: bool,
+    /// Time since the poses of the patch were taken, s.
+    pub patch_age: f64,
+    /// Candidates that touch.
+    pub n_active: u32,
+    /// Of these, those that slide.
+    pub n_sliding: u32,
+    /// Sweeps over the contacts.
+    pub sweeps: u32,
+    /// Change of the contact forces in the last sweep as a share of their sum.
+    pub residual: f64,
+    /// Share of the force that is let through: below 1 after a fault.
+    pub gain: f64,
+    /// Energy that may be given out beyond what was taken in, J.
+    pub energy_budget: f64,
+    /// What was wrong in this tick, over all tools.
+    pub faults: Faults,
+    /// Limits met, over all tools.
+    pub limits: Limits,
+    /// The tools; those that the loop has no device for are [`ToolReport::ZERO`].
+    pub tools: [ToolReport; MAX_TOOLS],
+}
+
+impl TickReport {
+    /// Of a tick that did nothing.
+    pub const ZERO: Self = Self {
+        now: 0.0,
+        patch_id: 0,
+        is_new_patch: false,
+        patch_age: 0.0,
+        n_active: 0,
+        n_sliding: 0,
+        sweeps: 0,
+        residual: 0.0,
+        gain: 0.0,
+        energy_budget: 0.0,
+        faults: Faults::NONE,
+        limits: Limits::NONE,
+        tools: [ToolReport::ZERO; MAX_TOOLS],
+    };
+}

@@ -1,0 +1,8 @@
+//! The law against oracles, garbage and its own limits.
+
+mod contact;
+#[cfg(debug_assertions)] // the allocator that forbids is not there in a release build
+mod cost;
+mod garbage;
+mod support;
+mod tick;
