@@ -63,8 +63,9 @@ pub(super) struct ContactProblem {
     /// By how much the force that the linear system takes is more than before: `f − p0` along the normals, or along the
     /// axes, N.
     pub(super) change: Vec<f64>,
-    along: Vec<f64>,
-    factor: Vec<f64>,
+    /// Compliance along the normals, m/N.
+    pub(super) along: Vec<f64>,
+    pub(super) factor: Vec<f64>,
     is_active: [bool; MOST_CANDIDATES],
 }
 
@@ -82,7 +83,7 @@ impl ContactProblem {
     }
 
     /// The block of the compliance between two candidates, with friction.
-    fn block(&self, i: usize, j: usize) -> Mat3 {
+    pub(super) fn block(&self, i: usize, j: usize) -> Mat3 {
         let n = 3 * self.candidates.len();
         Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
@@ -146,26 +147,39 @@ impl ContactProblem {
                     .filter(|j| !rows[..m].contains(j) && start[*j] != 0.0)
                     .map(|j| self.along[i + n * j] * start[j])
                     .sum();
-                let gap = if self.is_active[i] { self.candidates[i].gap } else { 0.0 };
+                let gap = if self.is_active[i] {
+                    self.candidates[i].gap
+                } else {
+                    0.0
+                };
                 *right = released - rest[i] - gap;
             }
             let candidates = &self.candidates;
             let (is_active, along) = (&self.is_active, &self.along);
             let entry = |r: usize, c: usize| {
                 let (i, j) = (rows[r], rows[c]);
-                let own = if r == c && !is_active[i] { 1.0 / candidates[i].support } else { 0.0 };
+                let own = if r == c && !is_active[i] {
+                    1.0 / candidates[i].support
+                } else {
+                    0.0
+                };
                 along[i + n * j] - own
             };
             // Change from the start of those in the system.
             let offset: [f64; MOST_CANDIDATES] = std::array::from_fn(|r| {
-                if r < m && !is_active[rows[r]] { start[rows[r]] / candidates[rows[r]].support } else { 0.0 }
+                if r < m && !is_active[rows[r]] {
+                    start[rows[r]] / candidates[rows[r]].support
+                } else {
+                    0.0
+                }
             });
             for r in 0..m {
                 right[r] += offset[r];
             }
-            if !solve_symmetric(m, entry, &mut right, &mut self.factor) {
+            if !factor_symmetric(m, entry, &mut self.factor) {
                 return;
             }
+            substitute_symmetric(m, &self.factor, &mut right[..m]);
             let mut change = [0.0; MOST_CANDIDATES];
             for j in 0..n {
                 change[j] = -start[j];
@@ -220,10 +234,17 @@ impl ContactProblem {
     }
 
     /// Sweeps with friction; leaves `change` along the axes.
-    fn rub(&mut self, tools: &[PosedTool], start: &[f64; MOST_CANDIDATES], before: &[Vec3; MOST_CANDIDATES]) {
+    fn rub(
+        &mut self,
+        tools: &[PosedTool],
+        start: &[f64; MOST_CANDIDATES],
+        before: &[Vec3; MOST_CANDIDATES],
+    ) {
         let n = self.candidates.len();
         let mut taken: [Vec3; MOST_CANDIDATES] = std::array::from_fn(|i| {
-            self.candidates.get(i).map_or(Vec3::zeros(), |c| c.normal * Self::taken(c) + c.friction)
+            self.candidates
+                .get(i)
+                .map_or(Vec3::zeros(), |c| c.normal * Self::taken(c) + c.friction)
         });
         for _ in 0..SWEEPS {
             let (mut moved, mut size) = (0.0, 0.0);
@@ -250,7 +271,11 @@ impl ContactProblem {
                 let friction = candidate.friction - slip / across;
                 let most = tool.friction() * pressure;
                 let norm = friction.norm();
-                let friction = if norm > most { friction * (most / norm) } else { friction };
+                let friction = if norm > most {
+                    friction * (most / norm)
+                } else {
+                    friction
+                };
                 let step = normal * push + friction - candidate.friction;
                 if step != Vec3::zeros() {
                     for j in 0..n {
@@ -275,11 +300,10 @@ impl ContactProblem {
     }
 }
 
-/// Solves a dense symmetric system by LDLᵀ; the solution replaces the right side. False where a pivot is nearly zero.
-fn solve_symmetric(
+/// Factors a dense symmetric matrix by LDLᵀ. False where a pivot is nearly zero.
+pub(super) fn factor_symmetric(
     n: usize,
     entry: impl Fn(usize, usize) -> f64,
-    right: &mut [f64],
     factor: &mut [f64],
 ) -> bool {
     const LEAST_PIVOT: f64 = 1e-12;
@@ -299,13 +323,18 @@ fn solve_symmetric(
                 for k in 0..c {
                     sum -= row[k] * row[k] / before[k * n + k];
                 }
-                if sum.abs() <= LEAST_PIVOT * size {
+                if sum.is_nan() || sum.abs() <= LEAST_PIVOT * size {
                     return false;
                 }
                 row[r] = sum;
             }
         }
     }
+    true
+}
+
+/// Solves with the factor of [`factor_symmetric`]; the solution replaces the right side.
+pub(super) fn substitute_symmetric(n: usize, factor: &[f64], right: &mut [f64]) {
     for r in 0..n {
         let mut sum = right[r];
         for k in 0..r {
@@ -318,5 +347,4 @@ fn solve_symmetric(
             right[r] -= factor[c * n + r] / factor[r * n + r] * right[c];
         }
     }
-    true
 }

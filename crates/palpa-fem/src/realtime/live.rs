@@ -6,6 +6,7 @@ use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
 
 use super::contact::{Candidate, ContactProblem};
+use super::local::LocalModel;
 use super::zone::{Follower, Inside, Outside, Plan, Trouble, Workshop};
 use super::{MOST_CANDIDATES, column_pattern};
 use crate::contact::PosedTool;
@@ -19,6 +20,8 @@ const FIRST_SPRING: f64 = 0.03;
 const SPRING_GROWTH: f64 = 3.0;
 const MOST_SPRING: f64 = 10.0;
 const SPRING_PATIENCE: u32 = 20;
+/// Growth of the zone's radius where vertices of its ring press.
+const ZONE_GROWTH: f64 = 1.3;
 /// Share of an iteration below which it has failed.
 const LEAST_SHARE: f64 = 0.05;
 /// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
@@ -155,26 +158,36 @@ impl Rebuild {
             PlanOrCentre::Same(plan) => plan,
             PlanOrCentre::New { id, centre, radius } => {
                 let plan = Plan::new(model, pattern, id, centre, radius);
-                Arc::new(plan.expect("a body that could be factored with one zone can with another"))
+                Arc::new(
+                    plan.expect("a body that could be factored with one zone can with another"),
+                )
             }
         };
-        let mut shop = self.shop.filter(|shop| shop.plan == plan.id).unwrap_or_else(|| {
-            Box::new(Shop {
-                plan: plan.id,
-                follower: Follower::new(model, memory, pattern, &plan, true),
-                workshop: Workshop::new(model, pattern, &plan),
-            })
-        });
+        let mut shop = self
+            .shop
+            .filter(|shop| shop.plan == plan.id)
+            .unwrap_or_else(|| {
+                Box::new(Shop {
+                    plan: plan.id,
+                    follower: Follower::new(model, memory, pattern, &plan, true),
+                    workshop: Workshop::new(model, pattern, &plan),
+                })
+            });
         if let Some((plan, old)) = &self.old {
             let mut scratch = palpa_sparse::fronts::SolveScratch::new(&plan.tree);
             let x = &mut shop.workshop.x;
             old.settle(model, plan, &mut self.displacements, x, &mut scratch);
         }
         shop.follower.batches.refresh(model, memory);
-        let recycled = self.retired.filter(|old| old.plan == plan.id).and_then(Arc::into_inner);
+        let recycled = self
+            .retired
+            .filter(|old| old.plan == plan.id)
+            .and_then(Arc::into_inner);
         let mut outside = recycled.unwrap_or_else(|| Outside::new(model, &plan));
         outside.id = self.id;
-        let Shop { follower, workshop, .. } = &mut *shop;
+        let Shop {
+            follower, workshop, ..
+        } = &mut *shop;
         let made = outside.refactor(
             model,
             memory,
@@ -188,7 +201,10 @@ impl Rebuild {
             let follower = self
                 .is_followed
                 .then(|| Box::new(Follower::new(model, memory, pattern, &plan, false)));
-            (Box::new(Inside::new(model, memory, pattern, &plan)), follower)
+            (
+                Box::new(Inside::new(model, memory, pattern, &plan)),
+                follower,
+            )
         });
         Rebuilt {
             plan,
@@ -232,6 +248,8 @@ pub struct Live {
     /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
     spring: f64,
     spring_age: u32,
+    /// Radius of zones: what was asked for, or more where a tool touches more, m.
+    radius: f64,
     job: Option<Rebuild>,
     is_job_out: bool,
     n_jobs: u64,
@@ -262,7 +280,9 @@ impl Live {
             workshop: Workshop::new(&model, &pattern, &plan),
         });
         let mut outside = Outside::new(&model, &plan);
-        let Shop { follower, workshop, .. } = &mut *shop;
+        let Shop {
+            follower, workshop, ..
+        } = &mut *shop;
         let rest = &state.displacements;
         outside
             .refactor(&model, &memory, &pattern, &plan, follower, workshop, rest)
@@ -271,8 +291,8 @@ impl Live {
                 Trouble::Singular => FemError::NoRest { at: centre.into() },
             })?;
         let is_followed = params.exterior == ExteriorMode::Followed;
-        let follower = is_followed
-            .then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
+        let follower =
+            is_followed.then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
         let (n, n_vertices) = (model.n_nodes(), model.body.n_vertices());
         let n_dofs = model.structure.n_dofs();
         Ok(Self {
@@ -295,6 +315,7 @@ impl Live {
             tools: Vec::with_capacity(tools.len()),
             spring: 0.0,
             spring_age: 0,
+            radius: params.zone_radius,
             job: None,
             is_job_out: false,
             n_jobs: 0,
@@ -322,13 +343,27 @@ impl Live {
     /// Columns of the zone, of its ring, and of the body.
     pub fn n_columns(&self) -> [usize; 3] {
         let tree = &self.plan.tree;
-        [tree.n_zone_columns(), tree.n_ring_columns(), tree.n_columns()]
+        [
+            tree.n_zone_columns(),
+            tree.n_ring_columns(),
+            tree.n_columns(),
+        ]
     }
 
     /// Force of the tissue on a tool, N.
     pub fn tool_force(&self, tool: usize) -> Vec3 {
         let candidates = self.problem.candidates.iter();
-        -candidates.filter(|c| c.tool as usize == tool).map(Candidate::force).sum::<Vec3>()
+        -candidates
+            .filter(|c| c.tool as usize == tool)
+            .map(Candidate::force)
+            .sum::<Vec3>()
+    }
+
+    /// The local model at the tools' present place, with at most `most` contacts; beyond that, neighbours that press are put
+    /// together.
+    pub fn local_model(&mut self, most: usize, out: &mut LocalModel) {
+        self.problem
+            .local_model(&self.tools, self.has_friction, most, out);
     }
 
     /// Follows the tools to where they are now.
@@ -379,15 +414,24 @@ impl Live {
         if !self.is_fresh {
             self.internal_forces()?;
         }
-        if let (Some(follower), Some(outside)) = (&mut self.follower, Arc::get_mut(&mut self.outside)) {
-            outside.follow(&model, &self.memory, &plan, follower, &self.state.displacements)?;
+        if let (Some(follower), Some(outside)) =
+            (&mut self.follower, Arc::get_mut(&mut self.outside))
+        {
+            outside.follow(
+                &model,
+                &self.memory,
+                &plan,
+                follower,
+                &self.state.displacements,
+            )?;
         }
         self.find_candidates(dt);
         self.refactor(report)?;
         let zone = plan.tree.first_zone_dof();
         self.right_side();
         self.inside.substitute(&plan, &mut self.x);
-        self.inside.prepare(&plan, &self.x, self.has_friction, &mut self.problem);
+        self.inside
+            .prepare(&plan, &self.x, self.has_friction, &mut self.problem);
         self.problem.solve(&self.tools, self.has_friction);
         self.inside.push(&plan, &self.problem, &mut self.x);
         self.inside.back_substitute(&plan, &mut self.x);
@@ -411,11 +455,21 @@ impl Live {
         self.accept_contact(share);
         if let Some(follower) = &mut self.follower {
             let x = &mut self.moves;
-            self.outside
-                .settle(&model, &plan, &mut self.state.displacements, x, &mut follower.solve);
+            self.outside.settle(
+                &model,
+                &plan,
+                &mut self.state.displacements,
+                x,
+                &mut follower.solve,
+            );
         }
         report.n_candidates = self.problem.candidates.len();
-        report.n_active = self.problem.candidates.iter().filter(|c| c.pressure > 0.0).count();
+        report.n_active = self
+            .problem
+            .candidates
+            .iter()
+            .filter(|c| c.pressure > 0.0)
+            .count();
         report.residual = self.residual();
         Ok(())
     }
@@ -425,8 +479,19 @@ impl Live {
     fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
         let (model, pattern, plan) = (&*self.model, &*self.pattern, &*self.plan);
         let inside = &mut self.inside;
-        inside.assemble(model, &self.memory, pattern, plan, &self.state.displacements)?;
-        let pressed = self.problem.candidates.iter().filter(|c| c.pressure > 0.0).map(|c| c.vertex);
+        inside.assemble(
+            model,
+            &self.memory,
+            pattern,
+            plan,
+            &self.state.displacements,
+        )?;
+        let pressed = self
+            .problem
+            .candidates
+            .iter()
+            .filter(|c| c.pressure > 0.0)
+            .map(|c| c.vertex);
         let size = inside.skin_stiffness(pattern, pressed);
         self.spring_age += 1;
         if self.spring > 0.0 && self.spring_age > SPRING_PATIENCE {
@@ -440,7 +505,11 @@ impl Live {
         loop {
             let springs = self.spring * size;
             for candidate in &mut self.problem.candidates {
-                candidate.support = if candidate.pressure > 0.0 { springs } else { 0.0 };
+                candidate.support = if candidate.pressure > 0.0 {
+                    springs
+                } else {
+                    0.0
+                };
             }
             inside.add_springs(pattern, &self.problem.candidates, springs - there);
             there = springs;
@@ -507,7 +576,8 @@ impl Live {
             }
         }
         let displacements = &self.state.displacements;
-        self.outside.push(&self.plan, displacements, &mut self.x, &mut self.moves);
+        self.outside
+            .push(&self.plan, displacements, &mut self.x, &mut self.moves);
     }
 
     /// Forces out of balance in the zone off its ring, as a share of the tools'.
@@ -529,13 +599,21 @@ impl Live {
             .filter(|&&v| self.plan.tree.first_dof(v as usize) < ring)
             .map(|&v| {
                 let node = self.model.body.node(v as usize, 0);
-                let pressed = self.problem.candidates.binary_search_by_key(&v, |c| c.vertex);
+                let pressed = self
+                    .problem
+                    .candidates
+                    .binary_search_by_key(&v, |c| c.vertex);
                 let tool = pressed.map_or(Vec3::zeros(), |i| self.problem.candidates[i].force());
                 let force = tool - self.forces[node];
                 self.model.supports[node].free_part(&force).norm_squared()
             })
             .sum();
-        let size: f64 = self.problem.candidates.iter().map(|c| c.force().norm_squared()).sum();
+        let size: f64 = self
+            .problem
+            .candidates
+            .iter()
+            .map(|c| c.force().norm_squared())
+            .sum();
         ((sum + skin) / size.max(1e-12)).sqrt()
     }
 
@@ -552,9 +630,16 @@ impl Live {
                 continue;
             }
             let start = model.body.positions[node] + self.state.displacements[node];
-            let distances = self.tools.iter().map(|tool| tool.tool.distance_at(&tool.pose, &start));
-            let nearest = distances.enumerate().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-            let Some((tool, distance)) = nearest else { continue };
+            let distances = self
+                .tools
+                .iter()
+                .map(|tool| tool.tool.distance_at(&tool.pose, &start));
+            let nearest = distances
+                .enumerate()
+                .min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+            let Some((tool, distance)) = nearest else {
+                continue;
+            };
             let pressure = self.pressures[vertex];
             if distance.distance > reach && pressure == 0.0 {
                 continue;
@@ -567,7 +652,10 @@ impl Live {
             } else {
                 // Where it would touch.
                 let surface = start - normal * distance.distance;
-                self.tools[tool].pose.inverse_transform_point(&surface.into()).coords
+                self.tools[tool]
+                    .pose
+                    .inverse_transform_point(&surface.into())
+                    .coords
             };
             candidates.push(Candidate {
                 vertex: v,
@@ -583,7 +671,13 @@ impl Live {
             });
         }
         if candidates.len() > MOST_CANDIDATES {
-            let order = |c: &Candidate| if c.pressure > 0.0 { f64::NEG_INFINITY } else { c.gap };
+            let order = |c: &Candidate| {
+                if c.pressure > 0.0 {
+                    f64::NEG_INFINITY
+                } else {
+                    c.gap
+                }
+            };
             candidates.select_nth_unstable_by(MOST_CANDIDATES - 1, |a, b| {
                 order(a).total_cmp(&order(b)).then(a.vertex.cmp(&b.vertex))
             });
@@ -625,9 +719,23 @@ impl Live {
         if self.is_job_out || self.job.is_some() || self.plan.exterior.is_empty() {
             return;
         }
-        let radius = self.params.zone_radius;
+        let ring = self.x.len() - 3 * self.plan.ring.len();
+        let reaches_ring = self
+            .problem
+            .candidates
+            .iter()
+            .any(|c| c.pressure > 0.0 && self.plan.tree.first_dof(c.vertex as usize) >= ring);
+        if reaches_ring {
+            self.radius *= ZONE_GROWTH;
+        }
+        let radius = self.radius;
         let displacements = &self.state.displacements;
-        let near = nearest_point(&self.model, displacements, &self.tools, Some(&self.plan.vertices));
+        let near = nearest_point(
+            &self.model,
+            displacements,
+            &self.tools,
+            Some(&self.plan.vertices),
+        );
         let (_, centre) = if near.0 < radius {
             near
         } else {
@@ -636,12 +744,12 @@ impl Live {
         let is_leaving = (centre - self.plan.centre).norm() > self.params.leave * radius;
         let depth = self.depth();
         let is_stale = (depth - self.depth_at_factor).abs() > self.params.stale;
-        if !(is_leaving || is_stale) {
+        if !(is_leaving || is_stale || reaches_ring) {
             return;
         }
         self.n_jobs += 1;
         self.depth_at_factor = depth;
-        let plan = if is_leaving {
+        let plan = if is_leaving || reaches_ring {
             self.n_zones += 1;
             let id = self.n_zones;
             PlanOrCentre::New { id, centre, radius }
@@ -678,8 +786,13 @@ impl Live {
     pub fn settle(&mut self) {
         let mut scratch = palpa_sparse::fronts::SolveScratch::new(&self.plan.tree);
         let displacements = &mut self.state.displacements;
-        self.outside
-            .settle(&self.model, &self.plan, displacements, &mut self.moves, &mut scratch);
+        self.outside.settle(
+            &self.model,
+            &self.plan,
+            displacements,
+            &mut self.moves,
+            &mut scratch,
+        );
     }
 
     /// Work for another thread, if any is due; its result is to be given to [`Self::install`].

@@ -11,11 +11,13 @@ mod contact;
 mod kernel;
 mod lanes;
 mod live;
+mod local;
 #[cfg(test)]
 mod tests;
 mod zone;
 
 pub use live::{ExteriorMode, Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome};
+pub use local::{LocalContact, LocalModel, LocalTool};
 
 use palpa_sparse::ColumnPattern;
 
@@ -28,11 +30,10 @@ pub const MOST_CANDIDATES: usize = 160;
 fn column_pattern(model: &Model) -> ColumnPattern {
     let edges = model.structure.groups.iter().flat_map(|group| {
         let vertices = &group.vertices[..group.n_columns()];
-        vertices.iter().enumerate().flat_map(move |(i, &a)| {
-            vertices[..i]
-                .iter()
-                .map(move |&b| (a as usize, b as usize))
-        })
+        vertices
+            .iter()
+            .enumerate()
+            .flat_map(move |(i, &a)| vertices[..i].iter().map(move |&b| (a as usize, b as usize)))
     });
     ColumnPattern::new(
         model.body.n_vertices(),

@@ -67,7 +67,10 @@ impl Plan {
         radius: f64,
     ) -> Result<Self, TooLarge> {
         let points = &model.body.skin.points;
-        let mut is_inside: Vec<bool> = points.iter().map(|p| (p - centre).norm() <= radius).collect();
+        let mut is_inside: Vec<bool> = points
+            .iter()
+            .map(|p| (p - centre).norm() <= radius)
+            .collect();
         if !is_inside.contains(&true) {
             is_inside.fill(true);
         }
@@ -91,7 +94,9 @@ impl Plan {
         Ok(Self {
             id,
             centre,
-            vertices: (0..points.len() as u32).filter(|&v| is_inside[v as usize]).collect(),
+            vertices: (0..points.len() as u32)
+                .filter(|&v| is_inside[v as usize])
+                .collect(),
             zone,
             ring,
             exterior,
@@ -107,13 +112,22 @@ impl Plan {
     }
 
     /// Adds stiff springs where nodes are supported.
-    fn support(&self, model: &Model, pattern: &ColumnPattern, inside: bool, blocks: &mut [Block<f32>]) {
+    fn support(
+        &self,
+        model: &Model,
+        pattern: &ColumnPattern,
+        inside: bool,
+        blocks: &mut [Block<f32>],
+    ) {
         for &[node, _] in if inside { &self.zone } else { &self.exterior } {
             let hold = &model.supports[node as usize];
             if hold.n == 0 {
                 continue;
             }
-            let (v, l) = (node as usize / model.body.n_levels, node as usize % model.body.n_levels);
+            let (v, l) = (
+                node as usize / model.body.n_levels,
+                node as usize % model.body.n_levels,
+            );
             let block = &mut blocks[pattern.own(v) + 2 * l];
             let size = (block[0] + block[4] + block[8]) / 3.0 * SUPPORT as f32;
             for k in 0..usize::from(hold.n) {
@@ -146,7 +160,12 @@ pub(super) struct Inside {
 }
 
 impl Inside {
-    pub(super) fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
+    pub(super) fn new(
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+    ) -> Self {
         let tree = &plan.tree;
         let most = 3 * MOST_CANDIDATES;
         Self {
@@ -172,13 +191,18 @@ impl Inside {
         displacements: &[Vec3],
     ) -> Result<(), Trouble> {
         self.clear(pattern, plan);
-        self.batches.add_stiffness(model, memory, displacements, &mut self.blocks)?;
+        self.batches
+            .add_stiffness(model, memory, displacements, &mut self.blocks)?;
         plan.support(model, pattern, true, &mut self.blocks);
         Ok(())
     }
 
     /// Mean stiffness of a skin vertex of the zone against its neighbours, N/m.
-    pub(super) fn skin_stiffness(&self, pattern: &ColumnPattern, vertices: impl Iterator<Item = u32>) -> f64 {
+    pub(super) fn skin_stiffness(
+        &self,
+        pattern: &ColumnPattern,
+        vertices: impl Iterator<Item = u32>,
+    ) -> f64 {
         let (mut sum, mut n) = (0.0, 0.0);
         for v in vertices {
             let block = &self.blocks[pattern.own(v as usize)];
@@ -212,16 +236,25 @@ impl Inside {
         let mut shift = 0.0;
         for attempt in 0..=MOST_SHIFTS {
             let exterior = Some(&outside.factor);
-            let result = self.factor.factor(&plan.tree, &self.blocks, exterior, &mut self.scratch);
+            let result = self
+                .factor
+                .factor(&plan.tree, &self.blocks, exterior, &mut self.scratch);
             if result.is_ok() {
                 return Ok(shift);
             }
             if !may_shift {
                 break;
             }
-            let next = if attempt == 0 { FIRST_SHIFT } else { shift * SHIFT_GROWTH };
+            let next = if attempt == 0 {
+                FIRST_SHIFT
+            } else {
+                shift * SHIFT_GROWTH
+            };
             for &[node, _] in &plan.zone {
-                let (v, l) = (node as usize / model.body.n_levels, node as usize % model.body.n_levels);
+                let (v, l) = (
+                    node as usize / model.body.n_levels,
+                    node as usize % model.body.n_levels,
+                );
                 let block = &mut self.blocks[pattern.own(v) + 2 * l];
                 for d in [0, 4, 8] {
                     block[d] = (block[d].abs() / (1.0 + shift)) * (1.0 + next);
@@ -261,12 +294,22 @@ impl Inside {
     }
 
     /// Fills a contact problem: the compliance, and displacements by the right side whose forward substitution is `z`.
-    pub(super) fn prepare(&mut self, plan: &Plan, z: &[f32], has_friction: bool, problem: &mut ContactProblem) {
+    pub(super) fn prepare(
+        &mut self,
+        plan: &Plan,
+        z: &[f32],
+        has_friction: bool,
+        problem: &mut ContactProblem,
+    ) {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         self.pushes.clear();
         for candidate in &problem.candidates {
             let normal = [0, 1, 2].map(|c| candidate.normal[c] as f32);
-            let directions = if has_friction { &axes[..] } else { &[normal][..] };
+            let directions = if has_friction {
+                &axes[..]
+            } else {
+                &[normal][..]
+            };
             self.pushes.extend(directions.iter().map(|&direction| Push {
                 column: candidate.vertex,
                 level: 0,
@@ -274,7 +317,8 @@ impl Inside {
             }));
         }
         let n = self.pushes.len();
-        self.compliance.compute(&plan.tree, &self.factor, &self.pushes, &mut self.w[..n * n]);
+        self.compliance
+            .compute(&plan.tree, &self.factor, &self.pushes, &mut self.w[..n * n]);
         for (out, w) in problem.compliance.iter_mut().zip(&self.w[..n * n]) {
             *out = f64::from(*w);
         }
@@ -324,7 +368,13 @@ impl Outside {
     }
 
     /// Adds what it pushes the ring with, at these displacements, to a right side. Cost: the square of the ring.
-    pub(super) fn push(&self, plan: &Plan, displacements: &[Vec3], x: &mut [f32], moves: &mut [f32]) {
+    pub(super) fn push(
+        &self,
+        plan: &Plan,
+        displacements: &[Vec3],
+        x: &mut [f32],
+        moves: &mut [f32],
+    ) {
         let n = 3 * plan.ring.len();
         let first = x.len() - n;
         let moves = &mut moves[..n];
@@ -388,9 +438,12 @@ impl Outside {
     ) -> Result<(), Trouble> {
         if !plan.exterior.is_empty() {
             workshop.blocks.fill([0.0; 9]);
-            follower.batches.add_stiffness(model, memory, displacements, &mut workshop.blocks)?;
+            follower
+                .batches
+                .add_stiffness(model, memory, displacements, &mut workshop.blocks)?;
             plan.support(model, pattern, false, &mut workshop.blocks);
-            self.factor.factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
+            self.factor
+                .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
         }
         self.follow(model, memory, plan, follower, displacements)
     }
@@ -409,7 +462,9 @@ impl Outside {
             return Ok(());
         }
         follower.forces.fill(Vec3::zeros());
-        follower.batches.add_forces(model, memory, displacements, &mut follower.forces)?;
+        follower
+            .batches
+            .add_forces(model, memory, displacements, &mut follower.forces)?;
         self.at.copy_from_slice(displacements);
         self.right[plan.tree.first_zone_dof()..].fill(0.0);
         for &[node, dof] in plan.exterior.iter().chain(&plan.ring) {
@@ -419,7 +474,13 @@ impl Outside {
             }
         }
         let right = &mut self.right;
-        substitute(&plan.tree, Half::Exterior, &self.factor, right, &mut follower.solve);
+        substitute(
+            &plan.tree,
+            Half::Exterior,
+            &self.factor,
+            right,
+            &mut follower.solve,
+        );
         Ok(())
     }
 }
@@ -441,7 +502,13 @@ impl Follower {
         with_tangent: bool,
     ) -> Self {
         Self {
-            batches: Batches::new(model, memory, pattern, &|group| !plan.holds(group), with_tangent),
+            batches: Batches::new(
+                model,
+                memory,
+                pattern,
+                &|group| !plan.holds(group),
+                with_tangent,
+            ),
             forces: vec![Vec3::zeros(); model.n_nodes()],
             solve: SolveScratch::new(&plan.tree),
         }

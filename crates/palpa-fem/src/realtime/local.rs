@@ -1,0 +1,267 @@
+//! The local model of a body under its tools, which the haptic loop works with between steps.
+//!
+//! ```text
+//! x_i = x0_i + Σ_j W_ij (r_j − r0_j)
+//! ```
+
+use palpa_mesh::Vec3;
+
+use super::MOST_CANDIDATES;
+use super::contact::{Candidate, ContactProblem, factor_symmetric, substitute_symmetric};
+use crate::Mat3;
+use crate::contact::PosedTool;
+use crate::shape::Pose;
+
+/// A skin vertex under or near a tool, or two that press side by side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalContact {
+    /// Skin vertex; of two the one that presses more.
+    pub vertex: u32,
+    /// Which tool.
+    pub tool: usize,
+    /// Where it is, m.
+    pub position: Vec3,
+    /// Force of the tool on it, N.
+    pub force: Vec3,
+    /// Nearest point of the tool, in the tool's frame, m.
+    pub surface: Vec3,
+    /// The tool's outward normal there, in the tool's frame.
+    pub normal: Vec3,
+    /// The tool's curvature there, in the tool's frame, 1/m.
+    pub curvature: Mat3,
+    /// Where friction holds it, in the tool's frame, m.
+    pub anchor: Vec3,
+}
+
+/// What the body feels of a tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalTool {
+    /// Where it is.
+    pub pose: Pose,
+    /// Its coefficient of friction.
+    pub friction: f64,
+    /// Force of the tissue on it, N.
+    pub force: Vec3,
+    /// By how much that force resists a displacement of the tool, along the normals of the vertices that press, N/m.
+    pub stiffness: Mat3,
+}
+
+/// The local model; its memory is kept from step to step.
+#[derive(Debug, Clone, Default)]
+pub struct LocalModel {
+    /// Contacts, active or not.
+    pub contacts: Vec<LocalContact>,
+    /// The tools.
+    pub tools: Vec<LocalTool>,
+    /// Compliance `W`, `3 n × 3 n` column by column, symmetric, m/N.
+    pub compliance: Vec<f64>,
+}
+
+impl LocalModel {
+    /// The displacement of contact `i` by a force on contact `j`, m/N.
+    pub fn block(&self, i: usize, j: usize) -> Mat3 {
+        let n = 3 * self.contacts.len();
+        Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
+    }
+}
+
+/// One or two candidates, and their share of the force.
+#[derive(Clone, Copy)]
+struct Cluster {
+    members: [usize; 2],
+    shares: [f64; 2],
+}
+
+impl ContactProblem {
+    /// Fills the local model with at most `most` contacts.
+    pub(super) fn local_model(
+        &mut self,
+        tools: &[PosedTool],
+        has_friction: bool,
+        most: usize,
+        out: &mut LocalModel,
+    ) {
+        let mut clusters = [Cluster {
+            members: [0; 2],
+            shares: [1.0, 0.0],
+        }; MOST_CANDIDATES];
+        let n = self.clusters(most, &mut clusters);
+        let clusters = &clusters[..n];
+        out.contacts.clear();
+        out.contacts.extend(clusters.iter().map(|cluster| {
+            let members = cluster.members.map(|m| &self.candidates[m]);
+            let share = cluster.shares;
+            let position = place(members[0]) * share[0] + place(members[1]) * share[1];
+            let force = if share[1] > 0.0 {
+                members[0].force() + members[1].force()
+            } else {
+                members[0].force()
+            };
+            let anchor = members[0].anchor * share[0] + members[1].anchor * share[1];
+            let PosedTool { tool, pose } = &tools[members[0].tool as usize];
+            let local = pose.inverse_transform_point(&position.into()).coords;
+            let distance = tool.shape().distance(&local);
+            LocalContact {
+                vertex: members[0].vertex,
+                tool: members[0].tool as usize,
+                position,
+                force,
+                surface: local - distance.normal * distance.distance,
+                normal: distance.normal,
+                curvature: distance.curvature,
+                anchor,
+            }
+        }));
+        out.compliance.clear();
+        out.compliance.resize(9 * n * n, 0.0);
+        for (j, cj) in clusters.iter().enumerate() {
+            for (i, ci) in clusters.iter().enumerate() {
+                let mut block = Mat3::zeros();
+                for (a, &share_a) in ci.members.iter().zip(&ci.shares) {
+                    for (b, &share_b) in cj.members.iter().zip(&cj.shares) {
+                        let share = share_a * share_b;
+                        if share > 0.0 {
+                            block += self.full_block(*a, *b, has_friction) * share;
+                        }
+                    }
+                }
+                for c in 0..3 {
+                    for r in 0..3 {
+                        out.compliance[3 * i + r + 3 * n * (3 * j + c)] = block[(r, c)];
+                    }
+                }
+            }
+        }
+        out.tools.clear();
+        for (t, tool) in tools.iter().enumerate() {
+            let own = self.candidates.iter().filter(|c| c.tool as usize == t);
+            let force = -own.map(Candidate::force).sum::<Vec3>();
+            out.tools.push(LocalTool {
+                pose: tool.pose,
+                friction: tool.tool.friction(),
+                force,
+                stiffness: self.tool_stiffness(t),
+            });
+        }
+    }
+
+    fn full_block(&self, i: usize, j: usize, has_friction: bool) -> Mat3 {
+        if has_friction {
+            return self.block(i, j);
+        }
+        let along = self.compliance[i + self.candidates.len() * j];
+        self.candidates[i].normal * self.candidates[j].normal.transpose() * along
+    }
+
+    /// Puts neighbours that press together until there are few enough, and leaves out the farthest of the others.
+    fn clusters(&self, most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
+        let n = self.candidates.len();
+        let mut partner = [usize::MAX; MOST_CANDIDATES];
+        let pressing = |i: usize| self.candidates[i].pressure > 0.0;
+        let n_idle = (0..n).filter(|&i| !pressing(i)).count();
+        // Of what is only near, a third of the room is enough.
+        let n_kept_idle = n_idle.min((most / 3).max(most.saturating_sub(n - n_idle)));
+        let mut n_over = (n - n_idle + n_kept_idle).saturating_sub(most);
+        while n_over > 0 {
+            let mut best = (f64::INFINITY, 0, 0);
+            for i in (0..n).filter(|&i| pressing(i) && partner[i] == usize::MAX) {
+                for j in (i + 1..n).filter(|&j| pressing(j) && partner[j] == usize::MAX) {
+                    let (a, b) = (&self.candidates[i], &self.candidates[j]);
+                    let distance = (a.start - b.start).norm_squared();
+                    if a.tool == b.tool && distance < best.0 {
+                        best = (distance, i, j);
+                    }
+                }
+            }
+            if best.0 == f64::INFINITY {
+                break;
+            }
+            (partner[best.1], partner[best.2]) = (best.2, best.1);
+            n_over -= 1;
+        }
+        let mut idle = [0; MOST_CANDIDATES];
+        let mut count = 0;
+        for i in (0..n).filter(|&i| !pressing(i)) {
+            idle[count] = i;
+            count += 1;
+        }
+        let gap = |i: &usize| self.candidates[*i].gap;
+        idle[..count].sort_unstable_by(|a, b| gap(a).total_cmp(&gap(b)).then(a.cmp(b)));
+        let mut kept = [false; MOST_CANDIDATES];
+        for &i in &idle[..n_kept_idle] {
+            kept[i] = true;
+        }
+        let mut filled = 0;
+        for i in 0..n {
+            let other = partner[i];
+            if filled == most || other < i || (!pressing(i) && !kept[i]) {
+                continue;
+            }
+            let alone = Cluster {
+                members: [i, i],
+                shares: [1.0, 0.0],
+            };
+            out[filled] = if other == usize::MAX {
+                alone
+            } else {
+                let (p, q) = (self.candidates[i].pressure, self.candidates[other].pressure);
+                let share = p / (p + q);
+                if share >= 0.5 {
+                    Cluster {
+                        members: [i, other],
+                        shares: [share, 1.0 - share],
+                    }
+                } else {
+                    Cluster {
+                        members: [other, i],
+                        shares: [1.0 - share, share],
+                    }
+                }
+            };
+            filled += 1;
+        }
+        filled
+    }
+
+    /// By how much the vertices that press resist a displacement of their tool, along their normals, N/m.
+    fn tool_stiffness(&mut self, tool: usize) -> Mat3 {
+        let mut rows = [0; MOST_CANDIDATES];
+        let mut m = 0;
+        for (i, candidate) in self.candidates.iter().enumerate() {
+            if candidate.pressure > 0.0 {
+                rows[m] = i;
+                m += 1;
+            }
+        }
+        let n = self.candidates.len();
+        let along = &self.along;
+        let entry = |r: usize, c: usize| along[rows[r] + n * rows[c]];
+        if m == 0 || !factor_symmetric(m, entry, &mut self.factor) {
+            return Mat3::zeros();
+        }
+        let mut stiffness = Mat3::zeros();
+        for axis in 0..3 {
+            let mut x = [0.0; MOST_CANDIDATES];
+            for (x, &i) in x.iter_mut().zip(&rows[..m]) {
+                if self.candidates[i].tool as usize == tool {
+                    *x = self.candidates[i].normal[axis];
+                }
+            }
+            substitute_symmetric(m, &self.factor, &mut x[..m]);
+            for (x, &i) in x.iter().zip(&rows[..m]) {
+                let candidate = &self.candidates[i];
+                if candidate.tool as usize == tool {
+                    let taken = x - candidate.support * candidate.normal[axis];
+                    let column = stiffness.column(axis) + candidate.normal * taken;
+                    stiffness.set_column(axis, &column);
+                }
+            }
+        }
+        stiffness
+    }
+}
+
+/// Where a candidate is at the end of the iteration.
+fn place(candidate: &Candidate) -> Vec3 {
+    candidate.start + candidate.displacement
+}
