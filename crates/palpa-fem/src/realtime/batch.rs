@@ -2,6 +2,11 @@
 //!
 //! Pairs whose law is not one of the kernel's are evaluated one by one.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::Number;
 use palpa_sparse::{Block, ColumnPattern};

@@ -14,6 +14,11 @@
 //! ```
 //! where `b = 2 V w' Jb^(−2/3)` and `D` collects what is quadratic in `δJ`. Derivation: `docs/theory/paired_prism.md`.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+
 use super::lanes::Lanes;
 use crate::law::Hardening;
 

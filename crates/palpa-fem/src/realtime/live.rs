@@ -24,6 +24,12 @@ const SPRING_PATIENCE: u32 = 20;
 const ZONE_GROWTH: f64 = 1.3;
 /// Share of an iteration below which it has failed.
 const LEAST_SHARE: f64 = 0.05;
+/// Residual above which tools are followed more slowly, and that above which a step has lost the body; the slowest.
+const ROUGH: f64 = 0.5;
+const LOST: f64 = 3.0;
+const LEAST_PACE: f64 = 1.0 / 64.0;
+/// A force below which a residual is not relative to it, N.
+const LEAST_FORCE: f64 = 0.01;
 /// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
 const FASTEST: f64 = 0.1;
 const LEAST_REACH: f64 = 0.2e-3;
@@ -43,6 +49,9 @@ pub struct LiveParams {
     pub reach: f64,
     /// How far the tool may go from the zone's centre before a new zone is asked for, as a share of the radius.
     pub leave: f64,
+    /// How far a tool that is this near to the skin, or nearer, may go in one step, m. One that is asked to go farther is
+    /// followed over several steps, so that it cannot jump through the skin.
+    pub longest_move: f64,
     /// Indentation after which the exterior's stiffness is asked to be made anew, m.
     pub stale: f64,
 }
@@ -56,7 +65,8 @@ impl Default for LiveParams {
             tolerance: 0.02,
             reach: 1.5e-3,
             leave: 0.3,
-            stale: 3e-3,
+            longest_move: 3e-3,
+            stale: 1e-3,
         }
     }
 }
@@ -75,9 +85,9 @@ pub enum ExteriorMode {
 pub enum StepOutcome {
     /// The tools are where they were asked to be.
     Arrived,
-    /// Part of the way only: tissue would have been turned inside out.
+    /// Part of the way only: it was too far for a step, or tissue would have been turned inside out.
     BackedOff,
-    /// Nowhere; the state is the last good one.
+    /// Nowhere; the state is the last good one, and the tools are followed more slowly from there.
     Failed,
 }
 
@@ -245,6 +255,14 @@ pub struct Live {
     moves: Vec<f32>,
     before: Vec<Vec3>,
     tools: Vec<PosedTool>,
+    /// The last state of the zone that was near equilibrium, and the share of the longest move that a step may make from
+    /// where it is now.
+    good: Vec<Vec3>,
+    good_pressures: Vec<f64>,
+    good_tools: Vec<PosedTool>,
+    pace: f64,
+    /// Least gap between tools and the zone's skin, m.
+    clearance: f64,
     /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
     spring: f64,
     spring_age: u32,
@@ -312,7 +330,12 @@ impl Live {
             x: vec![0.0; n_dofs],
             moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
-            tools: Vec::with_capacity(tools.len()),
+            tools: tools.to_vec(),
+            good: vec![Vec3::zeros(); n],
+            good_pressures: vec![0.0; n_vertices],
+            good_tools: tools.to_vec(),
+            pace: 1.0,
+            clearance: 0.0,
             spring: 0.0,
             spring_age: 0,
             radius: params.zone_radius,
@@ -366,10 +389,9 @@ impl Live {
             .local_model(&self.tools, self.has_friction, most, out);
     }
 
-    /// Follows the tools to where they are now.
+    /// Follows the tools, as many as it was made with, to where they are now. `dt` is the time since the last step, s.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
-        self.tools.clear();
-        self.tools.extend_from_slice(tools);
+        let is_short = self.move_tools(tools);
         self.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
         if self.model.has_memory {
             self.memory.begin(&self.model, &self.state, dt);
@@ -380,7 +402,11 @@ impl Live {
             self.is_fresh = false;
         }
         let mut report = LiveReport {
-            outcome: StepOutcome::Arrived,
+            outcome: if is_short {
+                StepOutcome::BackedOff
+            } else {
+                StepOutcome::Arrived
+            },
             iterations: 0,
             residual: 0.0,
             n_active: 0,
@@ -401,11 +427,69 @@ impl Live {
                 }
             }
         }
+        if report.residual.is_nan() || report.residual > LOST {
+            report.outcome = StepOutcome::Failed;
+        }
+        if report.outcome == StepOutcome::Failed {
+            self.return_to_good();
+            self.pace = (self.pace * 0.25).max(LEAST_PACE);
+        } else if report.residual > ROUGH {
+            self.pace = (self.pace * 0.5).max(LEAST_PACE);
+        } else {
+            self.pace = (self.pace * 2.0).min(1.0);
+            self.keep_good();
+        }
         if self.model.has_memory && report.outcome != StepOutcome::Failed {
             self.memory.commit(&self.model, &mut self.state);
         }
         self.ask();
         report
+    }
+
+    /// Remembers the zone's state as one to come back to.
+    fn keep_good(&mut self) {
+        for &[node, _] in &self.plan.zone {
+            self.good[node as usize] = self.state.displacements[node as usize];
+        }
+        for &v in &self.plan.vertices {
+            self.good_pressures[v as usize] = self.pressures[v as usize];
+        }
+        self.good_tools.copy_from_slice(&self.tools);
+    }
+
+    fn return_to_good(&mut self) {
+        for &[node, _] in &self.plan.zone {
+            self.state.displacements[node as usize] = self.good[node as usize];
+        }
+        for &v in &self.plan.vertices {
+            self.pressures[v as usize] = self.good_pressures[v as usize];
+            self.frictions[v as usize] = Vec3::zeros();
+        }
+        self.tools.copy_from_slice(&self.good_tools);
+        self.clearance = 0.0;
+        self.spring = 0.0;
+        self.is_fresh = false;
+    }
+
+    /// Moves the tools, no farther than one step may; returns whether that is short of where they were to go.
+    fn move_tools(&mut self, tools: &[PosedTool]) -> bool {
+        debug_assert_eq!(self.tools.len(), tools.len());
+        let mut is_short = false;
+        for (tool, target) in self.tools.iter_mut().zip(tools) {
+            let way = (target.pose.translation.vector - tool.pose.translation.vector).norm();
+            let most = (self.params.longest_move * self.pace).max(self.clearance);
+            let pose = if way <= most {
+                target.pose
+            } else {
+                is_short = true;
+                tool.pose.lerp_slerp(&target.pose, most / way)
+            };
+            *tool = PosedTool {
+                tool: target.tool,
+                pose,
+            };
+        }
+        is_short
     }
 
     /// One Newton iteration. An error leaves the state as it was.
@@ -614,7 +698,7 @@ impl Live {
             .iter()
             .map(|c| c.force().norm_squared())
             .sum();
-        ((sum + skin) / size.max(1e-12)).sqrt()
+        ((sum + skin) / size.max(LEAST_FORCE * LEAST_FORCE)).sqrt()
     }
 
     /// Vertices of the zone that press or are near a tool, those nearest first.
@@ -623,6 +707,7 @@ impl Live {
         let reach = (FASTEST * 2.0 * dt).clamp(LEAST_REACH, self.params.reach);
         let candidates = &mut self.problem.candidates;
         candidates.clear();
+        self.clearance = f64::INFINITY;
         for &v in &self.plan.vertices {
             let vertex = v as usize;
             let node = model.body.node(vertex, 0);
@@ -641,6 +726,7 @@ impl Live {
                 continue;
             };
             let pressure = self.pressures[vertex];
+            self.clearance = self.clearance.min(distance.distance);
             if distance.distance > reach && pressure == 0.0 {
                 continue;
             }
@@ -821,6 +907,7 @@ impl Live {
             self.inside = inside;
             self.follower = follower;
             self.inside.batches.refresh(&self.model, &self.memory);
+            self.keep_good();
         }
         self.is_fresh = false;
     }

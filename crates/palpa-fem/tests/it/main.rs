@@ -6,6 +6,7 @@
 mod law;
 mod lump;
 mod pairing;
+mod realtime;
 mod robust;
 mod shape;
 mod statics;

@@ -37,6 +37,8 @@ pub struct Compliance<T> {
     sorted: Vec<u32>,
     y: Vec<T>,
     product: Vec<T>,
+    /// One vector of the visited rows.
+    rows_of_z: Vec<T>,
     w: Vec<T>,
 }
 
@@ -54,6 +56,7 @@ impl<T: Number> Compliance<T> {
             n_rows: 0,
             y: vec![T::default(); rows * most],
             product: vec![T::default(); border * most],
+            rows_of_z: vec![T::default(); rows],
             w: vec![T::default(); most * most],
         }
     }
@@ -63,7 +66,10 @@ impl<T: Number> Compliance<T> {
     /// # Panics
     /// When there are more forces than there is room for, or one is not on the zone.
     pub fn compute(&mut self, tree: &Tree, zone: &Zone<T>, pushes: &[Push<T>], out: &mut [T]) {
-        assert!(pushes.len() <= self.most, "more forces than there is room for");
+        assert!(
+            pushes.len() <= self.most,
+            "more forces than there is room for"
+        );
         let b = tree.width;
         let range = tree.range(Half::Zone);
         let place = |u: u32| tree.place[pushes[u as usize].column as usize];
@@ -118,9 +124,7 @@ impl<T: Number> Compliance<T> {
             let panel = &zone.panels[front.panel..][..(own + border) * own];
             let panel = MatRef::from_column_major_slice(panel, own + border, own);
             let all = MatMut::from_column_major_slice_mut(&mut *y, n_rows, n);
-            let mut here = all
-                .subcols_mut(from, n_right)
-                .subrows_mut(first_row, own);
+            let mut here = all.subcols_mut(from, n_right).subrows_mut(first_row, own);
             solve_lower_triangular_in_place(panel.subrows(0, own), here.rb_mut(), Par::Seq);
             if border > 0 {
                 let product = &mut self.product[..border * n_right];
@@ -166,40 +170,55 @@ impl<T: Number> Compliance<T> {
     }
 
     /// Displacements along the forces, `Yᵀ z`, of the solution whose forward substitution is `z`.
-    pub fn project(&self, tree: &Tree, z: &[T], out: &mut [T]) {
-        for (column, &u) in self.y.chunks(self.n_rows.max(1)).zip(&self.sorted) {
-            let mut sum = T::default();
-            self.each_front(tree, |rows, places| {
-                for (&y, &z) in column[rows].iter().zip(&z[places]) {
-                    sum += y * z;
-                }
-            });
-            out[u as usize] = sum;
+    pub fn project(&mut self, tree: &Tree, z: &[T], out: &mut [T]) {
+        let (n, n_rows) = (self.sorted.len(), self.n_rows);
+        self.each_front(tree, |product, rows, places| {
+            product[rows].copy_from_slice(&z[places]);
+        });
+        let y = MatRef::from_column_major_slice(&self.y[..n_rows * n], n_rows, n);
+        let z = MatRef::from_column_major_slice(&self.rows_of_z[..n_rows], n_rows, 1);
+        let sums = MatMut::from_column_major_slice_mut(&mut self.w[..n], n, 1);
+        matmul(
+            sums,
+            Accum::Replace,
+            y.transpose(),
+            z,
+            T::nearest(1.0),
+            Par::Seq,
+        );
+        for (&u, sum) in self.sorted.iter().zip(&self.w) {
+            out[u as usize] = *sum;
         }
     }
 
     /// Adds these forces to a right side that has been substituted forwards: `z ← z + Y f`.
-    pub fn add(&self, tree: &Tree, forces: &[T], z: &mut [T]) {
-        for (column, &u) in self.y.chunks(self.n_rows.max(1)).zip(&self.sorted) {
-            let force = forces[u as usize];
-            if force == T::default() {
-                continue;
-            }
-            self.each_front(tree, |rows, places| {
-                for (z, &y) in z[places].iter_mut().zip(&column[rows]) {
-                    *z += y * force;
-                }
-            });
+    pub fn add(&mut self, tree: &Tree, forces: &[T], z: &mut [T]) {
+        let (n, n_rows) = (self.sorted.len(), self.n_rows);
+        for (f, &u) in self.w.iter_mut().zip(&self.sorted) {
+            *f = forces[u as usize];
         }
+        let y = MatRef::from_column_major_slice(&self.y[..n_rows * n], n_rows, n);
+        let f = MatRef::from_column_major_slice(&self.w[..n], n, 1);
+        let sums = MatMut::from_column_major_slice_mut(&mut self.rows_of_z[..n_rows], n_rows, 1);
+        matmul(sums, Accum::Replace, y, f, T::nearest(1.0), Par::Seq);
+        self.each_front(tree, |sums, rows, places| {
+            for (z, &sum) in z[places].iter_mut().zip(&sums[rows]) {
+                *z += sum;
+            }
+        });
     }
 
-    /// Calls with the rows of every visited front, in `Y` and in vectors ordered by elimination.
-    fn each_front(&self, tree: &Tree, mut of: impl FnMut(Range<usize>, Range<usize>)) {
+    /// Calls with one vector of rows, and the rows of every visited front in it and in vectors ordered by elimination.
+    fn each_front(
+        &mut self,
+        tree: &Tree,
+        mut of: impl FnMut(&mut [T], Range<usize>, Range<usize>),
+    ) {
         let b = tree.width;
         for (&row, front) in self.rows.iter().zip(&tree.fronts[tree.range(Half::Zone)]) {
             if row != usize::MAX {
                 let (first, n) = (front.own.start as usize * b, front.own.len() * b);
-                of(row..row + n, first..first + n);
+                of(&mut self.rows_of_z, row..row + n, first..first + n);
             }
         }
     }

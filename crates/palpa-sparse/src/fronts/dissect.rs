@@ -70,8 +70,8 @@ fn best_cut(
     let widest = extent.iter().copied().fold(0.0, f64::max);
     let mut best: Option<(f64, usize, usize, bool)> = None;
     let mut sorted = set.to_vec();
-    for axis in 0..3 {
-        if extent[axis] < SLENDER * widest {
+    for (axis, &across) in extent.iter().enumerate() {
+        if across < SLENDER * widest {
             continue;
         }
         sort(&mut sorted, places, axis);

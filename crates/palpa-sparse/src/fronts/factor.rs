@@ -1,5 +1,10 @@
 //! The numbers of a factor: every front is assembled, eliminated, and leaves an update to its parent.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
@@ -209,6 +214,22 @@ fn add_update<T: Number>(
     into: &mut [T],
     height: usize,
 ) {
+    // Compiled for the machine's vectors.
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || add_update_wide(b, to_parent, update, first, into, height),
+    );
+}
+
+#[inline(always)]
+fn add_update_wide<T: Number>(
+    b: usize,
+    to_parent: &[u32],
+    update: &[T],
+    first: usize,
+    into: &mut [T],
+    height: usize,
+) {
     let size = to_parent.len() * b;
     let width = into.len() / height;
     for (j, &column) in to_parent.iter().enumerate() {
@@ -221,12 +242,21 @@ fn add_update<T: Number>(
         for jj in 0..b {
             let from = &update[(j * b + jj) * size..][..size];
             let into = &mut into[(column * b + jj) * height..][..height];
-            for (i, &row) in to_parent.iter().enumerate().skip(j) {
-                let row = (row as usize - first) * b;
-                let (from, into) = (&from[i * b..][..b], &mut into[row..][..b]);
+            // Columns that follow each other here and there are added in one go.
+            let mut i = j;
+            while i < to_parent.len() {
+                let start = to_parent[i] as usize;
+                let run = to_parent[i..]
+                    .iter()
+                    .enumerate()
+                    .take_while(|&(k, &row)| row as usize == start + k)
+                    .count();
+                let row = (start - first) * b;
+                let (from, into) = (&from[i * b..][..run * b], &mut into[row..][..run * b]);
                 for (into, &from) in into.iter_mut().zip(from) {
                     *into += from;
                 }
+                i += run;
             }
         }
     }
@@ -234,6 +264,20 @@ fn add_update<T: Number>(
 
 /// Adds blocks to a front.
 fn put_pairs<T: Number>(
+    tree: &Tree,
+    pairs: &[FrontPair],
+    blocks: &[Block<T>],
+    into: &mut [T],
+    height: usize,
+) {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || put_pairs_wide(tree, pairs, blocks, into, height),
+    );
+}
+
+#[inline(always)]
+fn put_pairs_wide<T: Number>(
     tree: &Tree,
     pairs: &[FrontPair],
     blocks: &[Block<T>],
@@ -270,7 +314,7 @@ fn put_pairs<T: Number>(
     }
 }
 
-#[inline]
+#[inline(always)]
 fn add_block<T: Number>(block: &Block<T>, is_turned: bool, into: &mut [T], height: usize) {
     for c in 0..3 {
         let into = &mut into[c * height..][..3];

@@ -21,7 +21,7 @@ pub use factor::{Exterior, FactorScratch, Zone};
 pub use solve::{SolveScratch, back_substitute, substitute};
 pub use tree::{Half, Tree};
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, Neg, Sub, SubAssign};
 
 use pulp::Simd;
 
@@ -37,6 +37,7 @@ pub trait Number:
     + Neg<Output = Self>
     + AddAssign
     + SubAssign
+    + DivAssign
     + PartialOrd
 {
     /// The nearest number of this precision.
@@ -44,7 +45,12 @@ pub trait Number:
     /// The same number in double precision.
     fn wide(self) -> f64;
     /// `y −= Σ columns · factors`, in the machine's vectors. All slices have one length.
-    fn subtract_columns<S: Simd>(simd: S, columns: [&[Self]; 4], factors: [Self; 4], y: &mut [Self]);
+    fn subtract_columns<S: Simd>(
+        simd: S,
+        columns: [&[Self]; 4],
+        factors: [Self; 4],
+        y: &mut [Self],
+    );
     /// The products of four columns with a vector. All slices have one length.
     fn dot_columns<S: Simd>(simd: S, columns: [&[Self]; 4], x: &[Self]) -> [Self; 4];
 }
@@ -111,10 +117,22 @@ macro_rules! number {
 }
 
 number!(
-    f64, as_simd_f64s, as_mut_simd_f64s, partial_load_f64s, partial_store_f64s, splat_f64s, mul_add_e_f64s,
+    f64,
+    as_simd_f64s,
+    as_mut_simd_f64s,
+    partial_load_f64s,
+    partial_store_f64s,
+    splat_f64s,
+    mul_add_e_f64s,
     reduce_sum_f64s
 );
 number!(
-    f32, as_simd_f32s, as_mut_simd_f32s, partial_load_f32s, partial_store_f32s, splat_f32s, mul_add_e_f32s,
+    f32,
+    as_simd_f32s,
+    as_mut_simd_f32s,
+    partial_load_f32s,
+    partial_store_f32s,
+    splat_f32s,
+    mul_add_e_f32s,
     reduce_sum_f32s
 );

@@ -1,5 +1,10 @@
 //! Substitution with a factor, for one right side.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+
 use pulp::{Simd, WithSimd};
 
 use super::Number;
@@ -74,7 +79,11 @@ impl<T: Number, const FORWARD: bool> WithSimd for Pass<'_, T, FORWARD> {
         let b = self.tree.width;
         let fronts = &self.tree.fronts[self.tree.range(self.half)];
         for i in 0..fronts.len() {
-            let front = if FORWARD { &fronts[i] } else { &fronts[fronts.len() - 1 - i] };
+            let front = if FORWARD {
+                &fronts[i]
+            } else {
+                &fronts[fronts.len() - 1 - i]
+            };
             let (own, border) = (front.own.len() * b, front.border.len() * b);
             let height = own + border;
             let panel = &self.panels[front.panel..][..height * own];
@@ -108,14 +117,16 @@ fn forward<T: Number, S: Simd>(simd: S, panel: &[T], own: usize, x: &mut [T]) {
         let n = TOGETHER.min(own - j);
         for a in j..j + n {
             let column = &panel[a * height..][..height];
-            x[a] = x[a] / column[a];
+            x[a] /= column[a];
             for k in a + 1..j + n {
                 let product = column[k] * x[a];
                 x[k] -= product;
             }
         }
         // Fewer than four are filled up with one of them, times nothing.
-        let columns = std::array::from_fn(|a| &panel[(j + a.min(n - 1)) * height + j + n..][..height - j - n]);
+        let columns = std::array::from_fn(|a| {
+            &panel[(j + a.min(n - 1)) * height + j + n..][..height - j - n]
+        });
         let factors = std::array::from_fn(|a| if a < n { x[j + a] } else { T::default() });
         T::subtract_columns(simd, columns, factors, &mut x[j + n..]);
     }

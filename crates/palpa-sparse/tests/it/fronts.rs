@@ -212,7 +212,11 @@ fn errors<T: Number>(case: &Case, tree: &Tree) -> [f64; 2] {
         let unit = Mat::from_fn(n, m, |i, j| {
             let push = &pushes[j];
             let first = push.column as usize * pattern.width() + 3 * push.level as usize;
-            if (first..first + 3).contains(&i) { push.direction[i - first].wide() } else { 0.0 }
+            if (first..first + 3).contains(&i) {
+                push.direction[i - first].wide()
+            } else {
+                0.0
+            }
         });
         let all = Mat::from_fn(n, 1, |i, _| {
             (0..m).fold(force[(i, 0)], |sum, j| sum + unit[(i, j)] * later[j].wide())

@@ -1,0 +1,328 @@
+//! The moving step against converged equilibria of the same mesh.
+
+use std::sync::Arc;
+
+use palpa_fem::law::NeoHookean;
+use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LocalModel, StepOutcome};
+use palpa_fem::shape::{Pose, Sphere, Tool};
+use palpa_fem::{
+    Load, Material, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State,
+    Supports, Workspace, advance,
+};
+use palpa_mesh::Vec3;
+use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
+
+/// Skin, fat and muscle, 60 mm square; its supports hold the base and, if asked, two sides.
+fn model(n: usize, with_sides: bool) -> Arc<Model> {
+    let levels = LevelStack {
+        depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
+        interval_layer: vec![0, 1, 1, 2],
+    };
+    let grid = Grid {
+        n_cells: [n, n],
+        diagonal: Diagonal::Alternate,
+        jitter: Some(2),
+    };
+    let place = |u: f64, v: f64| Vec3::new(0.06 * u - 0.03, 0.06 * v - 0.03, 0.0);
+    let body = mapped_grid(&grid, place, &levels);
+    let material = |young| Material::new("t", NeoHookean::from_young(young, 0.45).unwrap());
+    let materials = Materials::of_layers(vec![material(100e3), material(5e3), material(30e3)]);
+    let mut supports = Supports::on_base(&body);
+    if with_sides {
+        let x = 0.03 - 1e-9;
+        for (node, position) in body.positions.iter().enumerate() {
+            if position.x > x {
+                supports.planes.push((node, Vec3::x()));
+            } else if position.x < -x {
+                supports.fixed.push(node);
+            }
+        }
+    }
+    Arc::new(Model::build(&body, &materials, &supports, ModelParams::default()).unwrap())
+}
+
+fn sphere(friction: f64) -> Tool {
+    Tool::new(Sphere::new(8e-3).unwrap(), friction).unwrap()
+}
+
+fn at(tool: Tool, x: f64, y: f64, depth: f64) -> [PosedTool; 1] {
+    let pose = Pose::translation(x, y, -depth);
+    [PosedTool { tool, pose }]
+}
+
+/// The converged force after a path of tools.
+fn converged(model: &Model, path: &[[PosedTool; 1]]) -> Vec3 {
+    let mut state = State::new(model);
+    let mut ws = Workspace::new(model);
+    let mut force = Vec3::zeros();
+    for pair in path.windows(2) {
+        let before = Load {
+            tools: &pair[0],
+            ..Load::default()
+        };
+        let load = Load {
+            tools: &pair[1],
+            ..Load::default()
+        };
+        let report = advance(
+            model,
+            &mut state,
+            &mut ws,
+            &before,
+            &load,
+            &SolveParams::default(),
+        );
+        assert_eq!(report.outcome, Outcome::Converged, "{:?}", pair[1][0].pose);
+        force = report.tool_forces[0];
+    }
+    force
+}
+
+/// Follows a path in steps; jobs are done at once. Returns the last force and how many zones there were.
+fn follow(live: &mut Live, path: impl Iterator<Item = [PosedTool; 1]>) -> (Vec3, u64) {
+    let mut zones = 0;
+    for tools in path {
+        let report = live.step(&tools, 0.002);
+        assert_eq!(report.outcome, StepOutcome::Arrived);
+        zones = report.zone;
+        if let Some(job) = live.take_job() {
+            live.install(job.run());
+        }
+    }
+    (live.tool_force(0), zones)
+}
+
+const MODES: [(f64, ExteriorMode); 3] = [
+    (f64::INFINITY, ExteriorMode::Followed),
+    (14e-3, ExteriorMode::Followed),
+    (14e-3, ExteriorMode::Linear),
+];
+
+fn params((zone_radius, exterior): (f64, ExteriorMode)) -> LiveParams {
+    LiveParams {
+        zone_radius,
+        exterior,
+        stale: 1e-3,
+        ..LiveParams::default()
+    }
+}
+
+#[test]
+fn a_press_is_followed_to_the_converged_force() {
+    for with_sides in [false, true] {
+        let model = model(13, with_sides);
+        let tool = sphere(0.0);
+        let (x, y) = (0.6e-3, -0.4e-3);
+        let path: Vec<_> = (0..=4)
+            .map(|k| at(tool, x, y, 1e-3 * f64::from(k)))
+            .collect();
+        let expected = converged(&model, &path);
+        for mode in MODES {
+            let mut live = Live::new(Arc::clone(&model), &path[0], params(mode)).unwrap();
+            let steps = (1..=32).map(|k| at(tool, x, y, 0.125e-3 * f64::from(k)));
+            let (moving, _) = follow(&mut live, steps);
+            let error = (moving - expected).norm() / expected.norm();
+            assert!(error < 0.01, "{mode:?}: {moving} {expected} {error}");
+            // Held still it converges, and the body with it.
+            let (still, _) = follow(&mut live, (0..30).map(|_| at(tool, x, y, 4e-3)));
+            let error = (still - expected).norm() / expected.norm();
+            assert!(error < 2e-3, "{mode:?}: {still} {expected} {error}");
+        }
+    }
+}
+
+#[test]
+fn a_stroke_goes_from_zone_to_zone() {
+    let model = model(13, false);
+    for friction in [0.0, 0.4] {
+        let tool = sphere(friction);
+        let down = |k: u32| at(tool, -8e-3, 0.0, 0.25e-3 * f64::from(k));
+        let along = |k: u32| at(tool, -8e-3 + 0.25e-3 * f64::from(k), 0.0, 2.5e-3);
+        let path: Vec<_> = (0..=10).map(down).chain((1..=64).map(along)).collect();
+        // Friction remembers the way there, in longer steps; without it only the end counts.
+        let expected = if friction > 0.0 {
+            let strokes = (1..=16).map(|k| along(4 * k));
+            converged(
+                &model,
+                &(0..=5)
+                    .map(|k| down(2 * k))
+                    .chain(strokes)
+                    .collect::<Vec<_>>(),
+            )
+        } else {
+            let end = (0..=2).map(|k| at(tool, 8e-3, 0.0, 1.25e-3 * f64::from(k)));
+            converged(&model, &end.collect::<Vec<_>>())
+        };
+        for mode in MODES {
+            let mut live = Live::new(Arc::clone(&model), &path[0], params(mode)).unwrap();
+            let (force, zones) = follow(&mut live, path[1..].iter().copied());
+            assert!(mode.0.is_infinite() || zones > 2, "{mode:?}: {zones} zones");
+            let error = (force - expected).norm() / expected.norm();
+            let bound = if friction > 0.0 { 0.05 } else { 0.02 };
+            assert!(
+                error < bound,
+                "{mode:?}, {friction}: {force} {expected} {error}"
+            );
+            if friction > 0.0 {
+                // It is dragged back.
+                assert!(force.x < -0.2 * force.z, "{force}");
+            }
+        }
+    }
+}
+
+#[test]
+fn it_lets_go_when_the_tool_leaves() {
+    let model = model(13, false);
+    let tool = sphere(0.3);
+    let mut live = Live::new(
+        Arc::clone(&model),
+        &at(tool, 0.0, 0.0, 0.0),
+        params(MODES[2]),
+    )
+    .unwrap();
+    let steps = (1..=20).chain((-4..20).rev());
+    let (force, _) = follow(
+        &mut live,
+        steps.map(|k| at(tool, 0.0, 0.0, 0.15e-3 * f64::from(k))),
+    );
+    assert_eq!(force, Vec3::zeros());
+    follow(&mut live, (0..10).map(|_| at(tool, 0.0, 0.0, -1e-3)));
+    live.settle();
+    let most = live
+        .displacements()
+        .iter()
+        .map(Vec3::norm)
+        .fold(0.0, f64::max);
+    assert!(most < 1e-6, "{most}");
+}
+
+#[test]
+fn the_local_model_tells_the_force_of_a_small_further_press() {
+    let model = model(19, false);
+    let tool = sphere(0.0);
+    let depth = 3e-3;
+    let down =
+        |n: i32| (1..=n).map(move |k| at(tool, 0.0, 0.0, depth * f64::from(k) / f64::from(n)));
+    for most in [60, 12] {
+        let mut live = Live::new(
+            Arc::clone(&model),
+            &at(tool, 0.0, 0.0, 0.0),
+            params(MODES[0]),
+        )
+        .unwrap();
+        let (force, _) = follow(&mut live, down(40));
+        follow(&mut live, (0..5).map(|_| at(tool, 0.0, 0.0, depth)));
+        let mut local = LocalModel::default();
+        live.local_model(most, &mut local);
+        assert!(local.contacts.len() <= most && !local.contacts.is_empty());
+        let sum: Vec3 = local.contacts.iter().map(|c| c.force).sum();
+        assert!((sum + force).norm() < 0.01 * force.norm(), "{sum} {force}");
+        // Every contact that presses lies on the tool.
+        for contact in local.contacts.iter().filter(|c| c.force != Vec3::zeros()) {
+            let distance = tool
+                .distance_at(&local.tools[0].pose, &contact.position)
+                .distance;
+            assert!(distance.abs() < 0.1e-3, "{distance}");
+        }
+        for i in 0..local.contacts.len() {
+            for j in 0..local.contacts.len() {
+                let (a, b) = (local.block(i, j), local.block(j, i).transpose());
+                assert!((a - b).norm() < 1e-6 * local.block(i, i).norm());
+            }
+        }
+        let further = 0.05e-3;
+        let (next, _) = follow(
+            &mut live,
+            (1..=4).map(|k| at(tool, 0.0, 0.0, depth + further * f64::from(k) / 4.0)),
+        );
+        let predicted = local.tools[0].stiffness[(2, 2)] * further;
+        let true_change = next.z - force.z;
+        assert!(
+            (predicted / true_change - 1.0).abs() < 0.1,
+            "{predicted} {true_change}"
+        );
+    }
+}
+
+#[test]
+fn a_step_too_far_backs_off_and_recovers() {
+    let model = model(13, false);
+    let tool = sphere(0.0);
+    let mut live = Live::new(
+        Arc::clone(&model),
+        &at(tool, 0.0, 0.0, 0.0),
+        params(MODES[1]),
+    )
+    .unwrap();
+    let mut bad = 0;
+    let jump = [2e-3, 31e-3, 31e-3, 31e-3, 31e-3, 31e-3];
+    for depth in jump.into_iter().chain([2e-3; 30]) {
+        let report = live.step(&at(tool, 0.0, 0.0, depth), 0.002);
+        bad += u32::from(report.outcome != StepOutcome::Arrived);
+        assert!(
+            live.displacements()
+                .iter()
+                .all(|u| u.iter().all(|x| x.is_finite()))
+        );
+        // Never through the skin.
+        let has_failed = report.outcome == StepOutcome::Failed;
+        assert!(has_failed || report.n_active > 0, "{depth}: {report:?}");
+        if let Some(job) = live.take_job() {
+            live.install(job.run());
+        }
+    }
+    assert!(bad >= 5);
+    let path: Vec<_> = [0.0, 1e-3, 2e-3].map(|d| at(tool, 0.0, 0.0, d)).to_vec();
+    let expected = converged(&model, &path);
+    let force = live.tool_force(0);
+    assert!(
+        (force - expected).norm() < 0.02 * expected.norm(),
+        "{force} {expected}"
+    );
+}
+
+#[test]
+fn the_same_steps_and_jobs_give_the_same_bits() {
+    let model = model(13, false);
+    let tool = sphere(0.3);
+    let run = || {
+        let mut live = Live::new(
+            Arc::clone(&model),
+            &at(tool, -5e-3, 0.0, 0.0),
+            params(MODES[2]),
+        )
+        .unwrap();
+        let mut pending = None;
+        let mut forces = Vec::new();
+        for k in 0..80_i32 {
+            let tools = at(
+                tool,
+                -5e-3 + 0.2e-3 * f64::from(k),
+                0.0,
+                0.1e-3 * f64::from(k.min(25)),
+            );
+            live.step(&tools, 0.002);
+            forces.push(live.tool_force(0));
+            // Results come a while after they were asked for.
+            if k % 4 == 3
+                && let Some(done) = pending.take()
+            {
+                live.install(done);
+            }
+            if pending.is_none() {
+                pending = live.take_job().map(palpa_fem::realtime::Rebuild::run);
+            }
+        }
+        forces
+    };
+    let (one, other) = (run(), run());
+    assert!(one.iter().any(|f| f.norm() > 0.05));
+    let bits = |forces: &[Vec3]| -> Vec<[u64; 3]> {
+        forces
+            .iter()
+            .map(|f| [f.x.to_bits(), f.y.to_bits(), f.z.to_bits()])
+            .collect()
+    };
+    assert_eq!(bits(&one), bits(&other));
+}
