@@ -91,6 +91,7 @@ impl ContactProblem {
     /// Finds forces and displacements. Cost: some n³ of vertices that press, and with friction n² of candidates a sweep.
     pub(super) fn solve(&mut self, tools: &[PosedTool], has_friction: bool) {
         let n = self.candidates.len();
+        self.change.fill(0.0);
         for j in 0..n {
             for i in 0..n {
                 self.along[i + n * j] = if has_friction {

@@ -28,6 +28,11 @@ const LEAST_SHARE: f64 = 0.05;
 const ROUGH: f64 = 0.5;
 const LOST: f64 = 3.0;
 const LEAST_PACE: f64 = 1.0 / 64.0;
+/// Failed steps in a row after which a body begins again at rest; by how much its tools are lifted from it at a time, m, and
+/// how often.
+const MOST_FAILED: u32 = 8;
+const LIFT: f64 = 2e-3;
+const MOST_LIFTS: usize = 100;
 /// A force below which a residual is not relative to it, N.
 const LEAST_FORCE: f64 = 0.01;
 /// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
@@ -261,6 +266,8 @@ pub struct Live {
     good_pressures: Vec<f64>,
     good_tools: Vec<PosedTool>,
     pace: f64,
+    /// Steps in a row that failed.
+    n_failed: u32,
     /// Least gap between tools and the zone's skin, m.
     clearance: f64,
     /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
@@ -335,6 +342,7 @@ impl Live {
             good_pressures: vec![0.0; n_vertices],
             good_tools: tools.to_vec(),
             pace: 1.0,
+            n_failed: 0,
             clearance: 0.0,
             spring: 0.0,
             spring_age: 0,
@@ -431,12 +439,18 @@ impl Live {
             report.outcome = StepOutcome::Failed;
         }
         if report.outcome == StepOutcome::Failed {
-            self.return_to_good();
+            self.n_failed += 1;
+            if self.n_failed < MOST_FAILED {
+                self.return_to_good();
+            } else {
+                self.start_again();
+            }
             self.pace = (self.pace * 0.25).max(LEAST_PACE);
         } else if report.residual > ROUGH {
             self.pace = (self.pace * 0.5).max(LEAST_PACE);
         } else {
             self.pace = (self.pace * 2.0).min(1.0);
+            self.n_failed = 0;
             self.keep_good();
         }
         if self.model.has_memory && report.outcome != StepOutcome::Failed {
@@ -448,8 +462,13 @@ impl Live {
 
     /// Remembers the zone's state as one to come back to.
     fn keep_good(&mut self) {
-        for &[node, _] in &self.plan.zone {
-            self.good[node as usize] = self.state.displacements[node as usize];
+        // Where the exterior answers linearly it goes with the zone.
+        if self.follower.is_some() {
+            self.good.copy_from_slice(&self.state.displacements);
+        } else {
+            for &[node, _] in &self.plan.zone {
+                self.good[node as usize] = self.state.displacements[node as usize];
+            }
         }
         for &v in &self.plan.vertices {
             self.good_pressures[v as usize] = self.pressures[v as usize];
@@ -458,8 +477,12 @@ impl Live {
     }
 
     fn return_to_good(&mut self) {
-        for &[node, _] in &self.plan.zone {
-            self.state.displacements[node as usize] = self.good[node as usize];
+        if self.follower.is_some() {
+            self.state.displacements.copy_from_slice(&self.good);
+        } else {
+            for &[node, _] in &self.plan.zone {
+                self.state.displacements[node as usize] = self.good[node as usize];
+            }
         }
         for &v in &self.plan.vertices {
             self.pressures[v as usize] = self.good_pressures[v as usize];
@@ -469,6 +492,37 @@ impl Live {
         self.clearance = 0.0;
         self.spring = 0.0;
         self.is_fresh = false;
+    }
+
+    /// Begins at rest, with the tools off the skin: from the last good state there is no way on.
+    fn start_again(&mut self) {
+        self.n_failed = 0;
+        self.state.displacements.fill(Vec3::zeros());
+        self.pressures.fill(0.0);
+        self.frictions.fill(Vec3::zeros());
+        self.spring = 0.0;
+        self.is_fresh = false;
+        self.depth_at_factor = f64::INFINITY;
+        let body = &self.model.body;
+        let (_, vertex) = nearest_vertex(&self.model, &self.state.displacements, &self.tools, None);
+        let outward = body.positions[body.node(vertex, 0)] - body.positions[body.node(vertex, 1)];
+        let step = outward.normalize() * LIFT;
+        for _ in 0..MOST_LIFTS {
+            let (gap, _) = nearest_vertex(
+                &self.model,
+                &self.state.displacements,
+                &self.tools,
+                Some(&self.plan.vertices),
+            );
+            if gap > 0.0 {
+                break;
+            }
+            for tool in &mut self.tools {
+                tool.pose.translation.vector += step;
+            }
+        }
+        self.clearance = 0.0;
+        self.keep_good();
     }
 
     /// Moves the tools, no farther than one step may; returns whether that is short of where they were to go.
@@ -920,14 +974,24 @@ fn nearest_point(
     tools: &[PosedTool],
     among: Option<&[u32]>,
 ) -> (f64, Vec3) {
-    let mut best = (f64::INFINITY, model.body.skin.points[0]);
+    let (distance, vertex) = nearest_vertex(model, displacements, tools, among);
+    (distance, model.body.skin.points[vertex])
+}
+
+fn nearest_vertex(
+    model: &Model,
+    displacements: &[Vec3],
+    tools: &[PosedTool],
+    among: Option<&[u32]>,
+) -> (f64, usize) {
+    let mut best = (f64::INFINITY, 0);
     let mut look = |vertex: usize| {
         let point = model.body.skin.points[vertex];
         let x = point + displacements[model.body.node(vertex, 0)];
         for tool in tools {
             let distance = tool.tool.distance_at(&tool.pose, &x).distance;
             if distance < best.0 {
-                best = (distance, point);
+                best = (distance, vertex);
             }
         }
     };
