@@ -58,7 +58,7 @@ struct Other {
 /// The prisms of some part of a body.
 #[derive(Debug)]
 pub(super) struct Batches {
-    batches: Vec<Box<Batch>>,
+    full: Vec<Box<Batch>>,
     others: Vec<Other>,
     local_double: Box<Local<f64>>,
     local_single: Box<Local<f32>>,
@@ -131,15 +131,13 @@ impl Batches {
                     });
                     continue;
                 };
-                let index = match open.iter().find(|&&b| batches[b].hardening == hardening) {
-                    Some(&index) => index,
-                    None => {
-                        let batch = Batch::empty(hardening, with_tangent, model.has_memory);
-                        batches.push(Box::new(batch));
-                        open.push(batches.len() - 1);
-                        batches.len() - 1
-                    }
-                };
+                let with_room = open.iter().find(|&&b| batches[b].hardening == hardening);
+                let index = with_room.copied().unwrap_or(batches.len());
+                if index == batches.len() {
+                    let batch = Batch::empty(hardening, with_tangent, model.has_memory);
+                    batches.push(Box::new(batch));
+                    open.push(index);
+                }
                 batches[index].push(model, pattern, g, i, columns);
                 if batches[index].n == WIDTH {
                     open.retain(|&b| b != index);
@@ -147,14 +145,14 @@ impl Batches {
             }
         }
         let mut all = Self {
-            batches,
+            full: batches,
             others,
             local_double: Box::new(Local::new()),
             local_single: Box::new(Local::new()),
             response: GroupResponse::new(),
             has_memory: true,
         };
-        for batch in &mut all.batches {
+        for batch in &mut all.full {
             batch.fill();
         }
         all.refresh(model, memory);
@@ -168,7 +166,7 @@ impl Batches {
             return;
         }
         let mut phases = Vec::with_capacity(4);
-        for batch in &mut self.batches {
+        for batch in &mut self.full {
             for lane_index in 0..WIDTH {
                 let pair = batch.pairs[lane_index] as usize;
                 phases_at(model, memory, pair, &mut phases);
@@ -192,10 +190,10 @@ impl Batches {
         forces: &mut [Vec3],
     ) -> Result<(), Inverted> {
         let pass = Forces {
-            batches: &self.batches,
+            full: &self.full,
             local: &mut self.local_double,
             displacements,
-            forces,
+            into: forces,
         };
         Arch::new()
             .dispatch(pass)
@@ -230,7 +228,7 @@ impl Batches {
         blocks: &mut [Block<f32>],
     ) -> Result<(), Inverted> {
         let pass = Tangents {
-            batches: &self.batches,
+            full: &self.full,
             local: &mut self.local_single,
             displacements,
             blocks,
@@ -548,10 +546,10 @@ fn run<R: Lanes, const TANGENT: bool>(
 }
 
 struct Forces<'a> {
-    batches: &'a [Box<Batch>],
+    full: &'a [Box<Batch>],
     local: &'a mut Local<f64>,
     displacements: &'a [Vec3],
-    forces: &'a mut [Vec3],
+    into: &'a mut [Vec3],
 }
 
 impl WithSimd for Forces<'_> {
@@ -559,14 +557,14 @@ impl WithSimd for Forces<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        for batch in self.batches {
+        for batch in self.full {
             self.local.gather(&batch.nodes, self.displacements);
             if !run::<Doubles<S>, false>(simd, &batch.double, batch.hardening, self.local) {
                 return Err(batch.pairs[0]);
             }
             for (rows, nodes) in self.local.forces.iter().zip(&batch.nodes) {
                 for (lane, &node) in nodes.iter().enumerate().take(batch.n) {
-                    let force = &mut self.forces[node as usize];
+                    let force = &mut self.into[node as usize];
                     for c in 0..3 {
                         force[c] += rows[c][lane];
                     }
@@ -578,7 +576,7 @@ impl WithSimd for Forces<'_> {
 }
 
 struct Tangents<'a> {
-    batches: &'a [Box<Batch>],
+    full: &'a [Box<Batch>],
     local: &'a mut Local<f32>,
     displacements: &'a [Vec3],
     blocks: &'a mut [Block<f32>],
@@ -589,7 +587,7 @@ impl WithSimd for Tangents<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        for batch in self.batches {
+        for batch in self.full {
             let Some((single, places)) = &batch.tangent else {
                 continue;
             };

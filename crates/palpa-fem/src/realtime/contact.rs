@@ -8,6 +8,11 @@
 //! the tool holds it. Without friction this is all, and an active set solves it exactly. With friction,
 //! `|t| ≤ μ p` against the slip from the anchor where it reaches that, projected Gauss–Seidel sweeps go on from there.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "candidates index several arrays together"
+)]
+
 use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
@@ -301,7 +306,7 @@ impl ContactProblem {
     }
 }
 
-/// Factors a dense symmetric matrix by LDLᵀ. False where a pivot is nearly zero.
+/// Factors a dense symmetric matrix by `LDLᵀ`. False where a pivot is nearly zero.
 pub(super) fn factor_symmetric(
     n: usize,
     entry: impl Fn(usize, usize) -> f64,

@@ -16,7 +16,10 @@
 
 #![expect(
     clippy::inline_always,
-    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+    clippy::needless_range_loop,
+    clippy::too_many_lines,
+    clippy::too_many_arguments,
+    reason = "one piece of arithmetic on several arrays, compiled in its caller with the machine's instructions"
 )]
 
 use super::lanes::Lanes;

@@ -1,11 +1,6 @@
 //! Several numbers at once, whatever the machine's vectors are: the kernel is written on [`Lanes`] and compiled for each
 //! instruction set; which one runs is decided when the program starts.
 
-#![expect(
-    clippy::inline_always,
-    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
-)]
-
 use std::ops::{Add, Mul, Neg, Sub};
 
 use palpa_sparse::fronts::Number;

@@ -166,6 +166,9 @@ pub struct Rebuilt {
 
 impl Rebuild {
     /// Does the work. Cost: a factor of the whole body.
+    ///
+    /// # Panics
+    /// Never: a body that could be factored with one zone can with another.
     pub fn run(mut self) -> Rebuilt {
         let (model, pattern, memory) = (&*self.model, &*self.pattern, &self.memory);
         let is_new = matches!(self.plan, PlanOrCentre::New { .. });
@@ -232,6 +235,10 @@ impl Rebuild {
 
 /// A body that follows tools in real time.
 #[derive(Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "independent flags, none of them a state"
+)]
 pub struct Live {
     model: Arc<Model>,
     pattern: Arc<ColumnPattern>,
@@ -256,6 +263,8 @@ pub struct Live {
     forces: Vec<Vec3>,
     /// Whether they are those of the present displacements.
     is_fresh: bool,
+    /// Whether the exterior's are, where it is followed.
+    is_outside_fresh: bool,
     x: Vec<f32>,
     moves: Vec<f32>,
     before: Vec<Vec3>,
@@ -273,8 +282,6 @@ pub struct Live {
     /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
     spring: f64,
     spring_age: u32,
-    /// Radius of zones: what was asked for, or more where a tool touches more, m.
-    radius: f64,
     job: Option<Rebuild>,
     is_job_out: bool,
     n_jobs: u64,
@@ -334,6 +341,7 @@ impl Live {
             anchors: vec![Vec3::zeros(); n_vertices],
             forces: vec![Vec3::zeros(); n],
             is_fresh: false,
+            is_outside_fresh: false,
             x: vec![0.0; n_dofs],
             moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
@@ -346,7 +354,6 @@ impl Live {
             clearance: 0.0,
             spring: 0.0,
             spring_age: 0,
-            radius: params.zone_radius,
             job: None,
             is_job_out: false,
             n_jobs: 0,
@@ -408,6 +415,7 @@ impl Live {
                 follower.batches.refresh(&self.model, &self.memory);
             }
             self.is_fresh = false;
+            self.is_outside_fresh = false;
         }
         let mut report = LiveReport {
             outcome: if is_short {
@@ -492,6 +500,7 @@ impl Live {
         self.clearance = 0.0;
         self.spring = 0.0;
         self.is_fresh = false;
+        self.is_outside_fresh = false;
     }
 
     /// Begins at rest, with the tools off the skin: from the last good state there is no way on.
@@ -502,6 +511,7 @@ impl Live {
         self.frictions.fill(Vec3::zeros());
         self.spring = 0.0;
         self.is_fresh = false;
+        self.is_outside_fresh = false;
         self.depth_at_factor = f64::INFINITY;
         let body = &self.model.body;
         let (_, vertex) = nearest_vertex(&self.model, &self.state.displacements, &self.tools, None);
@@ -546,22 +556,14 @@ impl Live {
         is_short
     }
 
-    /// One Newton iteration. An error leaves the state as it was.
+    /// One Newton iteration. After an error the state is none to go on from.
     fn iterate(&mut self, dt: f64, report: &mut LiveReport) -> Result<(), Trouble> {
         let (model, plan) = (Arc::clone(&self.model), Arc::clone(&self.plan));
         if !self.is_fresh {
             self.internal_forces()?;
         }
-        if let (Some(follower), Some(outside)) =
-            (&mut self.follower, Arc::get_mut(&mut self.outside))
-        {
-            outside.follow(
-                &model,
-                &self.memory,
-                &plan,
-                follower,
-                &self.state.displacements,
-            )?;
+        if !self.is_outside_fresh {
+            self.follow()?;
         }
         self.find_candidates(dt);
         self.refactor(report)?;
@@ -601,6 +603,7 @@ impl Live {
                 &mut follower.solve,
             );
         }
+        self.follow()?;
         report.n_candidates = self.problem.candidates.len();
         report.n_active = self
             .problem
@@ -609,6 +612,25 @@ impl Live {
             .filter(|c| c.pressure > 0.0)
             .count();
         report.residual = self.residual();
+        Ok(())
+    }
+
+    /// Where the exterior is followed: its forces at the present displacements.
+    fn follow(&mut self) -> Result<(), Trouble> {
+        self.is_outside_fresh = false;
+        if let (Some(follower), Some(outside)) =
+            (&mut self.follower, Arc::get_mut(&mut self.outside))
+        {
+            let displacements = &self.state.displacements;
+            outside.follow(
+                &self.model,
+                &self.memory,
+                &self.plan,
+                follower,
+                displacements,
+            )?;
+        }
+        self.is_outside_fresh = true;
         Ok(())
     }
 
@@ -865,10 +887,7 @@ impl Live {
             .candidates
             .iter()
             .any(|c| c.pressure > 0.0 && self.plan.tree.first_dof(c.vertex as usize) >= ring);
-        if reaches_ring {
-            self.radius *= ZONE_GROWTH;
-        }
-        let radius = self.radius;
+        let radius = self.plan.radius;
         let displacements = &self.state.displacements;
         let near = nearest_point(
             &self.model,
@@ -890,6 +909,13 @@ impl Live {
         self.n_jobs += 1;
         self.depth_at_factor = depth;
         let plan = if is_leaving || reaches_ring {
+            let mut radius = self
+                .params
+                .zone_radius
+                .max(ZONE_GROWTH * self.contact_radius(centre));
+            if reaches_ring && !is_leaving {
+                radius = radius.max(ZONE_GROWTH * self.plan.radius);
+            }
             self.n_zones += 1;
             let id = self.n_zones;
             PlanOrCentre::New { id, centre, radius }
@@ -910,6 +936,15 @@ impl Live {
             is_followed,
             id: self.n_jobs,
         });
+    }
+
+    /// How far from a point of the skin at rest vertices press, m.
+    fn contact_radius(&self, centre: Vec3) -> f64 {
+        let points = &self.model.body.skin.points;
+        let pressing = self.problem.candidates.iter().filter(|c| c.pressure > 0.0);
+        pressing
+            .map(|c| (points[c.vertex as usize] - centre).norm())
+            .fold(0.0, f64::max)
     }
 
     /// Deepest displacement of a vertex that presses, m.
@@ -964,6 +999,7 @@ impl Live {
             self.keep_good();
         }
         self.is_fresh = false;
+        self.is_outside_fresh = false;
     }
 }
 

@@ -41,11 +41,11 @@ fn body() -> LayeredBody {
     )
 }
 
-fn materials(laws: [Law; 3], is_viscous: bool) -> Materials {
+fn materials(laws: &[Law; 3], is_viscous: bool) -> Materials {
     Materials::of_layers(
-        laws.into_iter()
+        laws.iter()
             .map(|law| {
-                let mut material = Material::new("t", law);
+                let mut material = Material::new("t", *law);
                 if is_viscous {
                     let terms = vec![
                         PronyTerm { g: 0.3, tau: 0.1 },
@@ -78,11 +78,11 @@ fn cases() -> Vec<(&'static str, Materials)> {
         soft(30e3),
     ];
     vec![
-        ("neo-Hookean", materials(neo_hookean, false)),
-        ("Fung and Yeoh", materials(hardening, false)),
-        ("one by one", materials(strange, false)),
-        ("viscous", materials(neo_hookean, true)),
-        ("viscous, hardening", materials(hardening, true)),
+        ("neo-Hookean", materials(&neo_hookean, false)),
+        ("Fung and Yeoh", materials(&hardening, false)),
+        ("one by one", materials(&strange, false)),
+        ("viscous", materials(&neo_hookean, true)),
+        ("viscous, hardening", materials(&hardening, true)),
     ]
 }
 
@@ -138,7 +138,7 @@ fn forces_and_stiffness_are_the_elements() {
             let mut forces = vec![Vec3::zeros(); n];
             let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
             for is_first in [true, false] {
-                let keep = |group: &SurfaceGroup| (group.triangles[0] % 3 == 0) == is_first;
+                let keep = |group: &SurfaceGroup| group.triangles[0].is_multiple_of(3) == is_first;
                 let mut batches = Batches::new(&model, &memory, &pattern, &keep, true);
                 batches.refresh(&model, &memory);
                 batches

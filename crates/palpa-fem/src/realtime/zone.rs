@@ -46,6 +46,7 @@ impl From<Singular> for Trouble {
 pub(super) struct Plan {
     pub(super) id: u64,
     pub(super) centre: Vec3,
+    pub(super) radius: f64,
     pub(super) tree: Tree,
     /// `[n_vertices]`
     pub(super) is_inside: Vec<bool>,
@@ -94,6 +95,7 @@ impl Plan {
         Ok(Self {
             id,
             centre,
+            radius,
             vertices: (0..points.len() as u32)
                 .filter(|&v| is_inside[v as usize])
                 .collect(),
@@ -426,6 +428,10 @@ impl Outside {
     }
 
     /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a model, its zone and two rooms to work in"
+    )]
     pub(super) fn refactor(
         &mut self,
         model: &Model,

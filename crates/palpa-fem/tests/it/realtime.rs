@@ -194,7 +194,8 @@ fn it_lets_go_when_the_tool_leaves() {
         .iter()
         .map(Vec3::norm)
         .fold(0.0, f64::max);
-    assert!(most < 1e-6, "{most}");
+    // The exterior is linear about where it was last brought up to date.
+    assert!(most < 5e-6, "{most}");
 }
 
 #[test]

@@ -138,11 +138,11 @@ fn dense(pattern: &ColumnPattern, parts: &[Vec<Block<f64>>; 2]) -> Mat<f64> {
     let mut matrix = Mat::zeros(pattern.n_dofs(), pattern.n_dofs());
     let mut put = |row: usize, column: usize, at: usize| {
         for part in parts {
-            for i in 0..9 {
+            for (i, value) in part[at].iter().enumerate() {
                 let (r, c) = (row + i % 3, column + i / 3);
-                matrix[(r, c)] += part[at][i];
+                matrix[(r, c)] += value;
                 if row != column {
-                    matrix[(c, r)] += part[at][i];
+                    matrix[(c, r)] += value;
                 }
             }
         }
