@@ -50,6 +50,11 @@ pub struct LiveParams {
     pub max_iterations: usize,
     /// Forces out of balance, as a share of the tools', above which a step takes another iteration.
     pub tolerance: f64,
+    /// Forces out of balance after the last step, as a share of the tools', below which the zone's stiffness of that step
+    /// serves again; 0 makes it anew in every step.
+    pub reuse: f64,
+    /// Most steps that one stiffness of the zone serves.
+    pub longest_reuse: u32,
     /// Gap up to which vertices are candidates for contact, m.
     pub reach: f64,
     /// How far the tool may go from the zone's centre before a new zone is asked for, as a share of the radius.
@@ -68,6 +73,8 @@ impl Default for LiveParams {
             exterior: ExteriorMode::Followed,
             max_iterations: 2,
             tolerance: 0.02,
+            reuse: 0.0,
+            longest_reuse: 4,
             reach: 1.5e-3,
             leave: 0.3,
             longest_move: 3e-3,
@@ -111,6 +118,8 @@ pub struct LiveReport {
     pub n_candidates: usize,
     /// Shift of the diagonal that the zone's stiffness needed, relative.
     pub shift: f32,
+    /// Whether the zone's stiffness was made anew.
+    pub is_anew: bool,
     /// Springs that held the vertices under the tools while it was solved, relative to the skin's own stiffness. Their
     /// forces are taken out again.
     pub spring: f64,
@@ -269,6 +278,9 @@ pub struct Live {
     moves: Vec<f32>,
     before: Vec<Vec3>,
     tools: Vec<PosedTool>,
+    /// Steps that the zone's stiffness has served, and forces out of balance after the last, relative.
+    age: u32,
+    balance: f64,
     /// The last state of the zone that was near equilibrium, and the share of the longest move that a step may make from
     /// where it is now.
     good: Vec<Vec3>,
@@ -349,6 +361,8 @@ impl Live {
             good: vec![Vec3::zeros(); n],
             good_pressures: vec![0.0; n_vertices],
             good_tools: tools.to_vec(),
+            age: u32::MAX,
+            balance: f64::INFINITY,
             pace: 1.0,
             n_failed: 0,
             clearance: 0.0,
@@ -428,6 +442,7 @@ impl Live {
             n_active: 0,
             n_candidates: 0,
             shift: 0.0,
+            is_anew: false,
             spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
@@ -501,6 +516,7 @@ impl Live {
         self.spring = 0.0;
         self.is_fresh = false;
         self.is_outside_fresh = false;
+        self.age = u32::MAX;
     }
 
     /// Begins at rest, with the tools off the skin: from the last good state there is no way on.
@@ -512,6 +528,7 @@ impl Live {
         self.spring = 0.0;
         self.is_fresh = false;
         self.is_outside_fresh = false;
+        self.age = u32::MAX;
         self.depth_at_factor = f64::INFINITY;
         let body = &self.model.body;
         let (_, vertex) = nearest_vertex(&self.model, &self.state.displacements, &self.tools, None);
@@ -566,7 +583,15 @@ impl Live {
             self.follow()?;
         }
         self.find_candidates(dt);
-        self.refactor(report)?;
+        let may_serve = self.age < self.params.longest_reuse && self.balance < self.params.reuse;
+        if may_serve && self.spring == 0.0 {
+            self.age += 1;
+        } else {
+            self.age = u32::MAX;
+            self.refactor(report)?;
+            self.age = 1;
+            report.is_anew = true;
+        }
         let zone = plan.tree.first_zone_dof();
         self.right_side();
         self.inside.substitute(&plan, &mut self.x);
@@ -612,6 +637,7 @@ impl Live {
             .filter(|c| c.pressure > 0.0)
             .count();
         report.residual = self.residual();
+        self.balance = report.residual;
         Ok(())
     }
 
@@ -1000,6 +1026,7 @@ impl Live {
         }
         self.is_fresh = false;
         self.is_outside_fresh = false;
+        self.age = u32::MAX;
     }
 }
 

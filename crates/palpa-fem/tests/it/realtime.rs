@@ -132,6 +132,32 @@ fn a_press_is_followed_to_the_converged_force() {
 }
 
 #[test]
+fn a_stiffness_that_serves_several_steps_leads_to_the_same_force() {
+    let model = model(13, false);
+    let tool = sphere(0.0);
+    let path: Vec<_> = (0..=4)
+        .map(|k| at(tool, 0.0, 0.0, 1e-3 * f64::from(k)))
+        .collect();
+    let expected = converged(&model, &path);
+    let params = LiveParams {
+        reuse: 0.05,
+        ..params(MODES[1])
+    };
+    let mut live = Live::new(Arc::clone(&model), &path[0], params).unwrap();
+    let mut n_anew = 0;
+    for k in 1..=80 {
+        let report = live.step(&at(tool, 0.0, 0.0, 0.05e-3 * f64::from(k)), 0.001);
+        n_anew += u32::from(report.is_anew);
+        if let Some(job) = live.take_job() {
+            live.install(job.run());
+        }
+    }
+    assert!((20..60).contains(&n_anew), "{n_anew}");
+    let error = (live.tool_force(0) - expected).norm() / expected.norm();
+    assert!(error < 0.01, "{error}");
+}
+
+#[test]
 fn a_stroke_goes_from_zone_to_zone() {
     let model = model(13, false);
     for friction in [0.0, 0.4] {
