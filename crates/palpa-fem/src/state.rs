@@ -139,6 +139,14 @@ impl Memory {
         if !model.has_memory {
             return;
         }
+        self.begin_materials(model, dt);
+        for g in 0..model.geometries.len() {
+            self.begin_group(model, state, g);
+        }
+    }
+
+    /// What the step makes of every material, without the groups.
+    pub(crate) fn begin_materials(&mut self, model: &Model, dt: f64) {
         for ((material, scale), step) in model
             .materials
             .iter()
@@ -158,26 +166,32 @@ impl Memory {
                 _ => [1.0; 2],
             };
         }
-        for g in 0..model.geometries.len() {
-            let normal = model.geometries[g].thickness_gradient.normalize();
-            let in_plane = Mat3::identity() - normal * normal.transpose();
-            for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
-                let index = model.phases[p].material as usize;
-                let material = &model.materials[index];
-                let overstress = &mut self.overstress[p];
-                overstress.points = [in_plane * material.prestress; N_POINTS];
-                overstress.volume = 0.0;
-                if let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) {
-                    let history = &state.history[p];
-                    for (point, rows) in history.points.chunks(prony.n_rows()).enumerate() {
-                        overstress.points[point] += symmetric(&step.memory(rows));
-                    }
-                    if prony.relaxes_volume() {
-                        overstress.volume = step.memory(&history.volume)[0];
-                    }
+    }
+
+    /// Constant stresses of a group in the step that has begun.
+    pub(crate) fn begin_group(&mut self, model: &Model, state: &State, g: usize) {
+        let in_plane = in_plane(model, g);
+        for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
+            let index = model.phases[p].material as usize;
+            let material = &model.materials[index];
+            let overstress = &mut self.overstress[p];
+            overstress.points = [in_plane * material.prestress; N_POINTS];
+            overstress.volume = 0.0;
+            if let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) {
+                let history = &state.history[p];
+                for (point, rows) in history.points.chunks(prony.n_rows()).enumerate() {
+                    overstress.points[point] += symmetric(&step.memory(rows));
+                }
+                if prony.relaxes_volume() {
+                    overstress.volume = step.memory(&history.volume)[0];
                 }
             }
         }
+    }
+
+    /// The step of a material, if it is viscous.
+    pub(crate) fn step_of(&self, material: usize) -> Option<&PronyStep> {
+        self.steps[material].as_ref()
     }
 
     /// Ends the step: every point remembers.
@@ -185,33 +199,43 @@ impl Memory {
         if self.steps.iter().all(Option::is_none) {
             return;
         }
-        let n_groups = model.n_groups();
         for g in 0..model.geometries.len() {
-            let (i, group) = (g / n_groups, g % n_groups);
-            let nodes = model.group_nodes(group, i);
-            let displacements = nodes.map(|n| state.displacements[n]);
-            for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
-                let index = model.phases[p].material as usize;
-                let material = &model.materials[index];
-                let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) else {
-                    continue;
-                };
-                let stresses = elastic_stresses(
-                    model.structure.groups[group].shape,
-                    &model.geometries[g],
-                    &displacements,
-                    &material.law,
-                );
-                // A step that was accepted has no inverted point.
-                let Some(stresses) = stresses else { continue };
-                let history = &mut state.history[p];
-                for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {
-                    step.advance(rows, &components(&stresses.points[point]));
-                }
-                step.advance(&mut history.volume, &[stresses.volume]);
-            }
+            self.commit_group(model, state, g);
         }
     }
+
+    /// Ends the step of a group.
+    pub(crate) fn commit_group(&self, model: &Model, state: &mut State, g: usize) {
+        let (i, group) = (g / model.n_groups(), g % model.n_groups());
+        let nodes = model.group_nodes(group, i);
+        let displacements = nodes.map(|n| state.displacements[n]);
+        for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
+            let index = model.phases[p].material as usize;
+            let material = &model.materials[index];
+            let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) else {
+                continue;
+            };
+            let stresses = elastic_stresses(
+                model.structure.groups[group].shape,
+                &model.geometries[g],
+                &displacements,
+                &material.law,
+            );
+            // A step that was accepted has no inverted point.
+            let Some(stresses) = stresses else { continue };
+            let history = &mut state.history[p];
+            for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {
+                step.advance(rows, &components(&stresses.points[point]));
+            }
+            step.advance(&mut history.volume, &[stresses.volume]);
+        }
+    }
+}
+
+/// The projection on the plane of a group's layer.
+pub(crate) fn in_plane(model: &Model, g: usize) -> Mat3 {
+    let normal = model.geometries[g].thickness_gradient.normalize();
+    Mat3::identity() - normal * normal.transpose()
 }
 
 fn components(s: &Mat3) -> [f64; 6] {

@@ -544,7 +544,7 @@ impl Newton<'_> {
         outcome
     }
 
-    /// Below this the body counts as free of forces, N.
+    /// Below this the body counts as free of forces, N. The tolerance of it is still above what rounding leaves.
     fn floor(&self) -> f64 {
         let stiffest = self
             .model
@@ -553,7 +553,7 @@ impl Newton<'_> {
             .map(|m| m.law.shear_modulus())
             .fold(0.0, f64::max);
         let area: f64 = self.model.skin_areas.iter().sum();
-        1e-9 * stiffest * area / self.model.skin_areas.len() as f64
+        1e-6 * stiffest * area / self.model.skin_areas.len() as f64
     }
 
     /// Takes loads off the forces and adds what inertia and contact put on the stiffness.

@@ -187,6 +187,11 @@ impl PronyStep {
         self.scale
     }
 
+    /// For each term what is left of its memory, and what a change of the elastic stress adds to it.
+    pub(crate) fn factors(&self) -> ([f64; Prony::MOST_TERMS], [f64; Prony::MOST_TERMS]) {
+        (self.decay, self.gain)
+    }
+
     /// `H`, in Pa: the part of the new stress that the past has fixed. `history` is `[n_terms + 1]` rows, as the last step
     /// left them.
     #[inline]

@@ -13,15 +13,16 @@ use palpa_sparse::{Block, ColumnPattern};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::kernel::{
-    Constant, Geometry, Local, N_BLOCKS, N_NODES, N_POINTS, Row, Stiffness, WIDTH, evaluate,
+    Constant, Geometry, Local, N_BLOCKS, N_NODES, N_POINTS, Row, Stiffness, WIDTH, elastic,
+    evaluate,
 };
 use super::lanes::{Doubles, Lanes, Singles};
 use crate::assembly::{Inverted, phases_at};
 use crate::columns::SurfaceGroup;
-use crate::element::{GroupResponse, Overstress, PhaseAt};
-use crate::law::Hardening;
+use crate::element::{GroupResponse, PhaseAt};
+use crate::law::{Hardening, Prony, PronyStep};
 use crate::model::Model;
-use crate::state::Memory;
+use crate::state::{Memory, State, in_plane};
 
 /// Set in the place of a block that is to be added turned.
 const TURNED: u32 = 1 << 31;
@@ -44,8 +45,57 @@ struct Batch {
     /// Nodes in the order of the kernel.
     nodes: [[u32; WIDTH]; N_NODES],
     double: Numbers<f64>,
+    /// Of a body that has a memory.
+    past: Option<Box<Past>>,
     /// For tangents: in single precision, and where they go.
     tangent: Option<(Numbers<f32>, [[u32; WIDTH]; N_BLOCKS])>,
+}
+
+/// What the pairs of a batch, all of one material, remember.
+#[derive(Debug)]
+struct Past {
+    material: usize,
+    relaxes_volume: bool,
+    /// Without the factors of a step.
+    rest: Stiffness<f64>,
+    /// Tension in the plane of the layer, `xx, yy, zz, xy, yz, zx`, Pa.
+    tension: [Row<f64>; 6],
+    /// The last elastic stress, then the memory of each term, Pa.
+    rows: Vec<Constant<f64>>,
+}
+
+/// Memories of all pairs of a body, on their way from zone to zone.
+#[derive(Debug, Clone)]
+pub(super) struct History {
+    n_rows: usize,
+    /// `[pair][row][six stresses at six points, pressure]`, Pa
+    numbers: Vec<f64>,
+    is_known: Vec<bool>,
+}
+
+/// Numbers of a row of a pair.
+const ROW: usize = 6 * N_POINTS + 1;
+
+impl History {
+    pub(super) fn new(model: &Model) -> Self {
+        let rows = |m: &crate::Material| m.prony.as_ref().map_or(0, crate::law::Prony::n_rows);
+        let n_rows = model.materials.iter().map(rows).max().unwrap_or(0);
+        let n_pairs = if model.has_memory {
+            model.geometries.len()
+        } else {
+            0
+        };
+        Self {
+            n_rows,
+            numbers: vec![0.0; n_pairs * n_rows * ROW],
+            is_known: vec![false; n_pairs],
+        }
+    }
+
+    fn row(&self, pair: usize, row: usize) -> std::ops::Range<usize> {
+        let first = (pair * self.n_rows + row) * ROW;
+        first..first + ROW
+    }
 }
 
 /// A pair whose law is not the kernel's.
@@ -63,7 +113,6 @@ pub(super) struct Batches {
     local_double: Box<Local<f64>>,
     local_single: Box<Local<f32>>,
     response: GroupResponse,
-    has_memory: bool,
 }
 
 /// Local columns in the order of the kernel: the first wedge's own, the two that are shared, the second's own.
@@ -84,7 +133,10 @@ fn kernel_columns(group: &SurfaceGroup) -> [usize; 4] {
 
 /// `w'` at rest and bulk modulus of a group, per point and for its volume, and how it hardens; none if its law is not the
 /// kernel's.
-fn lane(phases: &[PhaseAt<'_>]) -> Option<([f64; N_POINTS], f64, Hardening)> {
+fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f64, Hardening)> {
+    if has_memory && phases.len() > 1 {
+        return None;
+    }
     let mut slopes = [0.0; N_POINTS];
     let mut bulk = 0.0;
     let mut common = None;
@@ -94,9 +146,9 @@ fn lane(phases: &[PhaseAt<'_>]) -> Option<([f64; N_POINTS], f64, Hardening)> {
             return None;
         }
         for (sum, share) in slopes.iter_mut().zip(at.phase.points) {
-            *sum += slope * share * at.scale[0];
+            *sum += slope * share;
         }
-        bulk += k * at.phase.volume * at.scale[1];
+        bulk += k * at.phase.volume;
     }
     common.map(|hardening| (slopes, bulk, hardening))
 }
@@ -124,58 +176,125 @@ impl Batches {
                 let pair = i * n_groups + g;
                 phases_at(model, memory, pair, &mut phases);
                 let columns = kernel_columns(group);
-                let Some((_, _, hardening)) = lane(&phases) else {
+                let Some((slopes, bulk, hardening)) = lane(&phases, model.has_memory) else {
                     others.push(Other {
                         pair: pair as u32,
                         blocks: places(model, pattern, group, i, [0, 1, 2, 3]),
                     });
                     continue;
                 };
-                let with_room = open.iter().find(|&&b| batches[b].hardening == hardening);
+                let past = model.has_memory.then(|| phases[0].phase.material as usize);
+                let with_room = open.iter().find(|&&b| {
+                    let batch = &batches[b];
+                    batch.hardening == hardening && batch.past.as_ref().map(|p| p.material) == past
+                });
                 let index = with_room.copied().unwrap_or(batches.len());
                 if index == batches.len() {
-                    let batch = Batch::empty(hardening, with_tangent, model.has_memory);
+                    let batch = Batch::empty(model, hardening, with_tangent, past);
                     batches.push(Box::new(batch));
                     open.push(index);
                 }
                 batches[index].push(model, pattern, g, i, columns);
+                batches[index].stiffen(slopes, bulk);
                 if batches[index].n == WIDTH {
                     open.retain(|&b| b != index);
                 }
             }
         }
-        let mut all = Self {
+        for batch in &mut batches {
+            batch.fill();
+        }
+        Self {
             full: batches,
             others,
             local_double: Box::new(Local::new()),
             local_single: Box::new(Local::new()),
             response: GroupResponse::new(),
-            has_memory: true,
-        };
-        for batch in &mut all.full {
-            batch.fill();
         }
-        all.refresh(model, memory);
-        all.has_memory = model.has_memory;
-        all
     }
 
-    /// Takes over what a step's duration and the past make of materials that have a memory.
-    pub(super) fn refresh(&mut self, model: &Model, memory: &Memory) {
-        if !self.has_memory {
+    /// Takes over what a step's duration (`memory` has begun with) and the past make of materials that have a memory.
+    pub(super) fn begin(&mut self, model: &Model, memory: &mut Memory, state: &State) {
+        if !model.has_memory {
             return;
         }
-        let mut phases = Vec::with_capacity(4);
+        self.begin_others(model, memory, state);
+        self.begin_lanes(memory);
+    }
+
+    /// The same for the pairs that are not in lanes.
+    pub(super) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
+        for other in &self.others {
+            memory.begin_group(model, state, other.pair as usize);
+        }
+    }
+
+    /// The same for the pairs in lanes.
+    pub(super) fn begin_lanes(&mut self, memory: &Memory) {
         for batch in &mut self.full {
-            for lane_index in 0..WIDTH {
-                let pair = batch.pairs[lane_index] as usize;
-                phases_at(model, memory, pair, &mut phases);
-                let Some((slopes, bulk, _)) = lane(&phases) else {
+            batch.begin(memory);
+        }
+    }
+
+    /// Ends a step: every point remembers.
+    pub(super) fn commit(&mut self, model: &Model, memory: &Memory, state: &mut State) {
+        if !model.has_memory {
+            return;
+        }
+        self.commit_others(model, memory, state);
+        self.commit_lanes(memory, &state.displacements);
+    }
+
+    /// The same for the pairs that are not in lanes.
+    pub(super) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
+        for other in &self.others {
+            memory.commit_group(model, state, other.pair as usize);
+        }
+    }
+
+    /// The same for those that are.
+    pub(super) fn commit_lanes(&mut self, memory: &Memory, displacements: &[Vec3]) {
+        Arch::new().dispatch(Remember {
+            full: &mut self.full,
+            local: &mut self.local_double,
+            displacements,
+            memory,
+        });
+    }
+
+    /// Puts down what the pairs remember.
+    pub(super) fn store(&self, history: &mut History) {
+        for batch in &self.full {
+            let Some(past) = &batch.past else { continue };
+            for (lane, &pair) in batch.pairs.iter().enumerate().take(batch.n) {
+                history.is_known[pair as usize] = true;
+                for (r, row) in past.rows.iter().enumerate() {
+                    let range = history.row(pair as usize, r);
+                    let numbers = row.stress.iter().flatten().chain([&row.pressure]);
+                    for (into, from) in history.numbers[range].iter_mut().zip(numbers) {
+                        *into = from[lane];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes up what is known of these pairs.
+    pub(super) fn load(&mut self, history: &History) {
+        for batch in &mut self.full {
+            let Some(past) = &mut batch.past else {
+                continue;
+            };
+            for (lane, &pair) in batch.pairs.iter().enumerate() {
+                if !history.is_known[pair as usize] {
                     continue;
-                };
-                batch.double.put(lane_index, slopes, bulk, &phases);
-                if let Some((single, _)) = &mut batch.tangent {
-                    single.put(lane_index, slopes, bulk, &phases);
+                }
+                for (r, row) in past.rows.iter_mut().enumerate() {
+                    let range = history.row(pair as usize, r);
+                    let numbers = row.stress.iter_mut().flatten().chain([&mut row.pressure]);
+                    for (into, from) in numbers.zip(&history.numbers[range]) {
+                        into[lane] = *from;
+                    }
                 }
             }
         }
@@ -349,8 +468,10 @@ fn places(
 }
 
 impl Batch {
-    fn empty(hardening: Hardening, with_tangent: bool, has_memory: bool) -> Self {
+    fn empty(model: &Model, hardening: Hardening, with_tangent: bool, past: Option<usize>) -> Self {
+        let has_memory = past.is_some();
         Self {
+            past: past.map(|material| Box::new(Past::new(model, material))),
             n: 0,
             hardening,
             pairs: [0; WIDTH],
@@ -378,12 +499,59 @@ impl Batch {
             nodes[lane] = model.body.node(vertex, interval + n % 2) as u32;
         }
         self.double.shape(model, pair, lane, columns);
+        if let Some(past) = &mut self.past {
+            let tension = in_plane(model, pair) * model.materials[past.material].prestress;
+            let six = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
+            for (row, place) in past.tension.iter_mut().zip(six) {
+                row[lane] = tension[place];
+            }
+        }
         if let Some((single, blocks)) = &mut self.tangent {
             single.shape(model, pair, lane, columns);
             let places = places(model, pattern, group, interval, columns);
             for (row, place) in blocks.iter_mut().zip(places) {
                 row[lane] = place;
             }
+        }
+    }
+
+    /// Gives the pair that was pushed last its stiffness.
+    fn stiffen(&mut self, slopes: [f64; N_POINTS], bulk: f64) {
+        let lane = self.n - 1;
+        if let Some(past) = &mut self.past {
+            past.rest.put(lane, slopes, bulk);
+        }
+        self.double.stiffness.put(lane, slopes, bulk);
+        if let Some((single, _)) = &mut self.tangent {
+            single.stiffness.put(lane, slopes, bulk);
+        }
+    }
+
+    fn begin(&mut self, memory: &Memory) {
+        let (Some(past), Some(constant)) = (&self.past, &mut self.double.constant) else {
+            return;
+        };
+        let scale = memory.scales[past.material];
+        for (row, rest) in self.double.stiffness.slope.iter_mut().zip(&past.rest.slope) {
+            *row = rest.map(|x| x * scale[0]);
+        }
+        self.double.stiffness.bulk = past.rest.bulk.map(|x| x * scale[1]);
+        let factors = memory.step_of(past.material).map(PronyStep::factors);
+        for point in 0..N_POINTS {
+            for k in 0..6 {
+                let mut sum = past.tension[k];
+                if let Some((decay, gain)) = &factors {
+                    past.add_memory(|row| &row.stress[point][k], decay, gain, &mut sum);
+                }
+                constant.stress[point][k] = sum;
+            }
+        }
+        constant.pressure = [0.0; WIDTH];
+        if let Some((decay, gain)) = factors.filter(|_| past.relaxes_volume) {
+            past.add_memory(|row| &row.pressure, &decay, &gain, &mut constant.pressure);
+        }
+        if let Some((single, _)) = &mut self.tangent {
+            single.take_over(&self.double);
         }
     }
 
@@ -395,6 +563,12 @@ impl Batch {
                 nodes[lane] = nodes[0];
             }
             self.double.copy_first(lane);
+            if let Some(past) = &mut self.past {
+                past.rest.copy_first(lane);
+                for row in &mut past.tension {
+                    row[lane] = row[0];
+                }
+            }
             if let Some((single, _)) = &mut self.tangent {
                 single.copy_first(lane);
             }
@@ -452,32 +626,22 @@ impl<E: Number> Numbers<E> {
         geometry.alpha[lane] = E::nearest(if is_pair { model.params.alpha } else { 0.0 });
     }
 
-    fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64, phases: &[PhaseAt<'_>]) {
-        for (row, slope) in self.stiffness.slope.iter_mut().zip(slopes) {
-            row[lane] = E::nearest(slope);
-        }
-        self.stiffness.bulk[lane] = E::nearest(bulk);
-        let Some(constant) = &mut self.constant else {
-            return;
-        };
-        let shares = |overstress: &Overstress, at: &PhaseAt<'_>, point: usize| {
-            overstress.points[point] * at.phase.points[point]
-        };
-        for point in 0..N_POINTS {
-            let sum = phases
-                .iter()
-                .filter_map(|at| at.overstress.map(|o| shares(o, at, point)))
-                .sum::<crate::Mat3>();
-            let six = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
-            for (row, place) in constant.stress[point].iter_mut().zip(six) {
-                row[lane] = E::nearest(sum[place]);
+    /// Takes over what a step has changed, in another precision.
+    fn take_over(&mut self, from: &Numbers<f64>) {
+        let row = |row: &Row<f64>| row.map(E::nearest);
+        self.stiffness.slope = std::array::from_fn(|p| row(&from.stiffness.slope[p]));
+        self.stiffness.bulk = row(&from.stiffness.bulk);
+        if let (Some(constant), Some(from)) = (&mut self.constant, &from.constant) {
+            for (rows, from) in constant
+                .stress
+                .iter_mut()
+                .flatten()
+                .zip(from.stress.iter().flatten())
+            {
+                *rows = row(from);
             }
+            constant.pressure = row(&from.pressure);
         }
-        let pressure: f64 = phases
-            .iter()
-            .filter_map(|at| at.overstress.map(|o| o.volume * at.phase.volume))
-            .sum();
-        constant.pressure[lane] = E::nearest(pressure);
     }
 
     fn copy_first(&mut self, lane: usize) {
@@ -494,6 +658,120 @@ impl<E: Number> Numbers<E> {
         geometry.thickness.iter_mut().for_each(copy);
         geometry.thickness_gradient.iter_mut().for_each(copy);
         copy(&mut geometry.alpha);
+        self.stiffness.copy_first(lane);
+    }
+}
+
+impl<E: Number> Stiffness<E> {
+    fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64) {
+        for (row, slope) in self.slope.iter_mut().zip(slopes) {
+            row[lane] = E::nearest(slope);
+        }
+        self.bulk[lane] = E::nearest(bulk);
+    }
+
+    fn copy_first(&mut self, lane: usize) {
+        for row in self.slope.iter_mut().chain([&mut self.bulk]) {
+            row[lane] = row[0];
+        }
+    }
+}
+
+impl Past {
+    fn new(model: &Model, material: usize) -> Self {
+        let zero = [0.0; WIDTH];
+        let prony = model.materials[material].prony.as_ref();
+        let empty = Constant {
+            stress: [[zero; 6]; N_POINTS],
+            pressure: zero,
+        };
+        Self {
+            material,
+            relaxes_volume: prony.is_some_and(Prony::relaxes_volume),
+            rest: Stiffness {
+                slope: [zero; N_POINTS],
+                bulk: zero,
+            },
+            tension: [zero; 6],
+            rows: vec![empty; prony.map_or(0, Prony::n_rows)],
+        }
+    }
+
+    /// Adds `Σ decay · memory − gain · last`.
+    #[inline(always)]
+    fn add_memory<'a>(
+        &'a self,
+        of: impl Fn(&'a Constant<f64>) -> &'a Row<f64>,
+        decay: &[f64],
+        gain: &[f64],
+        sum: &mut Row<f64>,
+    ) {
+        let Some((last, rows)) = self.rows.split_first() else {
+            return;
+        };
+        let last = of(last);
+        for (row, (decay, gain)) in rows.iter().zip(decay.iter().zip(gain)) {
+            let row = of(row);
+            for lane in 0..WIDTH {
+                sum[lane] += decay * row[lane] - gain * last[lane];
+            }
+        }
+    }
+}
+
+/// Moves the memories of all batches on.
+struct Remember<'a> {
+    full: &'a mut [Box<Batch>],
+    local: &'a mut Local<f64>,
+    displacements: &'a [Vec3],
+    memory: &'a Memory,
+}
+
+impl WithSimd for Remember<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let zero = [0.0; WIDTH];
+        let mut new = Constant {
+            stress: [[zero; 6]; N_POINTS],
+            pressure: zero,
+        };
+        for batch in self.full {
+            let Some(past) = &mut batch.past else {
+                continue;
+            };
+            let Some(step) = self.memory.step_of(past.material) else {
+                continue;
+            };
+            self.local.gather(&batch.nodes, self.displacements);
+            for at in (0..WIDTH).step_by(Doubles::<S>::N) {
+                elastic::<Doubles<S>>(
+                    simd,
+                    at,
+                    &batch.double.geometry,
+                    &past.rest,
+                    batch.hardening,
+                    self.local,
+                    &mut new,
+                );
+            }
+            let (decay, gain) = step.factors();
+            let Some((last, rows)) = past.rows.split_first_mut() else {
+                continue;
+            };
+            for (row, (decay, gain)) in rows.iter_mut().zip(decay.iter().zip(&gain)) {
+                let into = row.stress.iter_mut().flatten().chain([&mut row.pressure]);
+                let old = last.stress.iter().flatten().chain([&last.pressure]);
+                let now = new.stress.iter().flatten().chain([&new.pressure]);
+                for ((into, old), now) in into.zip(old).zip(now) {
+                    for lane in 0..WIDTH {
+                        into[lane] = decay * into[lane] + gain * (now[lane] - old[lane]);
+                    }
+                }
+            }
+            last.clone_from(&new);
+        }
     }
 }
 

@@ -576,3 +576,113 @@ impl<R: Lanes> Context<'_, R> {
         axpy(weight, &self.constant_times(point, v), &own)
     }
 }
+
+/// The deviatoric second Piola–Kirchhoff stress that the law alone says at the points, and the pressure, of the lanes from
+/// `at` on, into the places of constant stresses, Pa. `material` is that at rest, for one share of everything.
+#[inline(always)]
+pub(super) fn elastic<R: Lanes>(
+    token: R::Token,
+    at: usize,
+    geometry: &Geometry<R::Element>,
+    material: &Stiffness<R::Element>,
+    hardening: Hardening,
+    local: &Local<R::Element>,
+    out: &mut Constant<R::Element>,
+) {
+    let splat = |x: f64| R::splat(token, x);
+    let (zero, one) = (splat(0.0), splat(1.0));
+    let load = |row: &Row<R::Element>| R::load(token, &row[at..]);
+    let load3 = |rows: &[Row<R::Element>; 3]| [load(&rows[0]), load(&rows[1]), load(&rows[2])];
+    let thickness = load3(&geometry.thickness);
+    let normal = load3(&geometry.thickness_gradient);
+    let context = Context {
+        token,
+        at,
+        material,
+        constant: None,
+        hardening,
+        thickness,
+        normal,
+    };
+    let mut f = [[[[zero; 3]; 3]; 2]; 2];
+    let mut volumes = [[zero; 2]; 2];
+    let (mut change, mut total) = (zero, zero);
+    for w in 0..2 {
+        for q in 0..2 {
+            let mut h = [[zero; 3]; 3];
+            for n in 0..6 {
+                let g = load3(&geometry.gradients[w][q][n]);
+                let u = load3(&local.displacements[2 * w + n]);
+                for r in 0..3 {
+                    h[r] = axpy(u[r], &g, &h[r]);
+                }
+            }
+            for r in 0..3 {
+                h[r][r] = h[r][r] + one;
+            }
+            let j = dot(&h[0], &cofactor(&h)[0]);
+            f[w][q] = h;
+            volumes[w][q] = load(&geometry.volumes[w][q]);
+            change = volumes[w][q].mul_add(j - one, change);
+            total = total + volumes[w][q];
+        }
+    }
+    let pressure = load(&material.bulk) * change.divided_by(total);
+    pressure.store(&mut out.pressure[at..]);
+    let mut mean = [[[zero; 3]; 3]; 2];
+    let mut sums = [zero; 2];
+    for q in 0..2 {
+        sums[q] = volumes[0][q] + volumes[1][q];
+        let inverse = one.divided_by(sums[q]);
+        for w in 0..2 {
+            for r in 0..3 {
+                mean[q][r] = axpy(volumes[w][q] * inverse, &f[w][q][r], &mean[q][r]);
+            }
+        }
+    }
+    let units = [
+        (0, mean, sums),
+        (2, f[0], volumes[0]),
+        (4, f[1], volumes[1]),
+    ];
+    for (point, f, v) in units {
+        let j = [
+            dot(&f[0][0], &cofactor(&f[0])[0]),
+            dot(&f[1][0], &cofactor(&f[1])[0]),
+        ];
+        let sum = v[0] + v[1];
+        // The second wedge of a single prism has no volume, and no say.
+        let jb = v[0]
+            .mul_add(j[0], v[1] * j[1])
+            .divided_by(sum.max(splat(1e-300)));
+        let y = inv_cbrt(token, jb.max(splat(1e-3)));
+        let y2 = y * y;
+        let inv_jb2 = (y2 * y) * (y2 * y);
+        for q in 0..2 {
+            let excess = jb.divided_by(j[q]) - one;
+            let carried = mul(&f[q], &thickness);
+            let mut hat = [[zero; 3]; 3];
+            for r in 0..3 {
+                hat[r] = axpy(excess * carried[r], &normal, &f[q][r]);
+            }
+            // C = F^ᵀ F^, its cofactor, and J² = Jb².
+            let column = |c: usize| [hat[0][c], hat[1][c], hat[2][c]];
+            let columns = [column(0), column(1), column(2)];
+            let c: M3<R> =
+                std::array::from_fn(|i| std::array::from_fn(|k| dot(&columns[i], &columns[k])));
+            let n = c[0][0] + c[1][1] + c[2][2];
+            let cof = cofactor(&c);
+            let slope = load(&material.slope[point + q]);
+            let [first, _] = context.harden(y2.mul_add(n, splat(-3.0)));
+            let b = splat(2.0) * slope * first * y2;
+            let fall = n * splat(-1.0 / 3.0) * inv_jb2;
+            for (k, (i, l)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
+                .into_iter()
+                .enumerate()
+            {
+                let unit = if i == l { one } else { zero };
+                (b * fall.mul_add(cof[i][l], unit)).store(&mut out.stress[point + q][k][at..]);
+            }
+        }
+    }
+}

@@ -25,11 +25,12 @@ pub(super) trait Lanes:
     fn mul_add(self, b: Self, c: Self) -> Self;
     fn divided_by(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
 }
 
 macro_rules! lanes {
     ($name:ident, $element:ty, $vector:ident, $as_simd:ident, $as_mut_simd:ident,
-     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $min:ident, $mul_add:ident) => {
+     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $min:ident, $max:ident, $mul_add:ident) => {
         /// The machine's vector of this precision.
         #[derive(Clone, Copy)]
         pub(super) struct $name<S: Simd> {
@@ -116,6 +117,11 @@ macro_rules! lanes {
             fn min(self, other: Self) -> Self {
                 self.with(self.simd.$min(self.v, other.v))
             }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.with(self.simd.$max(self.v, other.v))
+            }
         }
     };
 }
@@ -133,6 +139,7 @@ lanes!(
     div_f64s,
     neg_f64s,
     min_f64s,
+    max_f64s,
     mul_add_e_f64s
 );
 lanes!(
@@ -148,5 +155,6 @@ lanes!(
     div_f32s,
     neg_f32s,
     min_f32s,
+    max_f32s,
     mul_add_e_f32s
 );

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
 
+use super::batch::History;
 use super::contact::{Candidate, ContactProblem};
 use super::local::LocalModel;
 use super::zone::{Follower, Inside, Outside, Plan, Trouble, Workshop};
@@ -139,8 +140,13 @@ pub struct Rebuild {
     /// The exterior that the displacements outside the zone follow; none where they are up to date.
     old: Option<(Arc<Plan>, Arc<Outside>)>,
     plan: PlanOrCentre,
-    /// Kept from the last rebuild of the same zone.
+    /// Kept from the last rebuild.
     shop: Option<Box<Shop>>,
+    /// Duration of a step, and time that the exterior's memory is behind, s.
+    dt: f64,
+    lag: f64,
+    /// What prisms remember that are not in the shop, or all of them.
+    history: Option<History>,
     /// Memory that is no longer needed: used again, or freed where nobody waits.
     retired: Option<Arc<Outside>>,
     is_followed: bool,
@@ -160,6 +166,16 @@ struct Shop {
     plan: u64,
     follower: Follower,
     workshop: Workshop,
+}
+
+impl Shop {
+    fn new(model: &Model, memory: &Memory, pattern: &ColumnPattern, plan: &Plan) -> Self {
+        Self {
+            plan: plan.id,
+            follower: Follower::new(model, memory, pattern, plan, true),
+            workshop: Workshop::new(model, pattern, plan),
+        }
+    }
 }
 
 /// What came of a [`Rebuild`].
@@ -190,22 +206,36 @@ impl Rebuild {
                 )
             }
         };
-        let mut shop = self
-            .shop
-            .filter(|shop| shop.plan == plan.id)
-            .unwrap_or_else(|| {
-                Box::new(Shop {
-                    plan: plan.id,
-                    follower: Follower::new(model, memory, pattern, &plan, true),
-                    workshop: Workshop::new(model, pattern, &plan),
-                })
-            });
+        let (same, mut other) = match self.shop {
+            Some(shop) if shop.plan == plan.id => (Some(shop), None),
+            other => (None, other),
+        };
+        let mut shop = same.unwrap_or_else(|| Box::new(Shop::new(model, memory, pattern, &plan)));
         if let Some((plan, old)) = &self.old {
             let mut scratch = palpa_sparse::fronts::SolveScratch::new(&plan.tree);
             let x = &mut shop.workshop.x;
             old.settle(model, plan, &mut self.displacements, x, &mut scratch);
         }
-        shop.follower.batches.refresh(model, memory);
+        if let Some(mut history) = self.history.take() {
+            let is_linear = self.old.is_some();
+            if let (true, Some(old)) = (is_linear, &mut other) {
+                self.memory.begin_materials(model, self.lag);
+                let batches = &mut old.follower.batches;
+                batches.commit_lanes(&self.memory, &self.displacements);
+                batches.store(&mut history);
+            }
+            shop.follower.batches.load(&history);
+            self.history = Some(history);
+        } else if model.has_memory {
+            self.memory.begin_materials(model, self.lag);
+            let batches = &mut shop.follower.batches;
+            batches.commit_lanes(&self.memory, &self.displacements);
+        }
+        if model.has_memory {
+            self.memory.begin_materials(model, self.dt);
+            shop.follower.batches.begin_lanes(&self.memory);
+        }
+        let memory = &self.memory;
         let recycled = self
             .retired
             .filter(|old| old.plan == plan.id)
@@ -225,19 +255,26 @@ impl Rebuild {
             &self.displacements,
         );
         let inside = is_new.then(|| {
-            let follower = self
+            let mut follower = self
                 .is_followed
                 .then(|| Box::new(Follower::new(model, memory, pattern, &plan, false)));
-            (
-                Box::new(Inside::new(model, memory, pattern, &plan)),
-                follower,
-            )
+            let mut inside = Box::new(Inside::new(model, memory, pattern, &plan));
+            if let Some(history) = &self.history {
+                inside.batches.load(history);
+                if let Some(follower) = &mut follower {
+                    follower.batches.load(history);
+                }
+            }
+            (inside, follower)
         });
         Rebuilt {
             plan,
             inside,
+            shop: match (&made, other) {
+                (Err(_), Some(old)) => old,
+                _ => shop,
+            },
             outside: made.is_ok().then(|| Arc::new(outside)),
-            shop,
         }
     }
 }
@@ -299,6 +336,8 @@ pub struct Live {
     n_jobs: u64,
     n_zones: u64,
     depth_at_factor: f64,
+    /// Time that a linear exterior's memory is behind, s.
+    lag: f64,
 }
 
 impl Live {
@@ -318,11 +357,10 @@ impl Live {
         let centre = nearest_point(&model, &state.displacements, tools, None).1;
         let plan = Plan::new(&model, &pattern, 1, centre, params.zone_radius)?;
         let inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
-        let mut shop = Box::new(Shop {
-            plan: plan.id,
-            follower: Follower::new(&model, &memory, &pattern, &plan, true),
-            workshop: Workshop::new(&model, &pattern, &plan),
-        });
+        let mut shop = Box::new(Shop::new(&model, &memory, &pattern, &plan));
+        if model.has_memory {
+            shop.follower.batches.begin(&model, &mut memory, &state);
+        }
         let mut outside = Outside::new(&model, &plan);
         let Shop {
             follower, workshop, ..
@@ -373,6 +411,7 @@ impl Live {
             n_jobs: 0,
             n_zones: 1,
             depth_at_factor: 0.0,
+            lag: 0.0,
             model,
             pattern,
             params,
@@ -423,10 +462,11 @@ impl Live {
         let is_short = self.move_tools(tools);
         self.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
         if self.model.has_memory {
-            self.memory.begin(&self.model, &self.state, dt);
-            self.inside.batches.refresh(&self.model, &self.memory);
+            let (model, state) = (&*self.model, &self.state);
+            self.memory.begin_materials(model, dt);
+            self.inside.batches.begin(model, &mut self.memory, state);
             if let Some(follower) = &mut self.follower {
-                follower.batches.refresh(&self.model, &self.memory);
+                follower.batches.begin(model, &mut self.memory, state);
             }
             self.is_fresh = false;
             self.is_outside_fresh = false;
@@ -477,9 +517,14 @@ impl Live {
             self.keep_good();
         }
         if self.model.has_memory && report.outcome != StepOutcome::Failed {
-            self.memory.commit(&self.model, &mut self.state);
+            let (model, memory) = (&*self.model, &self.memory);
+            self.inside.batches.commit(model, memory, &mut self.state);
+            match &mut self.follower {
+                Some(follower) => follower.batches.commit(model, memory, &mut self.state),
+                None => self.lag += dt,
+            }
         }
-        self.ask();
+        self.ask(dt);
         report
     }
 
@@ -903,7 +948,7 @@ impl Live {
     }
 
     /// Asks for a rebuild where it is due.
-    fn ask(&mut self) {
+    fn ask(&mut self, dt: f64) {
         if self.is_job_out || self.job.is_some() || self.plan.exterior.is_empty() {
             return;
         }
@@ -950,6 +995,10 @@ impl Live {
         };
         let is_followed = self.params.exterior == ExteriorMode::Followed;
         let old = (!is_followed).then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside)));
+        let history = (self.model.has_memory && (is_leaving || reaches_ring || is_followed))
+            .then(|| self.history());
+        let lag = std::mem::take(&mut self.lag);
+        self.bring_up_others(dt, lag);
         self.job = Some(Rebuild {
             model: Arc::clone(&self.model),
             pattern: Arc::clone(&self.pattern),
@@ -960,8 +1009,37 @@ impl Live {
             shop: self.shop.take(),
             retired: self.retired.take(),
             is_followed,
+            dt,
+            lag,
+            history,
             id: self.n_jobs,
         });
+    }
+
+    /// What the prisms remember that step by step are moved on here.
+    fn history(&self) -> History {
+        let mut history = History::new(&self.model);
+        self.inside.batches.store(&mut history);
+        if let Some(follower) = &self.follower {
+            follower.batches.store(&mut history);
+        }
+        history
+    }
+
+    /// Moves on the memory of those prisms of a linear exterior that are evaluated one by one: they are few.
+    fn bring_up_others(&mut self, dt: f64, lag: f64) {
+        let Some(shop) = self
+            .shop
+            .as_ref()
+            .filter(|_| self.model.has_memory && lag > 0.0)
+        else {
+            return;
+        };
+        let batches = &shop.follower.batches;
+        self.memory.begin_materials(&self.model, lag);
+        batches.commit_others(&self.model, &self.memory, &mut self.state);
+        self.memory.begin_materials(&self.model, dt);
+        batches.begin_others(&self.model, &mut self.memory, &self.state);
     }
 
     /// How far from a point of the skin at rest vertices press, m.
@@ -1018,10 +1096,23 @@ impl Live {
         }
         self.plan = done.plan;
         self.retired = Some(std::mem::replace(&mut self.outside, outside));
-        if let Some((inside, follower)) = done.inside {
+        if let Some((mut inside, mut follower)) = done.inside {
+            if self.model.has_memory {
+                // What has been remembered since the job was given out.
+                let history = self.history();
+                inside.batches.load(&history);
+                inside
+                    .batches
+                    .begin(&self.model, &mut self.memory, &self.state);
+                if let Some(follower) = &mut follower {
+                    follower.batches.load(&history);
+                    follower
+                        .batches
+                        .begin(&self.model, &mut self.memory, &self.state);
+                }
+            }
             self.inside = inside;
             self.follower = follower;
-            self.inside.batches.refresh(&self.model, &self.memory);
             self.keep_good();
         }
         self.is_fresh = false;

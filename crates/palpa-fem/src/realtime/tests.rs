@@ -1,6 +1,6 @@
 //! The kernel against the element.
 
-use super::batch::Batches;
+use super::batch::{Batches, History};
 use super::column_pattern;
 use crate::assembly::assemble;
 use crate::columns::SurfaceGroup;
@@ -86,29 +86,24 @@ fn cases() -> Vec<(&'static str, Materials)> {
     ]
 }
 
-/// A body that has been deformed, twice if it remembers.
-fn deformed(model: &Model, memory: &mut Memory, size: f64) -> Vec<Vec3> {
-    let mut state = State::new(model);
+/// Two deformations of a body.
+fn deformations(model: &Model, size: f64) -> [Vec<Vec3>; 2] {
     let mut noise = Noise(11);
     let stretch = Mat3::new(0.05, 0.1, -0.04, 0.02, 0.06, 0.1, -0.1, 0.03, -0.2);
-    let mut shake = || -> Vec<Vec3> {
-        let noise = &mut noise;
-        model
-            .body
-            .positions
-            .iter()
-            .map(|x| stretch * x + Vec3::from_fn(|_, _| size * noise.next()))
-            .collect()
-    };
-    state.displacements = shake();
-    memory.begin(model, &state, 0.05);
-    memory.commit(model, &mut state);
-    memory.begin(model, &state, 0.01);
-    shake()
+    [0.6, 1.0].map(|share| {
+        let shake = |x: &Vec3, noise: &mut Noise| {
+            stretch * x * share + Vec3::from_fn(|_, _| size * noise.next())
+        };
+        let positions = model.body.positions.iter();
+        positions.map(|x| shake(x, &mut noise)).collect()
+    })
 }
 
+/// The duration of the first deformation, and of the second.
+const STEPS: [f64; 2] = [0.05, 0.01];
+
 #[test]
-fn forces_and_stiffness_are_the_elements() {
+fn forces_and_stiffness_are_the_elements_with_their_past() {
     let body = body();
     for (name, materials) in cases() {
         for is_fixed in [true, false] {
@@ -119,7 +114,12 @@ fn forces_and_stiffness_are_the_elements() {
             };
             let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
             let mut memory = Memory::new(&model);
-            let u = deformed(&model, &mut memory, 3e-4);
+            let mut state = State::new(&model);
+            let [first, u] = deformations(&model, 3e-4);
+            state.displacements = first;
+            memory.begin(&model, &state, STEPS[0]);
+            memory.commit(&model, &mut state);
+            memory.begin(&model, &state, STEPS[1]);
             let n = model.n_nodes();
             let mut expected = vec![Vec3::zeros(); n];
             let mut expected_blocks = vec![Mat3::zeros(); model.structure.n_blocks()];
@@ -137,15 +137,26 @@ fn forces_and_stiffness_are_the_elements() {
             // Made of two parts, as zone and exterior are.
             let mut forces = vec![Vec3::zeros(); n];
             let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+            let mut history = History::new(&model);
+            let mut own = Memory::new(&model);
+            let mut fresh = State::new(&model);
+            fresh.displacements.clone_from(&state.displacements);
+            let mut all = Batches::new(&model, &own, &pattern, &|_| true, false);
+            own.begin_materials(&model, STEPS[0]);
+            all.begin(&model, &mut own, &fresh);
+            all.commit(&model, &own, &mut fresh);
+            if model.has_memory {
+                all.store(&mut history);
+            }
+            own.begin_materials(&model, STEPS[1]);
             for is_first in [true, false] {
                 let keep = |group: &SurfaceGroup| group.triangles[0].is_multiple_of(3) == is_first;
-                let mut batches = Batches::new(&model, &memory, &pattern, &keep, true);
-                batches.refresh(&model, &memory);
+                let mut batches = Batches::new(&model, &own, &pattern, &keep, true);
+                batches.load(&history);
+                batches.begin(&model, &mut own, &fresh);
+                batches.add_forces(&model, &own, &u, &mut forces).unwrap();
                 batches
-                    .add_forces(&model, &memory, &u, &mut forces)
-                    .unwrap();
-                batches
-                    .add_stiffness(&model, &memory, &u, &mut blocks)
+                    .add_stiffness(&model, &own, &u, &mut blocks)
                     .unwrap();
             }
             for (force, expected) in forces.iter().zip(&expected) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use palpa_fem::law::NeoHookean;
+use palpa_fem::law::{Moduli, NeoHookean, Prony, PronyTerm};
 use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LocalModel, StepOutcome};
 use palpa_fem::shape::{Pose, Sphere, Tool};
 use palpa_fem::{
@@ -14,6 +14,10 @@ use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
 
 /// Skin, fat and muscle, 60 mm square; its supports hold the base and, if asked, two sides.
 fn model(n: usize, with_sides: bool) -> Arc<Model> {
+    model_of(n, with_sides, None)
+}
+
+fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
     let levels = LevelStack {
         depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
         interval_layer: vec![0, 1, 1, 2],
@@ -25,7 +29,13 @@ fn model(n: usize, with_sides: bool) -> Arc<Model> {
     };
     let place = |u: f64, v: f64| Vec3::new(0.06 * u - 0.03, 0.06 * v - 0.03, 0.0);
     let body = mapped_grid(&grid, place, &levels);
-    let material = |young| Material::new("t", NeoHookean::from_young(young, 0.45).unwrap());
+    let material = |young| {
+        let law = NeoHookean::from_young(young, 0.45).unwrap();
+        Material {
+            prony: prony.cloned(),
+            ..Material::new("t", law)
+        }
+    };
     let materials = Materials::of_layers(vec![material(100e3), material(5e3), material(30e3)]);
     let mut supports = Supports::on_base(&body);
     if with_sides {
@@ -194,6 +204,69 @@ fn a_stroke_goes_from_zone_to_zone() {
                 assert!(force.x < -0.2 * force.z, "{force}");
             }
         }
+    }
+}
+
+#[test]
+fn tissue_relaxes_under_a_tool_that_moves_and_holds() {
+    const DT: f64 = 0.005;
+    let terms = vec![
+        PronyTerm { g: 0.4, tau: 0.03 },
+        PronyTerm { g: 0.2, tau: 0.3 },
+    ];
+    let prony = Prony::new(terms, Moduli::Instantaneous, true).unwrap();
+    let model = model_of(13, false, Some(&prony));
+    let tool = sphere(0.0);
+    // Down in 0.1 s, 15 mm along in 0.2 s, and still for 0.2 s.
+    let path: Vec<_> = (0..=100_u32)
+        .map(|k| {
+            let (down, along) = (
+                f64::from(k.min(20)) / 20.0,
+                f64::from(k.clamp(20, 60) - 20) / 40.0,
+            );
+            at(tool, -7e-3 + 15e-3 * along, 0.0, 3e-3 * down)
+        })
+        .collect();
+    let mut state = State::new(&model);
+    let mut ws = Workspace::new(&model);
+    let mut expected = Vec::new();
+    for pair in path.windows(2) {
+        let [before, load] = [&pair[0], &pair[1]].map(|tools| Load {
+            tools,
+            duration: DT,
+            ..Load::default()
+        });
+        let report = advance(
+            &model,
+            &mut state,
+            &mut ws,
+            &before,
+            &load,
+            &SolveParams::default(),
+        );
+        assert_eq!(report.outcome, Outcome::Converged, "{report:?} {:?}", pair[1][0].pose);
+        expected.push(report.tool_forces[0].z);
+    }
+    assert!(
+        expected[99] < 0.8 * expected[60],
+        "{} {}",
+        expected[60],
+        expected[99]
+    );
+    for (mode, bound) in MODES.into_iter().zip([0.01, 0.02, 0.05]) {
+        let mut live = Live::new(Arc::clone(&model), &path[0], params(mode)).unwrap();
+        let mut worst = 0.0_f64;
+        for (k, tools) in path[1..].iter().enumerate() {
+            live.step(tools, DT);
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+            if k >= 15 {
+                let error = live.tool_force(0).z / expected[k] - 1.0;
+                worst = worst.max(error.abs());
+            }
+        }
+        assert!(worst < bound, "{mode:?}: {worst}");
     }
 }
 
