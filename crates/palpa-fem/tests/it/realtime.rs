@@ -244,7 +244,12 @@ fn tissue_relaxes_under_a_tool_that_moves_and_holds() {
             &load,
             &SolveParams::default(),
         );
-        assert_eq!(report.outcome, Outcome::Converged, "{report:?} {:?}", pair[1][0].pose);
+        assert_eq!(
+            report.outcome,
+            Outcome::Converged,
+            "{report:?} {:?}",
+            pair[1][0].pose
+        );
         expected.push(report.tool_forces[0].z);
     }
     assert!(
