@@ -453,8 +453,10 @@ impl Live {
     /// The local model at the tools' present place, with at most `most` contacts; beyond that, neighbours that press are put
     /// together.
     pub fn local_model(&mut self, most: usize, out: &mut LocalModel) {
+        let skin = &self.model.body.skin.points;
+        let (tools, has_friction) = (&self.tools, self.has_friction);
         self.problem
-            .local_model(&self.tools, self.has_friction, most, out);
+            .local_model(tools, skin, has_friction, most, out);
     }
 
     /// Follows the tools, as many as it was made with, to where they are now. `dt` is the time since the last step, s.

@@ -15,7 +15,7 @@ use crate::shape::Pose;
 /// A skin vertex under or near a tool, or two that press side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalContact {
-    /// Skin vertex; of two the one that presses more.
+    /// Skin vertex; of two a number of their own, the same in every step and no vertex's.
     pub vertex: u32,
     /// Which tool.
     pub tool: usize,
@@ -77,6 +77,7 @@ impl ContactProblem {
     pub(super) fn local_model(
         &mut self,
         tools: &[PosedTool],
+        skin: &[Vec3],
         has_friction: bool,
         most: usize,
         out: &mut LocalModel,
@@ -85,7 +86,7 @@ impl ContactProblem {
             members: [0; 2],
             shares: [1.0, 0.0],
         }; MOST_CANDIDATES];
-        let n = self.clusters(most, &mut clusters);
+        let n = self.clusters(skin, most, &mut clusters);
         let clusters = &clusters[..n];
         out.contacts.clear();
         out.contacts.extend(clusters.iter().map(|cluster| {
@@ -101,13 +102,27 @@ impl ContactProblem {
             let PosedTool { tool, pose } = &tools[members[0].tool as usize];
             let local = pose.inverse_transform_point(&position.into()).coords;
             let distance = tool.shape().distance(&local);
+            // The middle between two points of a curved tool is inside it, but they both touch.
+            let (surface, normal) = if share[1] > 0.0 {
+                let mean = members[0].normal * share[0] + members[1].normal * share[1];
+                (
+                    local,
+                    pose.rotation.inverse_transform_vector(&mean.normalize()),
+                )
+            } else {
+                (local - distance.normal * distance.distance, distance.normal)
+            };
             LocalContact {
-                vertex: members[0].vertex,
+                vertex: if share[1] > 0.0 {
+                    number_of_pair(members[0].vertex, members[1].vertex)
+                } else {
+                    members[0].vertex
+                },
                 tool: members[0].tool as usize,
                 position,
                 force,
-                surface: local - distance.normal * distance.distance,
-                normal: distance.normal,
+                surface,
+                normal,
                 curvature: distance.curvature,
                 anchor,
             }
@@ -154,7 +169,7 @@ impl ContactProblem {
     }
 
     /// Puts neighbours that press together until there are few enough, and leaves out the farthest of the others.
-    fn clusters(&self, most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
+    fn clusters(&self, skin: &[Vec3], most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
         let n = self.candidates.len();
         let mut partner = [usize::MAX; MOST_CANDIDATES];
         let pressing = |i: usize| self.candidates[i].pressure > 0.0;
@@ -167,7 +182,9 @@ impl ContactProblem {
             for i in (0..n).filter(|&i| pressing(i) && partner[i] == usize::MAX) {
                 for j in (i + 1..n).filter(|&j| pressing(j) && partner[j] == usize::MAX) {
                     let (a, b) = (&self.candidates[i], &self.candidates[j]);
-                    let distance = (a.start - b.start).norm_squared();
+                    // At rest, so that the same are together in every step.
+                    let points = [a, b].map(|c| skin[c.vertex as usize]);
+                    let distance = (points[0] - points[1]).norm_squared();
                     if a.tool == b.tool && distance < best.0 {
                         best = (distance, i, j);
                     }
@@ -259,6 +276,12 @@ impl ContactProblem {
         }
         stiffness
     }
+}
+
+/// A number for two vertices that is none of a vertex.
+fn number_of_pair(a: u32, b: u32) -> u32 {
+    let (a, b) = (a.min(b), a.max(b));
+    a.wrapping_mul(0x9e37_79b1).wrapping_add(b) | 1 << 31
 }
 
 /// Where a candidate is at the end of the iteration.
