@@ -98,7 +98,10 @@ pub enum ExteriorMode {
 pub enum StepOutcome {
     /// The tools are where they were asked to be.
     Arrived,
-    /// Part of the way only: it was too far for a step, or tissue would have been turned inside out.
+    /// On the way there: it was too far for one step. The local model is that of the place reached.
+    Behind,
+    /// Part of the way only, because tissue would have been turned inside out: the next steps go on from here, and the local
+    /// model is none to be felt.
     BackedOff,
     /// Nowhere; the state is the last good one, and the tools are followed more slowly from there.
     Failed,
@@ -475,7 +478,7 @@ impl Live {
         }
         let mut report = LiveReport {
             outcome: if is_short {
-                StepOutcome::BackedOff
+                StepOutcome::Behind
             } else {
                 StepOutcome::Arrived
             },

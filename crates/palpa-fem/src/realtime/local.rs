@@ -174,8 +174,8 @@ impl ContactProblem {
         let mut partner = [usize::MAX; MOST_CANDIDATES];
         let pressing = |i: usize| self.candidates[i].pressure > 0.0;
         let n_idle = (0..n).filter(|&i| !pressing(i)).count();
-        // Of what is only near, a third of the room is enough.
-        let n_kept_idle = n_idle.min((most / 3).max(most.saturating_sub(n - n_idle)));
+        // Of what is only near, a few that are nearest are enough.
+        let n_kept_idle = n_idle.min((most / 6).max(most.saturating_sub(n - n_idle)));
         let mut n_over = (n - n_idle + n_kept_idle).saturating_sub(most);
         while n_over > 0 {
             let mut best = (f64::INFINITY, 0, 0);
