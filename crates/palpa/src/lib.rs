@@ -6,6 +6,7 @@
 // `println!` panics when the reader has gone, as in `palpa check … | head`: print through `cli::Context`.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod bench;
 pub mod build;
 pub mod cli;
 pub mod commands;

@@ -6,6 +6,7 @@
 
 use clap::Subcommand;
 
+pub mod bench;
 pub mod check;
 pub mod export;
 pub mod press;
@@ -30,6 +31,7 @@ pub enum Outcome {
 #[derive(Debug, Subcommand)]
 #[expect(missing_docs, reason = "a command's help text stands at its `Args`")]
 pub enum Command {
+    Bench(bench::Args),
     Check(check::Args),
     Export(export::Args),
     Press(press::Args),
@@ -42,6 +44,7 @@ impl Command {
     /// The word on the command line, which also names the default output folder.
     pub fn name(&self) -> &'static str {
         match self {
+            Self::Bench(_) => "bench",
             Self::Check(_) => "check",
             Self::Export(_) => "export",
             Self::Press(_) => "press",
@@ -57,6 +60,7 @@ impl Command {
     /// On bad input, and when a result cannot be written.
     pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
         match self {
+            Self::Bench(args) => bench::run(args, context),
             Self::Check(args) => check::run(args, context),
             Self::Export(args) => export::run(args, context),
             Self::Press(args) => press::run(args, context),

@@ -86,7 +86,11 @@ pub fn measure(
     })
 }
 
-fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f64, SpringError> {
+/// The median rate of a step of this shape with a solver, measured for about `budget`.
+///
+/// # Errors
+/// If the model cannot be built.
+pub fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f64, SpringError> {
     // A batch is much longer than reading the clock takes.
     const BATCH: Duration = Duration::from_micros(200);
     const LEAST_BATCHES: usize = 3;

@@ -1,0 +1,360 @@
+//! What is pressed.
+
+use std::sync::{Arc, LazyLock};
+
+use palpa_fem::law::{Law, Moduli, NeoHookean, Ogden, Prony, PronyTerm};
+use palpa_fem::{FemError, Material, Materials, Model, ModelParams, Supports};
+use palpa_mesh::generate::{
+    self, Diagonal, GradedBlock, GradedLayer, Grid, LevelStack, Outline, mapped_grid,
+};
+use palpa_mesh::growth::Thickness;
+use palpa_mesh::{GrowthParams, LayerSpec, LayeredBody, Vec3, grow};
+
+use super::refined::Problem;
+use super::ride::Ride;
+use super::row::Mode;
+
+/// Side and thickness of the blocks, m.
+const SIDE: f64 = 0.1;
+/// Thickness of skin, fat and muscle, m, and their Young's moduli, Pa.
+const LAYERS: [(f64, f64); 3] = [(2e-3, 100e3), (10e-3, 5e3), (28e-3, 30e3)];
+/// Young's modulus of the block of one tissue, Pa, and its thickness, m.
+const ONE_TISSUE: (f64, f64) = (30e3, 40e-3);
+/// Poisson's ratio of all tissues.
+const POISSON: f64 = 0.45;
+/// Exponent of the hardening tissue.
+const OGDEN_EXPONENT: f64 = 8.0;
+/// Shares and times (s) of the tissue that relaxes: half of it, at once and slowly.
+const RELAXING: [(f64, f64); 2] = [(0.3, 0.1), (0.2, 1.0)];
+
+/// Length, radius, and radius of the bone of the limb, m.
+const LIMB: [f64; 3] = [0.2, 0.04, 0.012];
+
+/// The tissue of all layers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tissue {
+    /// Neo-Hookean.
+    Elastic,
+    /// The same, relaxing.
+    Relaxing,
+    /// Hardening.
+    Ogden,
+}
+
+/// The shape and its mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// The layered block, of so many equal columns a side and an interval a layer.
+    Block {
+        /// Columns a side.
+        columns: usize,
+    },
+    /// The layered block, fine where it is pressed.
+    Graded(Grading),
+    /// A block of one tissue, fine where it is pressed.
+    OneTissue(Grading),
+    /// A limb about its bone, an interval a layer.
+    Limb {
+        /// Length of the skin's edges, m.
+        spacing: f64,
+        /// Intervals of each layer.
+        intervals: usize,
+    },
+}
+
+/// A mesh that is graded toward a tool in its middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grading {
+    /// Length of edges in the ring, m.
+    pub spacing: f64,
+    /// Its radius, m.
+    pub ring: f64,
+    /// By how much edges lengthen per metre beyond it.
+    pub growth: f64,
+    /// First height (m) and growth of each layer's levels; the first only, of one tissue.
+    pub levels: [(f64, f64); 3],
+    /// Where the middle is, m.
+    pub centre: [f64; 2],
+    /// Where the tool is from there, in spacings.
+    pub beside: [f64; 2],
+}
+
+/// One line of the table that is to be measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Run {
+    /// What a step makes anew.
+    pub mode: Mode,
+    /// Radius of the zone, m.
+    pub zone_radius: f64,
+    /// Indentation after which the exterior is made anew, m; as shipped if not given.
+    pub stale: Option<f64>,
+    /// Steps per second that are asked for.
+    pub target: Option<f64>,
+}
+
+/// A body, a tool on its way, and the modes to measure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// The body.
+    pub shape: Shape,
+    /// What it is made of.
+    pub tissue: Tissue,
+    /// Radius of the sphere, m.
+    pub radius: f64,
+    /// How deep it presses, m, and how far it strokes, m.
+    pub way: [f64; 2],
+    /// The same on a refined mesh.
+    pub problem: Problem,
+    /// Every which place is compared with the converged body.
+    pub every: usize,
+    /// The lines.
+    pub runs: Vec<Run>,
+    /// Whether it is small enough for a quick look.
+    pub is_quick: bool,
+}
+
+fn law(tissue: Tissue, young: f64) -> Law {
+    match tissue {
+        Tissue::Ogden => Ogden::from_young(young, POISSON, OGDEN_EXPONENT)
+            .expect("valid constants")
+            .into(),
+        _ => NeoHookean::from_young(young, POISSON).expect("valid constants").into(),
+    }
+}
+
+fn material(tissue: Tissue, young: f64) -> Material {
+    let mut material = Material::new(format!("{:.0} kPa", young / 1e3), law(tissue, young));
+    if tissue == Tissue::Relaxing {
+        let terms = RELAXING.map(|(g, tau)| PronyTerm { g, tau }).to_vec();
+        let prony = Prony::new(terms, Moduli::Instantaneous, true);
+        material.prony = Some(prony.expect("valid terms"));
+    }
+    material
+}
+
+impl Grading {
+    fn body(&self, layers: &[(f64, f64)]) -> LayeredBody {
+        let block = GradedBlock {
+            outline: Outline::Square,
+            half_width: 0.5 * SIDE,
+            centre: self.centre,
+            ring_radius: Some(self.ring),
+            spacing: self.spacing,
+            inner_growth: 0.0,
+            growth: self.growth,
+            jitter: None,
+        };
+        let graded: Vec<GradedLayer> = layers
+            .iter()
+            .zip(self.levels)
+            .map(|(layer, (first_height, growth))| GradedLayer {
+                thickness: layer.0,
+                first_height,
+                growth,
+            })
+            .collect();
+        generate::graded_block(&block, &LevelStack::graded(&graded))
+    }
+}
+
+impl Shape {
+    fn body(&self) -> LayeredBody {
+        match *self {
+            Self::Block { columns } => {
+                let levels = LevelStack {
+                    depths: vec![0.0, 2e-3, 12e-3, 40e-3],
+                    interval_layer: vec![0, 1, 2],
+                };
+                let grid = Grid {
+                    n_cells: [columns - 1; 2],
+                    diagonal: Diagonal::Alternate,
+                    jitter: None,
+                };
+                let at = |x: f64| SIDE * (x - 0.5);
+                mapped_grid(&grid, |u, v| Vec3::new(at(u), at(v), 0.0), &levels)
+            }
+            Self::Graded(grading) => grading.body(&LAYERS),
+            Self::OneTissue(grading) => grading.body(&[(ONE_TISSUE.1, ONE_TISSUE.0)]),
+            Self::Limb { spacing, intervals } => {
+                let [length, radius, bone_radius] = LIMB;
+                let (skin, bone) = generate::cylinder(length, radius, bone_radius, spacing);
+                let names = ["skin", "fat", "muscle"];
+                let layers = (names.iter().zip(LAYERS).enumerate())
+                    .map(|(i, (name, layer))| LayerSpec {
+                        name: (*name).to_owned(),
+                        thickness: (i < 2).then_some(Thickness::Constant(layer.0)),
+                        n_levels: intervals,
+                        min_thickness: 0.2e-3,
+                    })
+                    .collect();
+                let params = GrowthParams {
+                    layers,
+                    cut_out: None,
+                };
+                grow(&skin, &[bone], &params)
+                    .expect("a limb made by formula can be grown")
+                    .body
+            }
+        }
+    }
+
+    /// Length of edges under the tool, m.
+    pub fn h_contact(&self) -> f64 {
+        match *self {
+            Self::Block { columns } => SIDE / (columns - 1) as f64,
+            Self::Graded(grading) | Self::OneTissue(grading) => grading.spacing,
+            Self::Limb { spacing, .. } => spacing,
+        }
+    }
+}
+
+impl Case {
+    /// The body with its materials, on its bone.
+    ///
+    /// # Errors
+    /// When it cannot be computed with.
+    pub fn model(&self) -> Result<Arc<Model>, FemError> {
+        self.model_of(&self.shape)
+    }
+
+    /// The same of another mesh.
+    ///
+    /// # Errors
+    /// When it cannot be computed with.
+    pub fn model_of(&self, shape: &Shape) -> Result<Arc<Model>, FemError> {
+        let body = shape.body();
+        let youngs: Vec<f64> = match shape {
+            Shape::OneTissue(_) => vec![ONE_TISSUE.0],
+            _ => LAYERS.map(|l| l.1).to_vec(),
+        };
+        let materials = youngs.into_iter().map(|young| material(self.tissue, young)).collect();
+        let model = Model::build(
+            &body,
+            &Materials::of_layers(materials),
+            &Supports::on_base(&body),
+            ModelParams::default(),
+        )?;
+        Ok(Arc::new(model))
+    }
+
+    /// The way of the tool.
+    pub fn ride(&self) -> Ride {
+        let at = match self.shape {
+            Shape::Block { .. } => Vec3::new(-0.5 * self.way[1], 0.0, 0.0),
+            Shape::Graded(grading) | Shape::OneTissue(grading) => {
+                let [x, y] = [0, 1].map(|i| grading.centre[i] + grading.beside[i] * grading.spacing);
+                Vec3::new(x, y, 0.0)
+            }
+            Shape::Limb { .. } => Vec3::new(0.5 * (LIMB[0] - self.way[1]), 0.0, LIMB[1]),
+        };
+        Ride {
+            at,
+            radius: self.radius,
+            depth: self.way[0],
+            stroke: self.way[1],
+        }
+    }
+}
+
+/// Radii of spheres, m.
+const LARGE: f64 = 10e-3;
+const SMALL: f64 = 5e-3;
+
+fn run(mode: Mode, zone_radius: f64, target: Option<f64>) -> Run {
+    Run {
+        mode,
+        zone_radius,
+        stale: None,
+        target,
+    }
+}
+
+/// A block of equal columns under modes with their targets.
+fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> Case {
+    Case {
+        name,
+        shape: Shape::Block { columns },
+        tissue: Tissue::Elastic,
+        radius: LARGE,
+        way: [5e-3, 20e-3],
+        problem: Problem::Layers,
+        every: 1,
+        runs,
+        is_quick: false,
+    }
+}
+
+static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
+    use Mode::{Full, Whole, Zone};
+    let usual = 15e-3;
+    vec![
+        Case {
+            is_quick: true,
+            ..block("324", 9, vec![run(Full, usual, None), run(Zone, usual, None)])
+        },
+        block(
+            "1k",
+            16,
+            vec![
+                run(Full, usual, None),
+                run(Whole, usual, Some(1000.0)),
+                run(Zone, usual, None),
+            ],
+        ),
+        block(
+            "4k",
+            32,
+            vec![
+                run(Full, usual, None),
+                run(Whole, usual, Some(250.0)),
+                run(Zone, usual, Some(500.0)),
+            ],
+        ),
+        Case {
+            every: 3,
+            ..block(
+                "16k",
+                64,
+                vec![
+                    run(Full, usual, None),
+                    run(Whole, usual, Some(40.0)),
+                    run(Zone, usual, Some(130.0)),
+                ],
+            )
+        },
+        Case {
+            every: 8,
+            radius: SMALL,
+            problem: Problem::LayersSmall,
+            ..block(
+                "64k",
+                128,
+                vec![run(Whole, 10e-3, Some(10.0)), run(Zone, 10e-3, Some(60.0))],
+            )
+        },
+        Case {
+            tissue: Tissue::Relaxing,
+            ..block("4k-prony", 32, vec![run(Zone, usual, None)])
+        },
+        Case {
+            tissue: Tissue::Ogden,
+            problem: Problem::Ogden,
+            ..block("4k-ogden", 32, vec![run(Zone, usual, None)])
+        },
+        Case {
+            shape: Shape::Limb {
+                spacing: 7.3e-3,
+                intervals: 1,
+            },
+            problem: Problem::Limb,
+            ..block("limb", 0, vec![run(Whole, usual, None), run(Zone, usual, None)])
+        },
+    ]
+});
+
+/// All cases, in the order of the table.
+pub fn cases() -> &'static [Case] {
+    &CASES
+}

@@ -1,0 +1,308 @@
+//! The way of a tool, and the moving step on it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use cpu_time::ThreadTime;
+use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LiveReport, Rebuilt, StepOutcome};
+use palpa_fem::shape::{Pose, Sphere, Tool};
+use palpa_fem::{FemError, Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
+use palpa_mesh::Vec3;
+
+/// How fast a tool goes where the steps allow it, m/s.
+const FASTEST: f64 = 0.05;
+/// It goes slower than that rather than further than this in a step, m.
+const LONGEST_TRAVEL: f64 = 0.25e-3;
+/// Steps between two millimetres of the way at most: more would only take longer.
+const MOST_STEPS_PER_MM: usize = 60;
+/// How far above the skin the tool starts and ends, m.
+const ABOVE: f64 = 1e-3;
+/// Depth from which on forces are compared, m.
+pub const JUDGED_FROM: f64 = 2e-3;
+/// Distance of the places where they are compared, m; the ways are multiples of it.
+const JUDGED_EVERY: f64 = 1e-3;
+
+/// The way of a sphere: from above the skin straight down, sideways, and up. In whole millimetres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ride {
+    /// Point of the skin that it is pressed on, m.
+    pub at: Vec3,
+    /// Radius of the sphere, m.
+    pub radius: f64,
+    /// How deep it is pressed along −z, m.
+    pub depth: f64,
+    /// How far it strokes along x, m.
+    pub stroke: f64,
+}
+
+impl Ride {
+    /// Its length, m.
+    pub fn length(&self) -> f64 {
+        2.0 * (self.depth + ABOVE) + self.stroke
+    }
+
+    /// Depth (m) and place of the tool after a length of the way (m).
+    fn at_length(&self, s: f64) -> (f64, PosedTool) {
+        let down = self.depth + ABOVE;
+        let (x, depth) = if s <= down {
+            (0.0, s - ABOVE)
+        } else if s <= down + self.stroke {
+            (s - down, self.depth)
+        } else {
+            (self.stroke, self.depth - (s - down - self.stroke))
+        };
+        let tip = self.at + Vec3::new(x, 0.0, -depth);
+        let sphere = Sphere::new(self.radius).expect("a valid radius");
+        let tool = PosedTool {
+            tool: Tool::new(sphere, 0.0).expect("no friction is valid"),
+            pose: Pose::translation(tip.x, tip.y, tip.z),
+        };
+        (depth, tool)
+    }
+
+    /// The places where forces are compared: lengths of the way, m.
+    pub fn judged(&self) -> Vec<f64> {
+        let n = (self.length() / JUDGED_EVERY).round() as usize;
+        let lengths = (0..=n).map(|i| i as f64 * JUDGED_EVERY);
+        lengths.filter(|&s| self.at_length(s).0 >= JUDGED_FROM - 1e-9).collect()
+    }
+}
+
+/// A force that is known to be right on its mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Where on the way, m.
+    pub at: f64,
+    /// Depth of the tool, m.
+    pub depth: f64,
+    /// Whether the tool has not yet gone sideways.
+    pub is_press: bool,
+    /// Force of the tissue on the tool, N.
+    pub force: Vec3,
+}
+
+/// Forces of the converged body, from step to step at the speed of the tool, at every `every`th place of
+/// [`Ride::judged`] and where it is deepest first. `speed` matters where tissue remembers, m/s.
+///
+/// # Errors
+/// The place (m along the way) and how the step ended, where one did not converge.
+pub fn converged(
+    model: &Model,
+    ride: &Ride,
+    speed: f64,
+    every: usize,
+) -> Result<Vec<Known>, (f64, Outcome)> {
+    let (mut state, mut ws) = (State::new(model), Workspace::new(model));
+    let (mut before, mut s_before): (Vec<PosedTool>, f64) = (Vec::new(), ABOVE);
+    let deepest = ride.depth + ABOVE;
+    let mut known = Vec::new();
+    let places = ride.judged();
+    for (i, &s) in places.iter().enumerate() {
+        let is_deepest = (s - deepest).abs() < 1e-9;
+        if !(i.is_multiple_of(every) || is_deepest) {
+            continue;
+        }
+        let (depth, tool) = ride.at_length(s);
+        let tools = vec![tool];
+        let load = Load {
+            tools: &tools,
+            duration: (s - s_before) / speed,
+            ..Load::default()
+        };
+        let last = Load {
+            tools: &before,
+            ..Load::default()
+        };
+        let params = SolveParams::default();
+        let report = advance(model, &mut state, &mut ws, &last, &load, &params);
+        if report.outcome != Outcome::Converged {
+            return Err((s, report.outcome));
+        }
+        known.push(Known {
+            at: s,
+            depth,
+            is_press: s <= deepest + 1e-9,
+            force: report.tool_forces[0],
+        });
+        before = tools;
+        s_before = s;
+    }
+    Ok(known)
+}
+
+/// What a ride has shown.
+#[derive(Debug)]
+pub struct Ridden {
+    /// Times of the steps in contact, s, ascending.
+    pub times: Vec<f64>,
+    /// All steps.
+    pub n_steps: usize,
+    /// CPU time of the background's work, and of the steps, s.
+    pub cpu: [f64; 2],
+    /// Time between steps, s, and how far the tool went in it, m.
+    pub dt: f64,
+    /// See `dt`.
+    pub travel: f64,
+    /// Lengths of the way (m) and forces (N) after every step.
+    pub forces: Vec<(f64, Vec3)>,
+    /// As in the table.
+    pub n_zone_switches: usize,
+    /// As in the table.
+    pub n_factors: usize,
+    /// As in the table.
+    pub n_active_changes: usize,
+    /// Most vertices that pressed at once, and most candidates.
+    pub most: [usize; 2],
+    /// Newton iterations of all steps.
+    pub n_iterations: usize,
+    /// Steps that went part of the way, and that failed.
+    pub n_bad: [usize; 2],
+    /// Columns of the last zone.
+    pub zone_columns: usize,
+}
+
+impl Ridden {
+    /// The median time of a step in contact, s; of all steps if none was.
+    pub fn median(&self) -> f64 {
+        self.quantile(0.5)
+    }
+
+    /// A quantile of the times of the steps in contact, s.
+    pub fn quantile(&self, q: f64) -> f64 {
+        let last = self.times.len().saturating_sub(1);
+        let at = (q * last as f64).round() as usize;
+        self.times.get(at).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Largest error against known forces, as a share of them.
+    pub fn error(&self, known: &[Known]) -> f64 {
+        let errors = known.iter().filter_map(|k| {
+            let found = self.forces.iter().find(|f| (f.0 - k.at).abs() < 1e-9)?;
+            Some((found.1 - k.force).norm() / k.force.norm())
+        });
+        errors.fold(0.0, f64::max)
+    }
+}
+
+/// Work of the background that is under way.
+struct Under {
+    result: Rebuilt,
+    /// The step before which it is done.
+    due: usize,
+}
+
+/// Rides at the step's own rate, which a short ride finds first. Background work is run at once and taken over as many
+/// steps later as its CPU time is long: as from a second thread, but the same from run to run but for the time.
+///
+/// # Errors
+/// When the body cannot be at rest or is too large.
+pub fn ride(model: &Arc<Model>, ride: &Ride, params: LiveParams) -> Result<Ridden, FemError> {
+    /// As long as finds the median to a few per cent.
+    const PILOT: f64 = 4e-3;
+    let pilot = run(model, ride, params, LONGEST_TRAVEL, None, ABOVE + PILOT)?;
+    let rate = 1.0 / pilot.median();
+    let per_mm = (1e-3 * rate / FASTEST).ceil() as usize;
+    let least = (1e-3 / LONGEST_TRAVEL).ceil() as usize;
+    let travel = 1e-3 / per_mm.clamp(least, MOST_STEPS_PER_MM) as f64;
+    let dt = (travel / FASTEST).max(1.0 / rate);
+    run(model, ride, params, travel, Some(dt), ride.length())
+}
+
+fn run(
+    model: &Arc<Model>,
+    ride: &Ride,
+    params: LiveParams,
+    travel: f64,
+    dt: Option<f64>,
+    length: f64,
+) -> Result<Ridden, FemError> {
+    // Without a rate of its own, a step is as long as at the usual speed.
+    let dt = dt.unwrap_or(travel / FASTEST);
+    let mut live = Live::new(Arc::clone(model), &[ride.at_length(0.0).1], params)?;
+    let n_steps = (length / travel).round() as usize;
+    let mut ridden = Ridden {
+        times: Vec::with_capacity(n_steps),
+        n_steps,
+        cpu: [0.0; 2],
+        dt,
+        travel,
+        forces: Vec::with_capacity(n_steps),
+        n_zone_switches: 0,
+        n_factors: 0,
+        n_active_changes: 0,
+        most: [0; 2],
+        n_iterations: 0,
+        n_bad: [0; 2],
+        zone_columns: 0,
+    };
+    let mut under: Option<Under> = None;
+    let mut last: Option<LiveReport> = None;
+    for step in 1..=n_steps {
+        if let Some(done) = under.take_if(|under| under.due <= step) {
+            live.install(done.result);
+        }
+        let s = step as f64 * travel;
+        let tools = [ride.at_length(s).1];
+        let clock = ThreadTime::now();
+        let report = live.step(&tools, dt);
+        let time = clock.elapsed();
+        if let Some(job) = live.take_job() {
+            let clock = ThreadTime::now();
+            let result = job.run();
+            let late = clock.elapsed();
+            ridden.cpu[0] += late.as_secs_f64();
+            let due = step + 1 + (late.as_secs_f64() / dt) as usize;
+            under = Some(Under { result, due });
+        }
+        ridden.note(&report, last.as_ref(), time);
+        ridden.forces.push((s, live.tool_force(0)));
+        last = Some(report);
+    }
+    ridden.zone_columns = live.n_columns()[0];
+    ridden.times.sort_by(f64::total_cmp);
+    Ok(ridden)
+}
+
+impl Ridden {
+    fn note(&mut self, report: &LiveReport, last: Option<&LiveReport>, time: Duration) {
+        let time = time.as_secs_f64();
+        self.cpu[1] += time;
+        if report.n_active > 0 {
+            self.times.push(time);
+        }
+        self.n_iterations += report.iterations;
+        self.most[0] = self.most[0].max(report.n_active);
+        self.most[1] = self.most[1].max(report.n_candidates);
+        match report.outcome {
+            StepOutcome::Arrived => {}
+            StepOutcome::BackedOff => self.n_bad[0] += 1,
+            StepOutcome::Failed => self.n_bad[1] += 1,
+        }
+        if let Some(last) = last {
+            self.n_zone_switches += usize::from(last.zone != report.zone);
+            self.n_factors += usize::from(last.factor != report.factor);
+            self.n_active_changes += usize::from(last.n_active != report.n_active);
+        }
+    }
+}
+
+/// The parameters of a mode.
+pub fn params(mode: super::Mode, zone_radius: f64) -> LiveParams {
+    let shipped = LiveParams::default();
+    match mode {
+        super::Mode::Full => LiveParams {
+            zone_radius: f64::INFINITY,
+            ..shipped
+        },
+        super::Mode::Whole => LiveParams {
+            zone_radius,
+            exterior: ExteriorMode::Followed,
+            ..shipped
+        },
+        super::Mode::Zone => LiveParams {
+            zone_radius,
+            exterior: ExteriorMode::Linear,
+            ..shipped
+        },
+    }
+}
