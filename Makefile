@@ -3,7 +3,7 @@
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation, without a warning
-# make bench      the thesis's table, measured here
+# make bench      the thesis's table and the moving step, measured here
 
 SHARED  ?= ../shared
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
@@ -53,3 +53,4 @@ docs:
 
 bench:
 	cargo run --release --package palpa -- reproduce
+	cargo run --release --package palpa -- bench

@@ -120,7 +120,9 @@ fn law(tissue: Tissue, young: f64) -> Law {
         Tissue::Ogden => Ogden::from_young(young, POISSON, OGDEN_EXPONENT)
             .expect("valid constants")
             .into(),
-        _ => NeoHookean::from_young(young, POISSON).expect("valid constants").into(),
+        _ => NeoHookean::from_young(young, POISSON)
+            .expect("valid constants")
+            .into(),
     }
 }
 
@@ -229,7 +231,10 @@ impl Case {
             Shape::OneTissue(_) => vec![ONE_TISSUE.0],
             _ => LAYERS.map(|l| l.1).to_vec(),
         };
-        let materials = youngs.into_iter().map(|young| material(self.tissue, young)).collect();
+        let materials = youngs
+            .into_iter()
+            .map(|young| material(self.tissue, young))
+            .collect();
         let model = Model::build(
             &body,
             &Materials::of_layers(materials),
@@ -244,7 +249,8 @@ impl Case {
         let at = match self.shape {
             Shape::Block { .. } => Vec3::new(-0.5 * self.way[1], 0.0, 0.0),
             Shape::Graded(grading) | Shape::OneTissue(grading) => {
-                let [x, y] = [0, 1].map(|i| grading.centre[i] + grading.beside[i] * grading.spacing);
+                let [x, y] =
+                    [0, 1].map(|i| grading.centre[i] + grading.beside[i] * grading.spacing);
                 Vec3::new(x, y, 0.0)
             }
             Shape::Limb { .. } => Vec3::new(0.5 * (LIMB[0] - self.way[1]), 0.0, LIMB[1]),
@@ -286,13 +292,58 @@ fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> Case {
     }
 }
 
+/// What a mesh that is graded toward the tool is measured with, pressed straight down.
+fn graded(name: &'static str, shape: Shape, problem: Problem, depth: f64) -> Case {
+    let runs = vec![
+        run(Mode::Full, 15e-3, None),
+        run(Mode::Zone, 12e-3, None),
+        run(Mode::Zone, 8e-3, Some(500.0)),
+    ];
+    Case {
+        shape,
+        way: [depth, 0.0],
+        problem,
+        ..block(name, 0, runs)
+    }
+}
+
+/// Beside a vertex: over one, forces are a little too good.
+fn grading(spacing: f64, levels: [(f64, f64); 3]) -> Grading {
+    Grading {
+        spacing,
+        ring: 4e-3,
+        growth: 0.5,
+        levels,
+        centre: [0.0; 2],
+        beside: [0.5, 0.3],
+    }
+}
+
+fn one_tissue(name: &'static str, spacing: f64, levels: (f64, f64)) -> Case {
+    let shape = Shape::OneTissue(grading(spacing, [levels; 3]));
+    graded(name, shape, Problem::OneTissue, 6e-3)
+}
+
+fn layers(name: &'static str, spacing: f64, levels: [(f64, f64); 3]) -> Case {
+    graded(
+        name,
+        Shape::Graded(grading(spacing, levels)),
+        Problem::Layers,
+        5e-3,
+    )
+}
+
 static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     use Mode::{Full, Whole, Zone};
     let usual = 15e-3;
     vec![
         Case {
             is_quick: true,
-            ..block("324", 9, vec![run(Full, usual, None), run(Zone, usual, None)])
+            ..block(
+                "324",
+                9,
+                vec![run(Full, usual, None), run(Zone, usual, None)],
+            )
         },
         block(
             "1k",
@@ -349,8 +400,20 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
                 intervals: 1,
             },
             problem: Problem::Limb,
-            ..block("limb", 0, vec![run(Whole, usual, None), run(Zone, usual, None)])
+            ..block(
+                "limb",
+                0,
+                vec![run(Whole, usual, None), run(Zone, usual, None)],
+            )
         },
+        one_tissue("sphere", 2e-3, (2.5e-3, 1.0)),
+        one_tissue("sphere-fine", 1.25e-3, (1.5e-3, 0.5)),
+        layers("layers", 2e-3, [(2e-3, 0.0), (3e-3, 1.0), (8e-3, 1.0)]),
+        layers(
+            "layers-fine",
+            1.6e-3,
+            [(1e-3, 0.0), (2e-3, 0.5), (6e-3, 0.6)],
+        ),
     ]
 });
 

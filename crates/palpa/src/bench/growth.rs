@@ -30,7 +30,10 @@ pub fn growth<'a>(rows: impl Iterator<Item = &'a BenchRow> + Clone) -> Vec<Growt
             let [x, y] = [mean(0), mean(1)];
             let spread: f64 = points.iter().map(|p| (p[0] - x) * (p[0] - x)).sum();
             let slope: f64 = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum();
-            let nodes = rows.clone().filter(|row| row.mode == mode).map(|row| row.nodes);
+            let nodes = rows
+                .clone()
+                .filter(|row| row.mode == mode)
+                .map(|row| row.nodes);
             (spread > 0.0).then(|| Growth {
                 mode,
                 exponent: slope / spread,

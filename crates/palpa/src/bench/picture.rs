@@ -31,9 +31,12 @@ pub fn draw(report: &BenchReport, of_growth: impl Fn(&BenchRow) -> bool) -> Pict
             rates = rates.series(Series::new(name, asked).dashed().with_color(color));
         }
     }
-    let mut errors = Chart::new(Axis::log("nodes"), Axis::log("largest error of the force, %"))
-        .title("What the rate is worth")
-        .subtitle("past 2 mm; step: against the same mesh, converged");
+    let mut errors = Chart::new(
+        Axis::log("nodes"),
+        Axis::log("largest error of the force, %"),
+    )
+    .title("What the rate is worth")
+    .subtitle("past 2 mm; step: against the same mesh, converged");
     for (mode, color) in modes.into_iter().zip(PALETTE) {
         let own: Vec<[f64; 2]> = (rows.iter().filter(|row| row.mode == mode))
             .filter(|row| row.step_error > 0.0)

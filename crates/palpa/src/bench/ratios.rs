@@ -64,7 +64,10 @@ pub fn full_factor(model: &Arc<Model>, n_times: usize) -> anyhow::Result<f64> {
         list.sort_unstable();
         list.dedup();
     }
-    let edges = neighbours.iter().enumerate().flat_map(|(a, list)| list.iter().map(move |&b| (a, b)));
+    let edges = neighbours
+        .iter()
+        .enumerate()
+        .flat_map(|(a, list)| list.iter().map(move |&b| (a, b)));
     let too_large = |_| anyhow::anyhow!("the factor of {n_columns} columns is too large");
     let order = minimum_degree(n_columns, edges).map_err(too_large)?;
     let mut rank = vec![0; n_columns];

@@ -6,7 +6,9 @@ use std::time::Duration;
 use cpu_time::ThreadTime;
 use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LiveReport, Rebuilt, StepOutcome};
 use palpa_fem::shape::{Pose, Sphere, Tool};
-use palpa_fem::{FemError, Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
+use palpa_fem::{
+    FemError, Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance,
+};
 use palpa_mesh::Vec3;
 
 /// How fast a tool goes where the steps allow it, m/s.
@@ -64,7 +66,9 @@ impl Ride {
     pub fn judged(&self) -> Vec<f64> {
         let n = (self.length() / JUDGED_EVERY).round() as usize;
         let lengths = (0..=n).map(|i| i as f64 * JUDGED_EVERY);
-        lengths.filter(|&s| self.at_length(s).0 >= JUDGED_FROM - 1e-9).collect()
+        lengths
+            .filter(|&s| self.at_length(s).0 >= JUDGED_FROM - 1e-9)
+            .collect()
     }
 }
 

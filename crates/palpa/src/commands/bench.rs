@@ -9,6 +9,7 @@ use palpa_fem::Model;
 use super::Outcome;
 use crate::bench::cases::{Case, Run, Shape, Tissue, cases};
 use crate::bench::ratios::{Ratio, dense_inverse, full_factor};
+use crate::bench::refined::Problem;
 use crate::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
 use crate::bench::{BenchReport, BenchRow, Mode, growth, picture};
 use crate::cli::Context;
@@ -39,6 +40,9 @@ pub struct Args {
     /// List the cases, and run none
     #[arg(long)]
     list: bool,
+    /// Compute the forces on refined meshes, which mesh errors are judged by, and run no case
+    #[arg(long)]
+    refined: bool,
 }
 
 /// Runs the command.
@@ -52,6 +56,9 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
             context.say(case.name)?;
         }
         return Ok(Outcome::Done);
+    }
+    if args.refined {
+        return refined(&chosen, context);
     }
     context.out_dir()?;
     context.begin_recording();
@@ -88,11 +95,40 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
+/// Forces on refined meshes, as they are recorded in the source.
+fn refined(chosen: &[&Case], context: &Context) -> anyhow::Result<Outcome> {
+    let mut found = Vec::new();
+    for problem in Problem::ALL {
+        if !chosen.iter().any(|case| case.problem == problem) {
+            continue;
+        }
+        let (forces, nodes) = problem.compute()?;
+        context.say(format_args!(
+            "{problem:?}, {nodes} nodes: depth mm, force N, recorded N"
+        ))?;
+        for known in forces {
+            let recorded = problem.force_at(known.depth);
+            let shown = recorded.map_or_else(String::new, |force| format!("{force:.5}"));
+            context.say(format_args!(
+                "{:.1}  {:.5}  {shown}",
+                known.depth * 1e3,
+                known.force.z
+            ))?;
+            found.push((problem, nodes, known.depth, known.force.z, recorded));
+        }
+    }
+    context.json(&found)?;
+    Ok(Outcome::Done)
+}
+
 fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
     let is_known = |name: &String| cases().iter().any(|case| case.name == name.as_str());
     if let Some(unknown) = args.cases.iter().find(|name| !is_known(name)) {
         let known: Vec<&str> = cases().iter().map(|case| case.name).collect();
-        bail!("there is no case \"{unknown}\"; the cases are {}", known.join(", "));
+        bail!(
+            "there is no case \"{unknown}\"; the cases are {}",
+            known.join(", ")
+        );
     }
     let is_named = |case: &Case| {
         args.cases.is_empty() && (!args.quick || case.is_quick)
@@ -102,16 +138,14 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
 }
 
 /// Measures all lines; whether it was not interrupted.
-fn measure(
-    chosen: &[&Case],
-    context: &Context,
-    report: &mut BenchReport,
-) -> anyhow::Result<bool> {
+fn measure(chosen: &[&Case], context: &Context, report: &mut BenchReport) -> anyhow::Result<bool> {
     let n_runs = chosen.iter().map(|case| case.runs.len() + 1).sum();
     let progress = context.progress(n_runs, "measuring");
     for case in chosen {
         progress.set_message(case.name);
-        let model = case.model().with_context(|| format!("case \"{}\"", case.name))?;
+        let model = case
+            .model()
+            .with_context(|| format!("case \"{}\"", case.name))?;
         let mut known: Option<Vec<Known>> = None;
         for run in &case.runs {
             if context.is_interrupted() {
@@ -134,6 +168,12 @@ fn measure(
             report.rows.push(row(case, run, &model, &ridden, known)?);
         }
         ratios(case, &model, report)?;
+        let own: Vec<&BenchRow> = report
+            .rows
+            .iter()
+            .filter(|row| row.case == case.name)
+            .collect();
+        progress.suspend(|| say_rows(context, &own))?;
         progress.inc(1);
     }
     Ok(true)
@@ -166,18 +206,20 @@ fn row(
         _ => None,
     };
     let on_mesh = sudden.as_deref().unwrap_or(known);
-    let force_at = |depth: f64| {
-        let known = refined.iter().find(|(d, _)| (d - depth).abs() < 1e-9);
-        known.map(|known| known.1)
-    };
+    let force_at = |depth: f64| case.problem.force_at(depth);
     let pressed = on_mesh.iter().filter(|known| known.is_press);
-    let mesh_errors = pressed.filter_map(|known| {
-        Some((known.force.z / force_at(known.depth)? - 1.0).abs())
-    });
-    let total_errors = known.iter().filter(|known| known.is_press).filter_map(|known| {
-        let found = ridden.forces.iter().find(|f| (f.0 - known.at).abs() < 1e-9)?;
-        Some((found.1.z / force_at(known.depth)? - 1.0).abs())
-    });
+    let mesh_errors =
+        pressed.filter_map(|known| Some((known.force.z / force_at(known.depth)? - 1.0).abs()));
+    let total_errors = known
+        .iter()
+        .filter(|known| known.is_press)
+        .filter_map(|known| {
+            let found = ridden
+                .forces
+                .iter()
+                .find(|f| (f.0 - known.at).abs() < 1e-9)?;
+            Some((found.1.z / force_at(known.depth)? - 1.0).abs())
+        });
     let is_elastic = sudden.is_none();
     let median = ridden.median();
     Ok(BenchRow {
@@ -219,7 +261,12 @@ fn ratios(case: &Case, model: &Arc<Model>, report: &mut BenchReport) -> anyhow::
     if !matches!(case.shape, Shape::Block { .. }) || case.tissue != Tissue::Elastic {
         return Ok(());
     }
-    let own: Vec<BenchRow> = report.rows.iter().filter(|row| row.case == case.name).cloned().collect();
+    let own: Vec<BenchRow> = report
+        .rows
+        .iter()
+        .filter(|row| row.case == case.name)
+        .cloned()
+        .collect();
     let mut add = |against: &'static str, seconds: f64, nodes: usize| {
         for row in &own {
             report.ratios.push(Ratio {
@@ -235,28 +282,52 @@ fn ratios(case: &Case, model: &Arc<Model>, report: &mut BenchReport) -> anyhow::
         let (seconds, nodes) = dense_inverse(*n, BUDGET)?;
         add("dense inverse of the reference method", seconds, nodes);
     }
-    let n_times = if model.n_nodes() > 20_000 { 1 } else { N_FACTORS };
-    add("full factor by faer", full_factor(model, n_times)?, model.n_nodes());
+    let n_times = if model.n_nodes() > 20_000 {
+        1
+    } else {
+        N_FACTORS
+    };
+    add(
+        "full factor by faer",
+        full_factor(model, n_times)?,
+        model.n_nodes(),
+    );
     Ok(())
 }
 
-fn say(context: &Context, report: &BenchReport) -> anyhow::Result<()> {
+fn say_rows(context: &Context, rows: &[&BenchRow]) -> anyhow::Result<()> {
     let mut table = Table::new([
-        "case", "nodes", "mode", "r mm", "h mm", "steps/s", "asked", "ms", "p99 ms", "bg CPU", "step err",
-        "mesh err", "total err", "mm/s", "switches", "bad",
+        "case",
+        "nodes",
+        "mode",
+        "r mm",
+        "h mm",
+        "steps/s",
+        "asked",
+        "ms",
+        "p99 ms",
+        "bg CPU",
+        "step err",
+        "mesh err",
+        "total err",
+        "mm/s",
+        "switches",
+        "bad",
     ])
     .with_left_names();
     let percent = |x: f64| format!("{:.1} %", x * 1e2);
     let maybe = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), percent);
-    for row in &report.rows {
+    for row in rows {
         table.push([
             row.case.clone(),
             row.nodes.to_string(),
             row.mode.name().to_owned(),
-            row.zone_radius_mm.map_or_else(|| "all".to_owned(), |r| format!("{r:.0}")),
+            row.zone_radius_mm
+                .map_or_else(|| "all".to_owned(), |r| format!("{r:.0}")),
             format!("{:.2}", row.h_contact_mm),
             format!("{:.0}", row.steps_per_s),
-            row.target_steps_per_s.map_or_else(String::new, |t| format!("{t:.0}")),
+            row.target_steps_per_s
+                .map_or_else(String::new, |t| format!("{t:.0}")),
             format!("{:.2}", row.step_ms_median),
             format!("{:.2}", row.step_ms_p99),
             format!("{:.2}", row.background_cpu_share),
@@ -268,7 +339,10 @@ fn say(context: &Context, report: &BenchReport) -> anyhow::Result<()> {
             (row.n_backed_off + row.n_failed).to_string(),
         ]);
     }
-    context.say(&table)?;
+    context.say(&table)
+}
+
+fn say(context: &Context, report: &BenchReport) -> anyhow::Result<()> {
     context.say(format_args!(
         "Errors are the largest past {:.0} mm; bg CPU is the background's over the steps'.",
         JUDGED_FROM * 1e3

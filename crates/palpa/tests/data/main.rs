@@ -5,6 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod awkward;
+mod bench;
 mod ccx;
 mod manifest;
 mod real;
