@@ -409,11 +409,6 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
         one_tissue("sphere", 2e-3, (2.5e-3, 1.0)),
         one_tissue("sphere-fine", 1.25e-3, (1.5e-3, 0.5)),
         layers("layers", 2e-3, [(2e-3, 0.0), (3e-3, 1.0), (8e-3, 1.0)]),
-        layers(
-            "layers-fine",
-            1.6e-3,
-            [(1e-3, 0.0), (2e-3, 0.5), (6e-3, 0.6)],
-        ),
     ]
 });
 
