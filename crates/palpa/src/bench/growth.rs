@@ -16,7 +16,7 @@ pub struct Growth {
 }
 
 /// Fits a line through the logarithms of time and nodes of each mode's rows; those of two bodies at least.
-pub fn growth<'a>(rows: impl Iterator<Item = &'a BenchRow> + Clone) -> Vec<Growth> {
+pub fn growth<'a>(rows: &(impl Iterator<Item = &'a BenchRow> + Clone)) -> Vec<Growth> {
     [Mode::Full, Mode::Whole, Mode::Zone]
         .into_iter()
         .filter_map(|mode| {

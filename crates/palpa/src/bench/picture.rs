@@ -9,7 +9,7 @@ pub fn draw(report: &BenchReport, of_growth: impl Fn(&BenchRow) -> bool) -> Pict
     let modes = [Mode::Full, Mode::Whole, Mode::Zone];
     let mut rates = Chart::new(Axis::log("nodes"), Axis::log("steps per second"))
         .title("Rate of the moving step")
-        .subtitle("4 levels, one core, median of steps in contact; crosses: asked for")
+        .subtitle("4 levels, one core, median of steps in contact; dashed: asked for")
         .guide(Guide::y(1000.0, ""));
     for (mode, color) in modes.into_iter().zip(PALETTE) {
         let own: Vec<[f64; 2]> = (rows.iter().filter(|row| row.mode == mode))

@@ -74,7 +74,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
                 && matches!(case.shape, Shape::Block { .. })
         })
     };
-    report.growth = growth::growth(report.rows.iter().filter(|row| is_of_growth(row)));
+    report.growth = growth::growth(&report.rows.iter().filter(|row| is_of_growth(row)));
     report.is_complete = is_whole;
     say(context, &report)?;
     let out = context.out_dir()?;
