@@ -278,7 +278,7 @@ impl Ridden {
         self.most[0] = self.most[0].max(report.n_active);
         self.most[1] = self.most[1].max(report.n_candidates);
         match report.outcome {
-            StepOutcome::Arrived => {}
+            StepOutcome::Arrived | StepOutcome::Behind => {}
             StepOutcome::BackedOff => self.n_bad[0] += 1,
             StepOutcome::Failed => self.n_bad[1] += 1,
         }
