@@ -3,6 +3,7 @@
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation, without a warning
+# make loop       a minute of the 1 kHz loop in real time, and the same minute run again
 # make bench      the thesis's table and the moving step, measured here
 
 SHARED  ?= ../shared
@@ -10,7 +11,7 @@ TARGET  := $(or $(CARGO_TARGET_DIR),target)
 RESULTS := $(TARGET)/tmp/results
 VENV    := $(TARGET)/venv
 
-.PHONY: run test test-data shared lint docs bench
+.PHONY: run test test-data shared lint docs bench loop
 
 run:
 	cargo run --release --package palpa -- press
@@ -54,3 +55,7 @@ docs:
 bench:
 	cargo run --release --package palpa -- reproduce
 	cargo run --release --package palpa -- bench
+
+loop:
+	cargo run --release --package palpa -- loop-report
+	cargo run --release --package palpa -- replay out/loop-report/log.mcap

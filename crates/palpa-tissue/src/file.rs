@@ -10,6 +10,7 @@
 )]
 
 mod either;
+mod motion;
 mod tissue;
 mod tool;
 
@@ -19,6 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use self::either::{AxisName, AxisSpec, ThicknessSpec, TissueSpec};
+pub(crate) use self::motion::{DeviceTable, MotionTable};
 pub(crate) use self::tissue::{OgdenTable, PronyTable, PronyTermTable, TissueTable};
 pub(crate) use self::tool::{LumpShapeName, LumpTable, ToolShape, ToolTable};
 use crate::Status;
@@ -47,6 +49,12 @@ pub(crate) struct SceneFile {
     /// Where, how deep and how fast it presses.
     #[serde(default)]
     pub(crate) press: PressTable,
+    /// The haptic device that presses in real time, and how it is held.
+    #[serde(default)]
+    pub(crate) device: DeviceTable,
+    /// How the simulated hand moves in real time.
+    #[serde(default)]
+    pub(crate) motion: MotionTable,
     /// How the body answers.
     #[serde(default)]
     pub(crate) model: ModelTable,

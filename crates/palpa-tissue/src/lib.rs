@@ -30,6 +30,7 @@ mod law;
 mod limits;
 mod lump;
 mod model;
+mod motion;
 mod resolve;
 mod scene;
 mod schema;
@@ -43,6 +44,7 @@ pub use catalogue::catalogue;
 pub use error::{Place, SceneError};
 pub use lump::{Lump, LumpPlace, LumpShape};
 pub use model::{Damping, Dynamics, Mesh, Model, ModelKind};
+pub use motion::{Device, DeviceKind, DevicePreset, Grip, Motion, MotionKind};
 pub use scene::{
     Body, CutFaces, Cutout, Generator, InPlane, Layer, LengthUnit, Press, Reference, Scene, Skin,
     Solver, Target,

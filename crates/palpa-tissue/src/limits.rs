@@ -110,6 +110,10 @@ pub(crate) const CYCLES: Limits<u32> = numbers(1, 100);
 pub(crate) const DEPTH: Limits<Length> = between(1e-6, 0.5);
 pub(crate) const SPEED: Limits<Velocity> = between(1e-5, 1.0);
 pub(crate) const HOLD: Limits<Time> = between(0.0, 600.0);
+pub(crate) const ACROSS: Limits<Length> = between(0.1e-3, 0.5);
+/// Beyond a pathological tremor it is a motion.
+pub(crate) const TREMOR: Limits<Length> = between(0.0, 5e-3);
+pub(crate) const ABOVE: Limits<Length> = between(0.1e-3, 0.1);
 pub(crate) const SUBSTEPS: Limits<u32> = numbers(1, 1024);
 pub(crate) const GAIN: Limits<f64> = numbers(0.0, 1.0);
 
@@ -229,6 +233,13 @@ mod tests {
         says("PressTable", "cycles", &CYCLES);
         says("PressTable", "hold", &HOLD);
         says("PressTable", "step", &format!("a {MAX_STEPS}th of it"));
+        says("MotionTable", "depth", &DEPTH);
+        says("MotionTable", "speed", &SPEED);
+        says("MotionTable", "hold", &HOLD);
+        says("MotionTable", "length", &ACROSS);
+        says("MotionTable", "times", &CYCLES);
+        says("MotionTable", "tremor", &TREMOR);
+        says("MotionTable", "above", &ABOVE);
         says("ReferenceTable", "substeps", &SUBSTEPS);
         says("ReferenceTable", "spring_gain", &GAIN);
         says("ReferenceTable", "shape_gain", &GAIN);

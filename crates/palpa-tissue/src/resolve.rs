@@ -4,6 +4,7 @@ mod body;
 mod layers;
 mod lumps;
 mod model;
+mod motion;
 mod tissue;
 mod tool;
 
@@ -67,6 +68,8 @@ pub(crate) fn parse(text: &str, base_dir: &Path, file: Option<&Path>) -> Result<
         layers,
         lumps: reader.lumps(written.lump, press.target)?,
         tool: reader.tool(&written.tool)?,
+        device: motion::device(&written.device),
+        motion: reader.motion(&written.motion, &press)?,
         press,
         model: reader.model(&written.model)?,
         mesh: reader.mesh(&written.mesh)?,

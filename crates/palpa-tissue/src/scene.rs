@@ -6,7 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Lump, MaterialStatus, Mesh, Model, SceneError, Status, Thickness, Tissue, Tool, resolve, write,
+    Device, Lump, MaterialStatus, Mesh, Model, Motion, SceneError, Status, Thickness, Tissue, Tool,
+    resolve, write,
 };
 
 /// The forearm that is pressed when no scene is named.
@@ -30,6 +31,10 @@ pub struct Scene {
     pub tool: Tool,
     /// Where, how deep and how fast it presses.
     pub press: Press,
+    /// What presses it in real time.
+    pub device: Device,
+    /// How the hand moves that holds the device.
+    pub motion: Motion,
     /// How the body answers.
     pub model: Model,
     /// How fine the body is made where it matters.

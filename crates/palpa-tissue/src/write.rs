@@ -1,5 +1,6 @@
 //! From the scene back to the text of a scene file.
 
+mod motion;
 mod tissue;
 mod tool;
 
@@ -23,6 +24,8 @@ pub(crate) fn to_toml(scene: &Scene) -> String {
         lump: scene.lumps.iter().map(|l| tool::lump(scene, l)).collect(),
         tool: tool::tool(&scene.tool),
         press: press(&scene.press),
+        device: motion::device(&scene.device),
+        motion: motion::motion(&scene.motion),
         model: model(&scene.model),
         mesh: mesh(&scene.mesh),
         reference: reference(&scene.reference),

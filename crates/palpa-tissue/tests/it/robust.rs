@@ -184,5 +184,5 @@ fn what_a_message_repeats_cannot_break_its_line() {
     let SceneError::Unknown { found, allowed, .. } = error else {
         panic!("{error}")
     };
-    assert_eq!((found.as_str(), allowed.len()), ("a`b", 8));
+    assert_eq!((found.as_str(), allowed.len()), ("a`b", 10));
 }

@@ -83,7 +83,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
             scene.tool
         );
     }
-    let pressed = PressedBody::build(&scene, &built, &lumps, &mut notes)?;
+    let pressed = PressedBody::build(&scene, &built, &lumps, &[], &mut notes)?;
     let (body, place) = (&pressed.body, &pressed.place);
     let supports = continuum::supports(scene.body.cut_faces, body, &mut notes);
     let patch = patch(&pressed);

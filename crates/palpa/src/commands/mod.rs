@@ -9,7 +9,9 @@ use clap::Subcommand;
 pub mod bench;
 pub mod check;
 pub mod export;
+pub mod loop_report;
 pub mod press;
+pub mod replay;
 pub mod reproduce;
 pub mod schema;
 pub mod verify;
@@ -34,7 +36,9 @@ pub enum Command {
     Bench(bench::Args),
     Check(check::Args),
     Export(export::Args),
+    LoopReport(loop_report::Args),
     Press(press::Args),
+    Replay(replay::Args),
     Reproduce(reproduce::Args),
     Schema(schema::Args),
     Verify(verify::Args),
@@ -47,7 +51,9 @@ impl Command {
             Self::Bench(_) => "bench",
             Self::Check(_) => "check",
             Self::Export(_) => "export",
+            Self::LoopReport(_) => "loop-report",
             Self::Press(_) => "press",
+            Self::Replay(_) => "replay",
             Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
             Self::Verify(_) => "verify",
@@ -63,7 +69,9 @@ impl Command {
             Self::Bench(args) => bench::run(args, context),
             Self::Check(args) => check::run(args, context),
             Self::Export(args) => export::run(args, context),
+            Self::LoopReport(args) => loop_report::run(args, context),
             Self::Press(args) => press::run(args, context),
+            Self::Replay(args) => replay::run(args, context),
             Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),
             Self::Verify(args) => verify::run(args, context),

@@ -65,7 +65,7 @@ pub struct Patch {
 }
 
 impl PressedBody {
-    /// Refines the scene's body as its `[mesh]` says.
+    /// Refines the scene's body as its `[mesh]` says, also so far from the place along the motion (m) as `way` says.
     ///
     /// # Errors
     /// When direction or depth do not fit the place.
@@ -73,13 +73,14 @@ impl PressedBody {
         scene: &Scene,
         built: &BuiltBody,
         lumps: &[Lump],
+        way: &[f64],
         notes: &mut Vec<String>,
     ) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
         // What is wrong with the place is said before any work, and once.
         let mut vertex = built.press_vertex;
         let coarse = Place::find(scene, grown, vertex, &mut Vec::new())?;
-        let mut refined = refine_near(scene, built, &coarse, lumps, notes);
+        let mut refined = refine_near(scene, built, &coarse, lumps, way, notes);
         if matches!(scene.press.target, Target::Point(_)) {
             vertex = nearest(&refined.body.skin, built.press_at);
         }
@@ -122,6 +123,7 @@ fn refine_near(
     built: &BuiltBody,
     place: &Place,
     lumps: &[Lump],
+    way: &[f64],
     notes: &mut Vec<String>,
 ) -> Refined {
     let body = &built.growth.body;
@@ -135,7 +137,13 @@ fn refine_near(
     let growth = scene.mesh.growth;
     let mut wishes: Vec<Wish> = Vec::new();
     if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
-        let (points, radius) = footprint(scene, built.press_at, &place.direction);
+        let (mut points, radius) = footprint(scene, built.press_at, &place.direction);
+        let along = along_skin(scene, &place.direction);
+        let index = SurfaceIndex::build(&body.skin);
+        for &far in way.iter().filter(|far| **far != 0.0) {
+            let over = built.press_at + along * far;
+            points.extend(index.closest(over).map(|closest| closest.point));
+        }
         wishes.push(Box::new(near_points(&points, radius, SLACK * h, growth)));
     }
     if !lumps.is_empty() {
@@ -202,6 +210,16 @@ fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64
         }
     }
     (points, radius)
+}
+
+/// The unit vector along which the scene's hand goes across the skin that is pressed in this direction.
+fn along_skin(scene: &Scene, direction: &Unit<Vec3>) -> Vec3 {
+    let first = scene.tool.contact().map_or(Vec3::x(), |tool| {
+        Vec3::from(tool.axes(direction.into_inner().into())[0])
+    });
+    let along = scene.motion.along.map_or(first, Vec3::from);
+    let flat = along - direction.into_inner() * along.dot(direction);
+    flat.try_normalize(1e-6).unwrap_or(first)
 }
 
 /// Points along a lump, and the radius of balls round them that hold it. m

@@ -264,11 +264,20 @@ impl Indentation {
     /// # Errors
     /// When the place, the depth, the tissues or the lumps do not fit the body, or it finds no rest.
     pub fn build(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
+        Self::build_along(scene, built, &[])
+    }
+
+    /// As [`Self::build`], with the body made fine also where the tool goes across the skin: so far from the place along the
+    /// motion's direction (m).
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn build_along(scene: &Scene, built: &BuiltBody, way: &[f64]) -> anyhow::Result<Self> {
         let mut notes = Vec::new();
         let materials = continuum::materials(scene)?;
         let is_viscous = materials.iter().any(|m| m.prony.is_some());
         let lumps = continuum::lumps(scene, built, &mut notes)?;
-        let mesh = PressedBody::build(scene, built, &lumps, &mut notes)?;
+        let mesh = PressedBody::build(scene, built, &lumps, way, &mut notes)?;
         let place = mesh.place;
         let body = &mesh.body;
         let supports = continuum::supports(scene.body.cut_faces, body, &mut notes);

@@ -8,6 +8,7 @@ mod awkward;
 mod bench;
 mod ccx;
 mod manifest;
+mod moving;
 mod real;
 mod verify;
 

@@ -1,0 +1,136 @@
+//! A scene in real time: the moving step behind the engine's [`Tissue`], in the frame of a device.
+//!
+//! ```text
+//! scene ─► body, refined along the hand's way ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand
+//! ```
+//! The device's frame is that of the tool where it presses: z out of the tissue, x along the tool's length. Its origin is
+//! where the tool's tip hangs, [`palpa_tissue::Motion::above`] over the first touch.
+
+mod hand;
+mod record;
+mod rehearsal;
+mod tissue;
+mod trace;
+
+pub use hand::{device_model, grip, path};
+pub use record::{FileState, changed_files, notes_of, scene_of};
+pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
+pub use tissue::LiveTissue;
+pub use trace::{TraceRow, force_while_moving, trace_picture};
+
+use std::sync::Arc;
+
+use anyhow::bail;
+use palpa_fem::realtime::{ExteriorMode, LiveParams};
+use palpa_fem::shape::Tool as RigidTool;
+use palpa_fem::{Model, PosedTool};
+use palpa_mesh::Vec3;
+use palpa_servo::Pose;
+use palpa_tissue::{Scene, Tool};
+
+use crate::build::build;
+use crate::press::tissue::Indentation;
+
+/// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
+/// least so much, m. With 1.0 the first strokes of a forearm failed until the zone had grown.
+const ZONE_RADII: f64 = 1.6;
+const LEAST_ZONE: f64 = 12e-3;
+/// Distance of the points along the hand's way at which the body is made fine, m.
+const WAY_STEP: f64 = 4e-3;
+
+/// A scene set up for real time.
+#[derive(Debug)]
+pub struct LiveScene {
+    /// The body with its materials.
+    pub model: Arc<Model>,
+    /// What presses.
+    pub tool: RigidTool,
+    /// Where the device's frame is: its origin is where the tool's tip hangs at rest.
+    pub scene_from_device: Pose,
+    /// How the moving step goes about its work.
+    pub params: LiveParams,
+    /// Mean length of the skin's edges near the tool, m.
+    pub mesh_size: f64,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+impl LiveScene {
+    /// Grows the scene's body and makes it fine along the way of the hand.
+    ///
+    /// # Errors
+    /// When the scene does not fit together, or its tool is bonded to the skin.
+    pub fn build(scene: &Scene) -> anyhow::Result<Self> {
+        if !matches!(scene.tool, Tool::Contact(_)) {
+            bail!(
+                "in real time the tool presses by contact, and the scene's is a {}; give [tool] a shape such as \"sphere\", \
+                 \"flat_punch\" or \"fingertip\"",
+                scene.tool
+            );
+        }
+        let built = build(scene)?;
+        let indentation = Indentation::build_along(scene, &built, &way(scene))?;
+        let mut notes = built.notes.clone();
+        notes.extend(indentation.notes.iter().cloned());
+        if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
+            notes.push(
+                "tension of layers is not at rest when the loop starts: the first steps of the tissue relax it".into(),
+            );
+        }
+        let Some(posed) = indentation.tool_at(-scene.motion.above) else {
+            bail!("the tool is bonded to the skin");
+        };
+        Ok(Self {
+            mesh_size: indentation.mesh.mesh_size,
+            params: LiveParams {
+                zone_radius: zone_radius(scene),
+                exterior: ExteriorMode::Followed,
+                ..LiveParams::default()
+            },
+            model: Arc::new(indentation.model),
+            tool: posed.tool,
+            scene_from_device: posed.pose,
+            notes,
+        })
+    }
+
+    /// The tissue, untouched.
+    ///
+    /// # Errors
+    /// When the body cannot be factored.
+    pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
+        LiveTissue::new(
+            Arc::clone(&self.model),
+            vec![self.tool],
+            self.scene_from_device,
+            self.params,
+        )
+    }
+
+    /// The tool where the device is at `position` in its own frame, m.
+    pub fn posed(&self, position: Vec3) -> PosedTool {
+        PosedTool {
+            tool: self.tool,
+            pose: self.scene_from_device * Pose::translation(position.x, position.y, position.z),
+        }
+    }
+}
+
+/// A radius that holds the contact at the depth of the hand.
+fn zone_radius(scene: &Scene) -> f64 {
+    let radius = scene.tool.contact_radius();
+    (ZONE_RADII * (radius + scene.motion.depth)).max(LEAST_ZONE)
+}
+
+/// Where along its way across the skin the hand's tool will be, from the place pressed, in shares of the tool's own frame:
+/// x along and y across. m
+fn way(scene: &Scene) -> Vec<f64> {
+    if !scene.motion.kind.goes_across() {
+        return vec![0.0];
+    }
+    let half = 0.5 * scene.motion.length;
+    let n = (half / WAY_STEP).ceil().max(1.0) as i32;
+    (-n..=n)
+        .map(|i| half * f64::from(i) / f64::from(n))
+        .collect()
+}
