@@ -18,27 +18,27 @@ thickness = "2 mm"
 [[layer]]
 tissue = { name = "fat", young = "5 kPa", poisson = 0.45 }
 thickness = "10 mm"
-levels = 3
+levels = 2
 [[layer]]
 tissue = { name = "muscle", young = "30 kPa", poisson = 0.45 }
-levels = 3
+levels = 2
 [tool]
 shape = "sphere"
 radius = "10 mm"
 [press]
 at = ["0 mm", "0 mm", "0 mm"]
-depth = "8 mm"
+depth = "7 mm"
 [mesh]
 near_tool = "3 mm"
-growth = 0.6
+growth = 0.8
 [motion]
 kind = "KIND"
-depth = "8 mm"
-length = "20 mm"
+depth = "7 mm"
+length = "10 mm"
 above = "5 mm"
 "#;
 const ABOVE: f64 = 5e-3;
-const DEPTH: f64 = 8e-3;
+const DEPTH: f64 = 7e-3;
 /// Time of a tissue step, s.
 const STEP_TIME: f64 = 4e-3;
 /// The law lets its whole force through half a second after the start. s
@@ -76,7 +76,7 @@ fn trace(live: &LiveScene, way: &Way) -> Vec<TraceRow> {
         duration: way.duration(),
         ..RehearsalParams::default()
     };
-    force_while_moving(live, ABOVE, way, &params, 3).unwrap()
+    force_while_moving(live, ABOVE, way, &params, 8).unwrap()
 }
 
 fn out() -> OutDir {
@@ -108,7 +108,7 @@ fn force_while_moving_stays_near_the_converged_one() {
         ("press at 20 mm/s", &still, press(0.02), 2.0),
         ("press at 50 mm/s", &still, press(0.05), 2.0),
         ("press at 100 mm/s", &still, press(0.1), 4.0),
-        ("stroke at 50 mm/s", &wide, stroke(0.05, 10e-3), 2.0),
+        ("stroke at 50 mm/s", &wide, stroke(0.05, 5e-3), 2.0),
     ];
     let out = out();
     let mut traces = Vec::new();
