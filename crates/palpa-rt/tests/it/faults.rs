@@ -136,15 +136,15 @@ fn a_tissue_that_panics_is_gone_and_the_loop_is_not() {
         wait(0.1);
         assert!(hand.force() < 1e-9);
     });
-    check_said(
-        &log,
-        &[
+    // A panic may take longer to be told than a patch to go stale.
+    for said in ["tissue panicked", "stale patch"] {
+        let texts = [
             "fault on purpose: the tissue panics",
-            "tissue panicked",
-            "stale patch",
+            said,
             "haptic loop stopped",
-        ],
-    );
+        ];
+        check_said(&log, &texts);
+    }
     assert!(report.warnings().any(|e| e.level == Level::Error));
     // Caught: the thread ended by itself.
     assert!(report.panicked.is_empty());
