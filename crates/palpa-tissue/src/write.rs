@@ -24,7 +24,7 @@ pub(crate) fn to_toml(scene: &Scene) -> String {
         lump: scene.lumps.iter().map(|l| tool::lump(scene, l)).collect(),
         tool: tool::tool(&scene.tool),
         press: press(&scene.press),
-        device: motion::device(&scene.device),
+        device: motion::device(scene.device),
         motion: motion::motion(&scene.motion),
         model: model(&scene.model),
         mesh: mesh(&scene.mesh),

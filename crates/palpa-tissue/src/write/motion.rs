@@ -5,7 +5,7 @@ use crate::file::{DeviceTable, MotionTable};
 use crate::motion::{Device, Motion};
 use crate::units::{Length, Time, Velocity};
 
-pub(super) fn device(device: &Device) -> DeviceTable {
+pub(super) fn device(device: Device) -> DeviceTable {
     DeviceTable {
         kind: device.kind,
         preset: device.preset,
