@@ -1,4 +1,4 @@
-//! A scene in real time: the moving step behind the engine's [`Tissue`], in the frame of a device.
+//! A scene in real time: the moving step behind the engine's [`palpa_rt::Tissue`], in the frame of a device.
 //!
 //! ```text
 //! scene ─► body, refined along the hand's way ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand

@@ -26,7 +26,7 @@ const MOST_SECONDS: f64 = 3600.0;
 
 /// Run the engine in real time and report deadlines, smoothness and energy
 ///
-/// A simulated hand holds the scene's haptic device and moves it as [motion] says; the tissue answers with finite elements,
+/// A simulated hand holds the scene's haptic device and moves it as its motion section says; the tissue answers with finite elements,
 /// the force comes at 1 kHz. Without a SCENE, a forearm with a lump is stroked. Writes the log (log.mcap, for `palpa replay`),
 /// the figures (loop.json), histograms of the tick's times, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
