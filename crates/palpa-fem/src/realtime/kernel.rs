@@ -139,6 +139,61 @@ pub(super) struct Local<E> {
     pub(super) stiffness: [[Row<E>; 9]; N_BLOCKS],
 }
 
+/// How the two wedges are deformed at their points, and how their volume has changed.
+struct Wedges<R> {
+    f: [[M3<R>; 2]; 2],
+    volumes: [[R; 2]; 2],
+    /// `Σ V (J − 1)` and `Σ V`, m³.
+    change: R,
+    total: R,
+    /// Least volume ratio of a point, at most 1.
+    least: R,
+}
+
+impl<R: Lanes> Wedges<R> {
+    #[inline(always)]
+    fn new(
+        token: R::Token,
+        at: usize,
+        geometry: &Geometry<R::Element>,
+        local: &Local<R::Element>,
+    ) -> Self {
+        let (zero, one) = (R::splat(token, 0.0), R::splat(token, 1.0));
+        let load = |row: &Row<R::Element>| R::load(token, &row[at..]);
+        let load3 = |rows: &[Row<R::Element>; 3]| [load(&rows[0]), load(&rows[1]), load(&rows[2])];
+        let mut wedges = Self {
+            f: [[[[zero; 3]; 3]; 2]; 2],
+            volumes: [[zero; 2]; 2],
+            change: zero,
+            total: zero,
+            least: one,
+        };
+        for w in 0..2 {
+            for q in 0..2 {
+                let mut h = [[zero; 3]; 3];
+                for n in 0..6 {
+                    let g = load3(&geometry.gradients[w][q][n]);
+                    let u = load3(&local.displacements[2 * w + n]);
+                    for r in 0..3 {
+                        h[r] = axpy(u[r], &g, &h[r]);
+                    }
+                }
+                for r in 0..3 {
+                    h[r][r] = h[r][r] + one;
+                }
+                let volume = load(&geometry.volumes[w][q]);
+                let j = dot(&h[0], &cofactor(&h)[0]);
+                wedges.f[w][q] = h;
+                wedges.volumes[w][q] = volume;
+                wedges.least = wedges.least.min(j);
+                wedges.change = volume.mul_add(j - one, wedges.change);
+                wedges.total = wedges.total + volume;
+            }
+        }
+        wedges
+    }
+}
+
 /// A unit's nodes, gradients and deformation.
 struct Unit<R, const N: usize> {
     gradients: [[V3<R>; N]; 2],
@@ -173,33 +228,13 @@ pub(super) fn evaluate<R: Lanes, const TANGENT: bool>(
     let alpha = load(&geometry.alpha);
 
     let mut forces = [[zero; 3]; N_NODES];
-    let mut f = [[[[zero; 3]; 3]; 2]; 2];
-    let mut volumes = [[zero; 2]; 2];
-    let mut change = zero;
-    let mut least = one;
-    let mut total = zero;
-    for w in 0..2 {
-        for q in 0..2 {
-            let mut h = [[zero; 3]; 3];
-            for n in 0..6 {
-                let g = load3(&geometry.gradients[w][q][n]);
-                let u = load3(&local.displacements[2 * w + n]);
-                for r in 0..3 {
-                    h[r] = axpy(u[r], &g, &h[r]);
-                }
-            }
-            for r in 0..3 {
-                h[r][r] = h[r][r] + one;
-            }
-            f[w][q] = h;
-            volumes[w][q] = load(&geometry.volumes[w][q]);
-            let cof = cofactor(&h);
-            let j = dot(&h[0], &cof[0]);
-            least = least.min(j);
-            change = volumes[w][q].mul_add(j - one, change);
-            total = total + volumes[w][q];
-        }
-    }
+    let Wedges {
+        f,
+        volumes,
+        change,
+        total,
+        mut least,
+    } = Wedges::<R>::new(token, at, geometry, local);
     let bulk = load(&material.bulk);
     let mut pressure = bulk * change.divided_by(total);
     if let Some(constant) = constant {
@@ -604,29 +639,13 @@ pub(super) fn elastic<R: Lanes>(
         thickness,
         normal,
     };
-    let mut f = [[[[zero; 3]; 3]; 2]; 2];
-    let mut volumes = [[zero; 2]; 2];
-    let (mut change, mut total) = (zero, zero);
-    for w in 0..2 {
-        for q in 0..2 {
-            let mut h = [[zero; 3]; 3];
-            for n in 0..6 {
-                let g = load3(&geometry.gradients[w][q][n]);
-                let u = load3(&local.displacements[2 * w + n]);
-                for r in 0..3 {
-                    h[r] = axpy(u[r], &g, &h[r]);
-                }
-            }
-            for r in 0..3 {
-                h[r][r] = h[r][r] + one;
-            }
-            let j = dot(&h[0], &cofactor(&h)[0]);
-            f[w][q] = h;
-            volumes[w][q] = load(&geometry.volumes[w][q]);
-            change = volumes[w][q].mul_add(j - one, change);
-            total = total + volumes[w][q];
-        }
-    }
+    let Wedges {
+        f,
+        volumes,
+        change,
+        total,
+        ..
+    } = Wedges::<R>::new(token, at, geometry, local);
     let pressure = load(&material.bulk) * change.divided_by(total);
     pressure.store(&mut out.pressure[at..]);
     let mut mean = [[[zero; 3]; 3]; 2];
