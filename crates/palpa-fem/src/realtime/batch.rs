@@ -20,7 +20,7 @@ use super::lanes::{Doubles, Lanes, Singles};
 use crate::assembly::{Inverted, phases_at};
 use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt};
-use crate::law::{Hardening, Prony, PronyStep};
+use crate::law::{Hardening, Prony, PronyStep, six_of};
 use crate::model::Model;
 use crate::state::{Memory, State, in_plane};
 
@@ -501,9 +501,8 @@ impl Batch {
         self.double.shape(model, pair, lane, columns);
         if let Some(past) = &mut self.past {
             let tension = in_plane(model, pair) * model.materials[past.material].prestress;
-            let six = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
-            for (row, place) in past.tension.iter_mut().zip(six) {
-                row[lane] = tension[place];
+            for (row, value) in past.tension.iter_mut().zip(six_of(&tension)) {
+                row[lane] = value;
             }
         }
         if let Some((single, blocks)) = &mut self.tangent {
