@@ -136,6 +136,7 @@ impl Trial {
         let mut pose = Pose::identity();
         let mut last_position = None;
         let (mut absorbed, mut deficit): (f64, f64) = (0.0, 0.0);
+        let mut stretch = Vec3::zeros();
         let mut command = [ForceCommand::ZERO];
         while clock < end {
             clock += hiccup(clock);
@@ -157,10 +158,13 @@ impl Trial {
                     patches.slot().clone_from(&working);
                     patches.publish();
                 }
-                bed.step(&pose, clock, period, &mut working);
+                let tool =
+                    Pose::from_parts((pose.translation.vector + stretch).into(), pose.rotation);
+                bed.step(&tool, clock, period, &mut working);
                 next_patch = clock + period - 1e-9;
             }
             let report = servo.tick(clock, &[state], &mut patches, &mut command);
+            stretch = report.tools[0].stretch;
             // A device that is gone takes no force; the trial goes on.
             let _ = device.write(clock, &command[0]);
             samples.push(Sample {

@@ -12,7 +12,7 @@ use crate::{
 use palpa_device::{DeviceFault, HapticDevice};
 use palpa_servo::{
     ContactPatch, DeviceState, Faults, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo,
-    TickReport, ToolReport,
+    TickReport, ToolReport, Vec3,
 };
 use rtrb::Producer;
 use std::{
@@ -73,6 +73,8 @@ pub(crate) struct Now {
     sample: PoseSample,
     states: [Option<DeviceState>; MAX_TOOLS],
     commands: [ForceCommand; MAX_TOOLS],
+    /// How far each tool stood off its device in the last tick, m.
+    stretch: [Vec3; MAX_TOOLS],
     /// For how many ticks a device has been away.
     away: [u64; MAX_TOOLS],
     is_written: [bool; MAX_TOOLS],
@@ -94,6 +96,7 @@ impl Now {
             },
             states: [None; MAX_TOOLS],
             commands: [ForceCommand::ZERO; MAX_TOOLS],
+            stretch: [Vec3::zeros(); MAX_TOOLS],
             away: [0; MAX_TOOLS],
             is_written: [true; MAX_TOOLS],
             faults: Faults::NONE,
@@ -124,6 +127,9 @@ impl ServoLoop {
             _ => TickReport::ZERO,
         };
         let (offered, taken) = (arrival.offered, arrival.taken);
+        for (stretch, tool) in self.now.stretch.iter_mut().zip(&report.tools) {
+            *stretch = tool.stretch;
+        }
         self.write(now);
         self.notice(now, &report);
         let mut entry = TickEntry {
@@ -254,11 +260,12 @@ impl ServoLoop {
         let n = &mut self.now;
         n.sample.tick = n.tick;
         n.sample.time = now;
-        for (pose, state) in n.sample.poses.iter_mut().zip(&n.states) {
+        for ((pose, state), stretch) in n.sample.poses.iter_mut().zip(&n.states).zip(&n.stretch) {
             if let Some(state) = state
                 && is_finite(&state.pose)
             {
                 *pose = state.pose;
+                pose.translation.vector += stretch;
             }
         }
         *self.poses.slot() = n.sample;
@@ -352,7 +359,7 @@ impl DeviceRecord {
             tissue_force: tool.tissue_force.into(),
             transfer: tool.transfer.into(),
             stiffness: tool.stiffness,
-            stretch: tool.stretch,
+            stretch: tool.stretch.norm(),
             softening: tool.softening,
             damping: tool.damping,
             energy_in: tool.energy_in,

@@ -18,6 +18,7 @@ pub struct ForceStats {
     squares: VecDeque<f64>,
     worst_sum: f64,
     arrivals: Histogram,
+    arrivals_alone: Histogram,
     others: Histogram,
     max_force: f64,
     work: f64,
@@ -35,6 +36,8 @@ pub struct ForceReport {
     pub arrival_max: f64,
     /// The change that 999 of 1000 such ticks stay below, N.
     pub arrival_p999: f64,
+    /// Largest change at such a tick beyond what the device's own displacement makes with the tissue's stiffness, N.
+    pub arrival_alone_max: f64,
     /// The change that 999 of 1000 other ticks stay below, N.
     pub other_p999: f64,
     /// Largest change at other ticks, N.
@@ -64,6 +67,7 @@ impl ForceStats {
             squares: VecDeque::new(),
             worst_sum: 0.0,
             arrivals: Histogram::new(),
+            arrivals_alone: Histogram::new(),
             others: Histogram::new(),
             max_force: 0.0,
             work: 0.0,
@@ -97,6 +101,13 @@ impl ForceStats {
                 &self.others
             };
             changes.add(norm(step));
+            if entry.tick.taken {
+                let way = norm(std::array::from_fn(|i| {
+                    device.position[i] - last.position[i]
+                }));
+                let own = device.stiffness.max(last.stiffness) * way;
+                self.arrivals_alone.add((norm(step) - own).max(0.0));
+            }
             if device.is_there && last.is_there {
                 // The force of the last tick acted while the hand moved to here.
                 let work: f64 = (0..3)
@@ -120,6 +131,7 @@ impl ForceStats {
             rms_band_worst: mean(self.worst_sum.max(now)),
             arrival_max: self.arrivals.max(),
             arrival_p999: self.arrivals.quantile(0.999),
+            arrival_alone_max: self.arrivals_alone.max(),
             other_p999: self.others.quantile(0.999),
             other_max: self.others.max(),
             max_force: self.max_force,

@@ -127,8 +127,9 @@ pub struct ToolReport {
     pub velocity: Vec3,
     /// Stiffness of the tissue against the tool, N/m; 0 without contact.
     pub stiffness: f64,
-    /// How far the tool stands off the device's position because of the coupling, m.
-    pub stretch: f64,
+    /// How far the tool stands off the device's position because of the coupling, m: the tissue's next step is to be made
+    /// where the tool is, for at the device's own place it would be pressed deeper, and be stiffer, than it is felt.
+    pub stretch: Vec3,
     /// Share of the tissue's stiffness that the coupling takes away: 0 where the tissue's own is felt.
     pub softening: f64,
     /// Damping that the energy observer injected, N s/m.
@@ -154,7 +155,7 @@ impl ToolReport {
         transfer: Vec3::new(0.0, 0.0, 0.0),
         velocity: Vec3::new(0.0, 0.0, 0.0),
         stiffness: 0.0,
-        stretch: 0.0,
+        stretch: Vec3::new(0.0, 0.0, 0.0),
         softening: 0.0,
         damping: 0.0,
         energy_in: 0.0,

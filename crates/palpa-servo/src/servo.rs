@@ -190,7 +190,7 @@ impl Servo {
             tool.update_coupling(load, dt);
             tool_report.tissue_force = load.force;
             tool_report.tissue_torque = load.torque;
-            tool_report.stretch = self.solver.stretch(t).norm();
+            tool_report.stretch = self.solver.stretch(t);
             tool.render(load, gain, is_frozen, dt, &params, tool_report);
             report.limits |= tool_report.limits;
         }
@@ -435,12 +435,9 @@ impl Tool {
             };
         }
         let velocity = self.hand.velocity;
-        let damping = self.energy.ask_damping(&velocity, dt, &spec, params);
-        let base = if self.held.force == Vec3::zeros() {
-            0.0
-        } else {
-            params.damping
-        };
+        let touches = self.held.force != Vec3::zeros();
+        let damping = (self.energy).ask_damping(&velocity, touches, dt, &spec, params);
+        let base = if touches { params.damping } else { 0.0 };
         let whole_damping = (damping + base).clamp(0.0, spec.max_damping);
         let force = (self.held.force - velocity * whole_damping) * gain;
         let torque = self.held.torque * gain;

@@ -104,6 +104,7 @@ impl ContactSolver {
     /// Forgets all forces and what friction held.
     pub(crate) fn clear(&mut self) {
         self.n = 0;
+        self.stretch = [Vec3::zeros(); MAX_TOOLS];
     }
 
     /// Takes a patch over: forces and anchors of vertices that were known go on, of the others the patch's do.

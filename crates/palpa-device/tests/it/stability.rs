@@ -173,3 +173,34 @@ fn the_stiffness_limits_hold_in_every_hand_without_the_guard() {
         }
     }
 }
+
+#[test]
+fn softened_tissue_is_stepped_where_the_tool_is() {
+    // It stiffens so quickly that a step at the device's own place, deeper by the coupling, would be another tissue.
+    let bed = BedParams {
+        compliance: 2e-3,
+        stiffening: 2000.0,
+        ..BedParams::default()
+    };
+    let trial = trial(DeviceModel::IDEAL, Grip::STIFF, bed, 200.0);
+    let mut trial = Trial {
+        duration: 3.0,
+        ..trial
+    };
+    trial.device.spec.max_stiffness = 500.0;
+    let report = trial.run();
+    let last = report.samples.last().expect("samples");
+    let tool = &last.report.tools[0];
+    assert!(tool.softening > 0.3, "{tool:?}");
+    let at = last.position + tool.stretch;
+    let mut patch = Box::new(palpa_servo::ContactPatch::EMPTY);
+    let force = palpa_device::Bed::new(&bed).step(
+        &palpa_servo::Pose::translation(at.x, at.y, at.z),
+        0.0,
+        1e-3,
+        &mut patch,
+    );
+    let error = (last.force - force).norm() / force.norm();
+    println!("{error:.4} of {:.2} N", force.norm());
+    assert!(error < 0.01, "{error}");
+}

@@ -61,17 +61,6 @@ pub(super) trait FirstInvariant {
     }
 }
 
-/// How `w'` of a law in the first invariant grows with `x = Ī1 − 3`, relative to `w'` at rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Hardening {
-    /// `w' = 1`.
-    None,
-    /// `w' = 1 + 2 a x + 3 b x²`.
-    Cubic { a: f64, b: f64 },
-    /// `w' = exp(b x)`.
-    Exponential { b: f64 },
-}
-
 /// What the invariants of one deformation gradient have in common.
 pub(super) struct Isochoric {
     f: Mat3,

@@ -10,6 +10,7 @@
 
 mod error;
 mod fung;
+mod hardening;
 mod invariants;
 mod linear;
 mod material;
@@ -36,8 +37,8 @@ pub use volumetric::Volumetric;
 pub use yeoh::Yeoh;
 
 use crate::{Mat3, Mat9};
+pub(crate) use hardening::{Hardening, Powers};
 use invariants::FirstInvariant;
-pub(crate) use invariants::Hardening;
 
 /// An energy density beyond this (J/m³) is that of no tissue, and its derivatives may overflow: it counts as infinite.
 const HIGHEST_ENERGY: f64 = 1e60;
@@ -134,24 +135,29 @@ macro_rules! of_each {
 }
 
 impl Law {
-    /// `w'` at rest (Pa), how it grows, and the bulk modulus (Pa), of a law in the first invariant whose volumetric energy
-    /// is quadratic; none of others.
-    pub(crate) fn first_invariant(&self) -> Option<(f64, Hardening, f64)> {
-        let (slope, hardening, volumetric) = match self {
-            Self::NeoHookean(law) => (0.5 * law.shear(), Hardening::None, law.volumetric()),
+    /// Half the shear modulus at rest (Pa), how the law hardens, and the bulk modulus (Pa), of an isotropic law at large
+    /// strain whose volumetric energy is quadratic; none of others.
+    pub(crate) fn hardening(&self) -> Option<(f64, Hardening, f64)> {
+        let hardening = match self {
+            Self::NeoHookean(_) => Hardening::None,
             Self::Yeoh(law) => {
                 let [c10, c20, c30] = law.constants();
                 let (a, b) = (c20 / c10, c30 / c10);
-                (c10, Hardening::Cubic { a, b }, law.volumetric())
+                Hardening::Cubic { a, b }
             }
-            Self::Fung(law) => {
-                let hardening = Hardening::Exponential { b: law.b() };
-                (0.5 * law.shear(), hardening, law.volumetric())
+            Self::Fung(law) => Hardening::Exponential { b: law.b() },
+            Self::Ogden(law) => Hardening::Powers(Powers::new(
+                law.terms().iter().map(|term| (term.mu, term.alpha)),
+            )),
+            // C10 (Ī1 − 3) is Ogden's term of the exponent 2, C01 (Ī2 − 3) that of −2.
+            Self::MooneyRivlin(law) => {
+                let [c10, c01] = law.constants();
+                Hardening::Powers(Powers::new([(c10, 2.0), (c01, -2.0)].into_iter()))
             }
-            _ => return None,
+            Self::Linear(_) | Self::StVenantKirchhoff(_) => return None,
         };
-        match *volumetric {
-            Volumetric::Quadratic { bulk } => Some((slope, hardening, bulk)),
+        match *self.volumetric_energy() {
+            Volumetric::Quadratic { bulk } => Some((0.5 * self.shear_modulus(), hardening, bulk)),
             Volumetric::Logarithmic { .. } => None,
         }
     }

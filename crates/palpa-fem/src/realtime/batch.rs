@@ -131,7 +131,7 @@ fn kernel_columns(group: &SurfaceGroup) -> [usize; 4] {
     [own(first, second), shared[0], shared[1], own(second, first)]
 }
 
-/// `w'` at rest and bulk modulus of a group, per point and for its volume, and how it hardens; none if its law is not the
+/// Half the shear modulus at rest and bulk modulus of a group, per point and for its volume, and how it hardens; none if its law is not the
 /// kernel's.
 fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f64, Hardening)> {
     if has_memory && phases.len() > 1 {
@@ -141,7 +141,7 @@ fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f6
     let mut bulk = 0.0;
     let mut common = None;
     for at in phases {
-        let (slope, hardening, k) = at.law.first_invariant()?;
+        let (slope, hardening, k) = at.law.hardening()?;
         if *common.get_or_insert(hardening) != hardening {
             return None;
         }

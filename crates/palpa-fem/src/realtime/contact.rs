@@ -71,6 +71,9 @@ pub(super) struct ContactProblem {
     /// Compliance along the normals, m/N.
     pub(super) along: Vec<f64>,
     pub(super) factor: Vec<f64>,
+    /// Compliance without the supports, as far as it has one, and where it is made.
+    pub(super) released: Vec<f64>,
+    pub(super) spread: Vec<f64>,
     is_active: [bool; MOST_CANDIDATES],
 }
 
@@ -83,6 +86,8 @@ impl ContactProblem {
             change: vec![0.0; 3 * n],
             along: vec![0.0; n * n],
             factor: vec![0.0; n * n],
+            released: vec![0.0; 9 * n * n],
+            spread: vec![0.0; 3 * n * n],
             is_active: [false; MOST_CANDIDATES],
         }
     }

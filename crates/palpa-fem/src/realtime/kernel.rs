@@ -1,6 +1,6 @@
 //! The element of [`crate::element`] in lanes: sixteen pairs of prisms of one layer at once.
 //!
-//! The same energy, written for laws in the first isochoric invariant, `W = w(x)`, `x = Jb^(−2/3) |F^|² − 3`. All
+//! The same energy, written first for laws in the first isochoric invariant, `W = w(x)`, `x = Jb^(−2/3) |F^|² − 3`. All
 //! derivatives by `δF` go through the two `δJ_p`, so that the stiffness of a unit (two depth points, N nodes) is
 //!
 //! ```text
@@ -12,7 +12,9 @@
 //! σ_qp = (v_p − δ_qp s_q)/J_q    (δs_q = Σ_p σ_qp δJ_p)
 //! y_a,p = Σ_q [σ_qp (F M (m · B G^_a) + T m (M · G_a)) + v_p b'_q F^ G^_a] + ½ Σ_r D_pr j_a,r
 //! ```
-//! where `b = 2 V w' Jb^(−2/3)` and `D` collects what is quadratic in `δJ`. Derivation: `docs/theory/paired_prism.md`.
+//! where `b = 2 V w' Jb^(−2/3)` and `D` collects what is quadratic in `δJ`. Laws in principal stretches (`principal.rs`) have no
+//! `w`: their stress is part of `S`, and `Σ_q V_q ε_a,q : ∂S/∂E : ε_b,q` takes the place of the last sum, with `ε` the strain that
+//! goes with a node's displacement. Derivation: `docs/theory/paired_prism.md`.
 
 #![expect(
     clippy::inline_always,
@@ -23,6 +25,7 @@
 )]
 
 use super::lanes::Lanes;
+use super::principal::{Frame, PLACES, Six, respond};
 use crate::law::Hardening;
 
 /// Pairs in a batch.
@@ -54,7 +57,7 @@ pub(super) struct Geometry<E> {
 /// What a batch is made of, in this step.
 #[derive(Debug, Clone)]
 pub(super) struct Stiffness<E> {
-    /// `w'` at the points at rest, Pa; half the shear modulus.
+    /// Half the shear modulus at the points at rest, Pa; `w'` of laws in the first invariant.
     pub(super) slope: [Row<E>; N_POINTS],
     /// `K`, Pa.
     pub(super) bulk: Row<E>,
@@ -67,11 +70,11 @@ pub(super) struct Constant<E> {
     pub(super) pressure: Row<E>,
 }
 
-type V3<R> = [R; 3];
-type M3<R> = [[R; 3]; 3];
+pub(super) type V3<R> = [R; 3];
+pub(super) type M3<R> = [[R; 3]; 3];
 
 #[inline(always)]
-fn dot<R: Lanes>(a: &V3<R>, b: &V3<R>) -> R {
+pub(super) fn dot<R: Lanes>(a: &V3<R>, b: &V3<R>) -> R {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
@@ -86,7 +89,7 @@ fn cross<R: Lanes>(a: &V3<R>, b: &V3<R>) -> V3<R> {
 
 /// Rows of the matrix times the vector.
 #[inline(always)]
-fn mul<R: Lanes>(m: &M3<R>, v: &V3<R>) -> V3<R> {
+pub(super) fn mul<R: Lanes>(m: &M3<R>, v: &V3<R>) -> V3<R> {
     [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
 }
 
@@ -100,16 +103,36 @@ fn cofactor<R: Lanes>(f: &M3<R>) -> M3<R> {
 }
 
 #[inline(always)]
-fn scale<R: Lanes>(s: R, v: &V3<R>) -> V3<R> {
+pub(super) fn scale<R: Lanes>(s: R, v: &V3<R>) -> V3<R> {
     [s * v[0], s * v[1], s * v[2]]
 }
 
 #[inline(always)]
-fn axpy<R: Lanes>(s: R, v: &V3<R>, to: &V3<R>) -> V3<R> {
+pub(super) fn axpy<R: Lanes>(s: R, v: &V3<R>, to: &V3<R>) -> V3<R> {
     [
         s.mul_add(v[0], to[0]),
         s.mul_add(v[1], to[1]),
         s.mul_add(v[2], to[2]),
+    ]
+}
+
+/// `FᵀF`.
+#[inline(always)]
+fn cauchy_green<R: Lanes>(f: &M3<R>) -> Six<R> {
+    let mut six = [f[0][0]; 6];
+    for (c, (i, k)) in six.iter_mut().zip(PLACES) {
+        *c = f[0][i].mul_add(f[0][k], f[1][i].mul_add(f[1][k], f[2][i] * f[2][k]));
+    }
+    six
+}
+
+#[inline(always)]
+fn six_times<R: Lanes>(six: &Six<R>, v: &V3<R>) -> V3<R> {
+    let [xx, yy, zz, xy, yz, zx] = *six;
+    [
+        dot(v, &[xx, xy, zx]),
+        dot(v, &[xy, yy, yz]),
+        dot(v, &[zx, yz, zz]),
     ]
 }
 
@@ -380,6 +403,8 @@ impl<R: Lanes> Context<'_, R> {
         let (mut n, mut b, mut k) = ([zero; 2], [zero; 2], [zero; 2]);
         let mut second = [zero; 2];
         let mut weights = [zero; 2];
+        let mut own = [None; 2];
+        let mut frames: [Option<Frame<R>>; 2] = [None; 2];
         let mut beta = zero;
         for q in 0..2 {
             carried[q] = mul(&unit.f[q], thick);
@@ -393,15 +418,22 @@ impl<R: Lanes> Context<'_, R> {
             weights[q] = unit.weight * unit.volumes[q];
             let slope = R::load(self.token, &self.material.slope[unit.point + q][self.at..]);
             let base = weights[q] * slope;
+            own[q] = self.constant_at(unit.point + q);
+            if let Hardening::Powers(powers) = &self.hardening {
+                let (mut law, frame) = respond(self.token, powers, slope, &cauchy_green(&hat[q]));
+                if let Some(constant) = own[q] {
+                    for k in 0..6 {
+                        law[k] = law[k] + constant[k];
+                    }
+                }
+                own[q] = Some(law);
+                frames[q] = Some(frame);
+            }
             let [first, bend] = self.harden(y2.mul_add(n[q], self.splat(-3.0)));
             second[q] = base * bend;
             b[q] = self.splat(2.0) * base * first * y2;
             for r in 0..3 {
-                stress[q][r] = scale(b[q], &hat[q][r]);
-                if self.constant.is_some() {
-                    let product = self.constant_times(unit.point + q, &hat[q][r]);
-                    stress[q][r] = axpy(weights[q], &product, &stress[q][r]);
-                }
+                stress[q][r] = times_b(own[q].as_ref(), b[q], weights[q], &hat[q][r]);
             }
             across[q] = mul(&stress[q], normal);
             k[q] = dot(&across[q], &carried[q]);
@@ -460,7 +492,7 @@ impl<R: Lanes> Context<'_, R> {
         for q in 0..2 {
             slope_jb[q] = b[q] * inv_jb * self.splat(-2.0 / 3.0);
             let second_jb = b[q] * inv_jb * inv_jb * self.splat(5.0 / 9.0) * n[q];
-            let bent_normal = self.times_b(unit.point + q, b[q], weights[q], normal);
+            let bent_normal = times_b(own[q].as_ref(), b[q], weights[q], normal);
             let eta = dot(&carried[q], &carried[q]) * dot(normal, &bent_normal);
             kappa[q] = dot(&mul(&hat[q], normal), &carried[q]);
             let fall = k[q] * inv_j[q];
@@ -480,7 +512,7 @@ impl<R: Lanes> Context<'_, R> {
                 }
             }
             for a in 0..N {
-                bent[q][a] = self.times_b(unit.point + q, b[q], weights[q], &hats[q][a]);
+                bent[q][a] = times_b(own[q].as_ref(), b[q], weights[q], &hats[q][a]);
                 let one_way = scale(dot(normal, &bent[q][a]), &carried[q]);
                 passing[q][a] = axpy(along[q][a], &across[q], &one_way);
                 parallel[q][a] = mul(&hat[q], &hats[q][a]);
@@ -499,7 +531,10 @@ impl<R: Lanes> Context<'_, R> {
                 partner[p][a] = sum;
             }
         }
-        let hardens = self.hardening != Hardening::None;
+        let hardens = matches!(
+            self.hardening,
+            Hardening::Cubic { .. } | Hardening::Exponential { .. }
+        );
         let mut steep = [[[zero; 3]; N]; 2];
         if hardens {
             let two = self.splat(2.0);
@@ -513,6 +548,24 @@ impl<R: Lanes> Context<'_, R> {
                     }
                     steep[q][a] = sum;
                 }
+            }
+        }
+        // Strains of a node's displacements at the points, and their stresses, of laws in principal stretches.
+        let has_frames = frames[0].is_some();
+        let mut strains = [[[[zero; 3]; 6]; N]; 2];
+        let mut stresses = strains;
+        for q in 0..2 {
+            let Some(frame) = &frames[q] else { continue };
+            for a in 0..N {
+                let turn = axpy(
+                    sigma[q][0],
+                    &turned[0][a],
+                    &scale(sigma[q][1], &turned[1][a]),
+                );
+                let of_node =
+                    frame.strains(self.token, &hat[q], &carried[q], normal, &hats[q][a], &turn);
+                stresses[q][a] = frame.stresses(weights[q], &of_node);
+                strains[q][a] = of_node;
             }
         }
         let spin = [g[0] * inv_j[0], g[1] * inv_j[1]];
@@ -544,6 +597,14 @@ impl<R: Lanes> Context<'_, R> {
                                 sum = sharp[q][r].mul_add(steep[q][c][t], sum);
                             }
                         }
+                        if has_frames {
+                            for q in 0..2 {
+                                for k in 0..6 {
+                                    let (stress, strain) = (&stresses[q][a][k], &strains[q][c][k]);
+                                    sum = stress[r].mul_add(strain[t], sum);
+                                }
+                            }
+                        }
                         if let (Some(lifted), Some((_, gradient))) = (&lifted, bulk) {
                             sum = lifted[r].mul_add(gradient[columns][t], sum);
                         }
@@ -563,11 +624,12 @@ impl<R: Lanes> Context<'_, R> {
         }
     }
 
-    /// `w'` and `w''` relative to `w'` at rest.
+    /// `w'` and `w''` relative to `w'` at rest; none of laws in principal stretches.
     #[inline(always)]
     fn harden(&self, x: R) -> [R; 2] {
         match self.hardening {
             Hardening::None => [self.splat(1.0), self.splat(0.0)],
+            Hardening::Powers(_) => [self.splat(0.0); 2],
             Hardening::Cubic { a, b } => {
                 let (a2, b3) = (self.splat(2.0 * a), self.splat(3.0 * b));
                 let first = x.mul_add(x.mul_add(b3, a2), self.splat(1.0));
@@ -586,29 +648,25 @@ impl<R: Lanes> Context<'_, R> {
         }
     }
 
-    /// A row times the constant stress at a point.
+    /// The constant stress at a point, Pa.
     #[inline(always)]
-    fn constant_times(&self, point: usize, row: &V3<R>) -> V3<R> {
-        let Some(constant) = self.constant else {
-            return *row;
-        };
-        let s = |i: usize| R::load(self.token, &constant.stress[point][i][self.at..]);
-        let [xx, yy, zz, xy, yz, zx] = [s(0), s(1), s(2), s(3), s(4), s(5)];
-        [
-            dot(row, &[xx, xy, zx]),
-            dot(row, &[xy, yy, yz]),
-            dot(row, &[zx, yz, zz]),
-        ]
-    }
-
-    /// `B` times a vector.
-    #[inline(always)]
-    fn times_b(&self, point: usize, b: R, weight: R, v: &V3<R>) -> V3<R> {
-        let own = scale(b, v);
-        if self.constant.is_none() {
-            return own;
+    fn constant_at(&self, point: usize) -> Option<Six<R>> {
+        let rows = &self.constant?.stress[point];
+        let mut stress = [self.splat(0.0); 6];
+        for (k, row) in rows.iter().enumerate() {
+            stress[k] = R::load(self.token, &row[self.at..]);
         }
-        axpy(weight, &self.constant_times(point, v), &own)
+        Some(stress)
+    }
+}
+
+/// `B` times a vector: `b` times it, and `weight` times what a stress makes of it.
+#[inline(always)]
+fn times_b<R: Lanes>(stress: Option<&Six<R>>, b: R, weight: R, v: &V3<R>) -> V3<R> {
+    let own = scale(b, v);
+    match stress {
+        Some(stress) => axpy(weight, &six_times(stress, v), &own),
+        None => own,
     }
 }
 
@@ -684,21 +742,23 @@ pub(super) fn elastic<R: Lanes>(
             for r in 0..3 {
                 hat[r] = axpy(excess * carried[r], &normal, &f[q][r]);
             }
-            // C = F^ᵀ F^, its cofactor, and J² = Jb².
-            let column = |c: usize| [hat[0][c], hat[1][c], hat[2][c]];
-            let columns = [column(0), column(1), column(2)];
-            let c: M3<R> =
-                std::array::from_fn(|i| std::array::from_fn(|k| dot(&columns[i], &columns[k])));
-            let n = c[0][0] + c[1][1] + c[2][2];
-            let cof = cofactor(&c);
             let slope = load(&material.slope[point + q]);
+            let six = cauchy_green(&hat);
+            if let Hardening::Powers(powers) = &hardening {
+                let (law, _) = respond(token, powers, slope, &six);
+                for (row, law) in out.stress[point + q].iter_mut().zip(law) {
+                    law.store(&mut row[at..]);
+                }
+                continue;
+            }
+            // C's cofactor, and J² = Jb².
+            let [xx, yy, zz, xy, yz, zx] = six;
+            let n = xx + yy + zz;
+            let cof = cofactor(&[[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]);
             let [first, _] = context.harden(y2.mul_add(n, splat(-3.0)));
             let b = splat(2.0) * slope * first * y2;
             let fall = n * splat(-1.0 / 3.0) * inv_jb2;
-            for (k, (i, l)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
-                .into_iter()
-                .enumerate()
-            {
+            for (k, (i, l)) in PLACES.into_iter().enumerate() {
                 let unit = if i == l { one } else { zero };
                 (b * fall.mul_add(cof[i][l], unit)).store(&mut out.stress[point + q][k][at..]);
             }

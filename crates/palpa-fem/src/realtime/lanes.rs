@@ -6,6 +6,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 use palpa_sparse::fronts::Number;
 use pulp::Simd;
 
+/// Numbers of the widest vector.
+const WIDTH: usize = 16;
+
 /// A vector of numbers of the kernel's precision.
 pub(super) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
@@ -16,6 +19,8 @@ pub(super) trait Lanes:
     type Token: Copy;
     /// How many there are.
     const N: usize;
+    /// Distance of 1 to the next number.
+    const EPSILON: f64;
 
     fn splat(token: Self::Token, x: f64) -> Self;
     /// The first [`Self::N`] of a slice.
@@ -26,11 +31,19 @@ pub(super) trait Lanes:
     fn divided_by(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
+    fn sqrt(self) -> Self;
+    /// `then` where `self < other`, `otherwise` elsewhere.
+    fn select_less(self, other: Self, then: Self, otherwise: Self) -> Self;
+    /// `m` of √½ to √2 and the whole number `k` with `self = m 2^k`; of positive normal numbers.
+    fn split(self) -> [Self; 2];
+    /// `2^self` of whole numbers that a normal number can have as exponent.
+    fn power_of_two(self) -> Self;
 }
 
 macro_rules! lanes {
     ($name:ident, $element:ty, $vector:ident, $as_simd:ident, $as_mut_simd:ident,
-     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $min:ident, $max:ident, $mul_add:ident) => {
+     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $min:ident, $max:ident, $mul_add:ident,
+     $sqrt:ident, $less_than:ident, $select:ident, $signed:ident, $mantissa:expr, $bias:expr) => {
         /// The machine's vector of this precision.
         #[derive(Clone, Copy)]
         pub(super) struct $name<S: Simd> {
@@ -81,6 +94,7 @@ macro_rules! lanes {
             type Element = $element;
             type Token = S;
             const N: usize = size_of::<S::$vector>() / size_of::<$element>();
+            const EPSILON: f64 = <$element>::EPSILON as f64;
 
             #[inline(always)]
             fn splat(simd: S, x: f64) -> Self {
@@ -122,6 +136,42 @@ macro_rules! lanes {
             fn max(self, other: Self) -> Self {
                 self.with(self.simd.$max(self.v, other.v))
             }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.with(self.simd.$sqrt(self.v))
+            }
+
+            #[inline(always)]
+            fn select_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+                let mask = self.simd.$less_than(self.v, other.v);
+                self.with(self.simd.$select(mask, then.v, otherwise.v))
+            }
+
+            #[inline(always)]
+            fn split(self) -> [Self; 2] {
+                let least = <$element>::to_bits(std::f64::consts::FRAC_1_SQRT_2 as $element);
+                let (mut m, mut k) = ([0.0; WIDTH], [0.0; WIDTH]);
+                self.store(&mut m);
+                for (m, k) in m.iter_mut().zip(&mut k).take(Self::N) {
+                    let bits = m.to_bits();
+                    let exponent = bits.wrapping_sub(least).cast_signed() >> $mantissa;
+                    *k = f32::from(exponent as i16).into();
+                    *m = <$element>::from_bits(bits.wrapping_sub((exponent << $mantissa) as _));
+                }
+                [Self::load(self.simd, &m), Self::load(self.simd, &k)]
+            }
+
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                let mut k = [0.0; WIDTH];
+                self.store(&mut k);
+                for k in k.iter_mut().take(Self::N) {
+                    let exponent = <$signed>::from(*k as i32 + $bias);
+                    *k = <$element>::from_bits((exponent << $mantissa) as _);
+                }
+                Self::load(self.simd, &k)
+            }
         }
     };
 }
@@ -140,7 +190,13 @@ lanes!(
     neg_f64s,
     min_f64s,
     max_f64s,
-    mul_add_e_f64s
+    mul_add_e_f64s,
+    sqrt_f64s,
+    less_than_f64s,
+    select_f64s,
+    i64,
+    52,
+    1023
 );
 lanes!(
     Singles,
@@ -156,5 +212,11 @@ lanes!(
     neg_f32s,
     min_f32s,
     max_f32s,
-    mul_add_e_f32s
+    mul_add_e_f32s,
+    sqrt_f32s,
+    less_than_f32s,
+    select_f32s,
+    i32,
+    23,
+    127
 );

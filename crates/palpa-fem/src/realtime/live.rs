@@ -12,22 +12,26 @@ use super::zone::{Follower, Inside, Outside, Plan, Trouble, Workshop};
 use super::{MOST_CANDIDATES, column_pattern};
 use crate::contact::PosedTool;
 use crate::error::FemError;
+use crate::law::Prony;
 use crate::model::Model;
 use crate::state::{Memory, State};
 
 /// First spring that holds vertices under a tool where the free body is not stable, relative to their own stiffness, its
-/// growth, the largest, and the steps after which a smaller one is tried.
+/// growth, the largest, and the least and most iterations after which a smaller one is tried: twice as many each time that it does
+/// not do.
 const FIRST_SPRING: f64 = 0.03;
 const SPRING_GROWTH: f64 = 3.0;
 const MOST_SPRING: f64 = 10.0;
-const SPRING_PATIENCE: u32 = 20;
+const SPRING_PATIENCE: [u32; 2] = [2, 32];
+/// How near to the edge of its zone what presses may come, as a share of the radius, before tools are followed no farther that way.
+const EDGE: f64 = 0.95;
 /// Growth of the zone's radius where vertices of its ring press.
 const ZONE_GROWTH: f64 = 1.3;
 /// Share of an iteration below which it has failed.
 const LEAST_SHARE: f64 = 0.05;
 /// Residual above which tools are followed more slowly, and that above which a step has lost the body; the slowest.
-const ROUGH: f64 = 0.5;
-const LOST: f64 = 3.0;
+const ROUGH: f64 = 0.1;
+const LOST: f64 = 0.6;
 const LEAST_PACE: f64 = 1.0 / 64.0;
 /// Failed steps in a row after which a body begins again at rest; by how much its tools are lifted from it at a time, m, and
 /// how often.
@@ -39,6 +43,13 @@ const LEAST_FORCE: f64 = 0.01;
 /// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
 const FASTEST: f64 = 0.1;
 const LEAST_REACH: f64 = 0.2e-3;
+/// Time after which a linear exterior that remembers is asked to be brought up to date, as a share of its shortest time of
+/// relaxation, and its limits, s.
+const LAG_SHARE: f64 = 0.5;
+const LAGS: [f64; 2] = [0.01, 0.05];
+/// Vertices beside those that press that are candidates at most, and how many may be candidates anyway.
+const MOST_NEAR: usize = 24;
+const LEAST_CANDIDATES: usize = 60;
 
 /// How a moving step goes about its work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,11 +62,6 @@ pub struct LiveParams {
     pub max_iterations: usize,
     /// Forces out of balance, as a share of the tools', above which a step takes another iteration.
     pub tolerance: f64,
-    /// Forces out of balance after the last step, as a share of the tools', below which the zone's stiffness of that step
-    /// serves again; 0 makes it anew in every step.
-    pub reuse: f64,
-    /// Most steps that one stiffness of the zone serves.
-    pub longest_reuse: u32,
     /// Gap up to which vertices are candidates for contact, m.
     pub reach: f64,
     /// How far the tool may go from the zone's centre before a new zone is asked for, as a share of the radius.
@@ -73,13 +79,23 @@ impl Default for LiveParams {
             zone_radius: 15e-3,
             exterior: ExteriorMode::Followed,
             max_iterations: 2,
-            tolerance: 0.02,
-            reuse: 0.0,
-            longest_reuse: 4,
+            tolerance: 0.01,
             reach: 1.5e-3,
-            leave: 0.3,
+            leave: 0.2,
             longest_move: 3e-3,
             stale: 1e-3,
+        }
+    }
+}
+
+impl LiveParams {
+    /// How far a tool may go while a job is under way, m: out of the zone's middle, or as far as the stiffness of a followed
+    /// exterior serves.
+    pub fn longest_way(&self) -> f64 {
+        let way = self.leave * self.zone_radius;
+        match self.exterior {
+            ExteriorMode::Followed => way.min(self.stale),
+            ExteriorMode::Linear => way,
         }
     }
 }
@@ -100,8 +116,8 @@ pub enum StepOutcome {
     Arrived,
     /// On the way there: it was too far for one step. The local model is that of the place reached.
     Behind,
-    /// Part of the way only, because tissue would have been turned inside out: the next steps go on from here, and the local
-    /// model is none to be felt.
+    /// Part of the way only, because tissue would have been turned inside out, or far from equilibrium, or with a matrix that had
+    /// to be changed to be factored: the next steps go on from here, and the local model is none to be felt.
     BackedOff,
     /// Nowhere; the state is the last good one, and the tools are followed more slowly from there.
     Failed,
@@ -122,8 +138,6 @@ pub struct LiveReport {
     pub n_candidates: usize,
     /// Shift of the diagonal that the zone's stiffness needed, relative.
     pub shift: f32,
-    /// Whether the zone's stiffness was made anew.
-    pub is_anew: bool,
     /// Springs that held the vertices under the tools while it was solved, relative to the skin's own stiffness. Their
     /// forces are taken out again.
     pub spring: f64,
@@ -217,7 +231,7 @@ impl Rebuild {
         if let Some((plan, old)) = &self.old {
             let mut scratch = palpa_sparse::fronts::SolveScratch::new(&plan.tree);
             let x = &mut shop.workshop.x;
-            old.settle(model, plan, &mut self.displacements, x, &mut scratch);
+            old.settle(model, plan, None, &mut self.displacements, x, &mut scratch);
         }
         if let Some(mut history) = self.history.take() {
             let is_linear = self.old.is_some();
@@ -318,9 +332,6 @@ pub struct Live {
     moves: Vec<f32>,
     before: Vec<Vec3>,
     tools: Vec<PosedTool>,
-    /// Steps that the zone's stiffness has served, and forces out of balance after the last, relative.
-    age: u32,
-    balance: f64,
     /// The last state of the zone that was near equilibrium, and the share of the longest move that a step may make from
     /// where it is now.
     good: Vec<Vec3>,
@@ -331,16 +342,30 @@ pub struct Live {
     n_failed: u32,
     /// Least gap between tools and the zone's skin, m.
     clearance: f64,
-    /// Springs under the tools, relative to the skin's stiffness, and the steps since they were changed.
+    /// Springs under the tools, relative to the skin's stiffness, the iterations since they were changed, and those after which
+    /// smaller ones are tried.
     spring: f64,
     spring_age: u32,
+    spring_patience: u32,
     job: Option<Rebuild>,
     is_job_out: bool,
     n_jobs: u64,
     n_zones: u64,
+    /// Steps since the job was asked for, and those that the last one took.
+    job_age: u32,
+    latency: u32,
+    /// How far the tools go in a step, smoothed, m.
+    drift: Vec3,
     depth_at_factor: f64,
-    /// Time that a linear exterior's memory is behind, s.
+    /// Time that a linear exterior's memory is behind, and may be, s.
     lag: f64,
+    longest_lag: f64,
+}
+
+/// What presses: its middle at rest, weighted with the forces, m, and their direction.
+struct Pressed {
+    middle: Vec3,
+    along: Vec3,
 }
 
 impl Live {
@@ -402,19 +427,22 @@ impl Live {
             good: vec![Vec3::zeros(); n],
             good_pressures: vec![0.0; n_vertices],
             good_tools: tools.to_vec(),
-            age: u32::MAX,
-            balance: f64::INFINITY,
             pace: 1.0,
             n_failed: 0,
             clearance: 0.0,
             spring: 0.0,
             spring_age: 0,
+            spring_patience: SPRING_PATIENCE[0],
             job: None,
             is_job_out: false,
             n_jobs: 0,
             n_zones: 1,
+            job_age: 0,
+            latency: 0,
+            drift: Vec3::zeros(),
             depth_at_factor: 0.0,
             lag: 0.0,
+            longest_lag: longest_lag(&model),
             model,
             pattern,
             params,
@@ -465,6 +493,7 @@ impl Live {
     /// Follows the tools, as many as it was made with, to where they are now. `dt` is the time since the last step, s.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let is_short = self.move_tools(tools);
+        self.job_age = self.job_age.saturating_add(1);
         self.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
         if self.model.has_memory {
             let (model, state) = (&*self.model, &self.state);
@@ -487,14 +516,15 @@ impl Live {
             n_active: 0,
             n_candidates: 0,
             shift: 0.0,
-            is_anew: false,
             spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
         };
         while report.iterations < self.params.max_iterations {
+            // Once the first iteration has come near, its stiffness and contact directions serve.
+            let is_near = report.iterations > 0 && report.residual < ROUGH && report.shift == 0.0;
             report.iterations += 1;
-            match self.iterate(dt, &mut report) {
+            match self.iterate(dt, is_near, &mut report) {
                 Ok(()) if report.residual <= self.params.tolerance => break,
                 Ok(()) => {}
                 Err(_) => {
@@ -503,10 +533,12 @@ impl Live {
                 }
             }
         }
-        if report.residual.is_nan() || report.residual > LOST {
+        let is_lost = report.outcome == StepOutcome::Failed
+            || report.residual.is_nan()
+            || report.residual > LOST;
+        // What has failed goes back to where the exterior is known.
+        if is_lost || self.bring_exterior().is_err() {
             report.outcome = StepOutcome::Failed;
-        }
-        if report.outcome == StepOutcome::Failed {
             self.n_failed += 1;
             if self.n_failed < MOST_FAILED {
                 self.return_to_good();
@@ -514,7 +546,8 @@ impl Live {
                 self.start_again();
             }
             self.pace = (self.pace * 0.25).max(LEAST_PACE);
-        } else if report.residual > ROUGH {
+        } else if report.residual > ROUGH || report.shift > 0.0 {
+            report.outcome = StepOutcome::BackedOff;
             self.pace = (self.pace * 0.5).max(LEAST_PACE);
         } else {
             self.pace = (self.pace * 2.0).min(1.0);
@@ -566,7 +599,6 @@ impl Live {
         self.spring = 0.0;
         self.is_fresh = false;
         self.is_outside_fresh = false;
-        self.age = u32::MAX;
     }
 
     /// Begins at rest, with the tools off the skin: from the last good state there is no way on.
@@ -578,7 +610,6 @@ impl Live {
         self.spring = 0.0;
         self.is_fresh = false;
         self.is_outside_fresh = false;
-        self.age = u32::MAX;
         self.depth_at_factor = f64::INFINITY;
         let body = &self.model.body;
         let (_, vertex) = nearest_vertex(&self.model, &self.state.displacements, &self.tools, None);
@@ -604,9 +635,20 @@ impl Live {
 
     /// Moves the tools, no farther than one step may; returns whether that is short of where they were to go.
     fn move_tools(&mut self, tools: &[PosedTool]) -> bool {
+        /// Share of the last step in the smoothed one.
+        const NEW: f64 = 0.2;
         debug_assert_eq!(self.tools.len(), tools.len());
         let mut is_short = false;
+        let held = self.held_direction();
+        let before: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
         for (tool, target) in self.tools.iter_mut().zip(tools) {
+            let mut target = *target;
+            let way = target.pose.translation.vector - tool.pose.translation.vector;
+            let outward = held.map_or(0.0, |outward| outward.dot(&way));
+            if let (Some(direction), true) = (held, outward > 0.0) {
+                is_short = true;
+                target.pose.translation.vector -= direction * outward;
+            }
             let way = (target.pose.translation.vector - tool.pose.translation.vector).norm();
             let most = (self.params.longest_move * self.pace).max(self.clearance);
             let pose = if way <= most {
@@ -620,32 +662,64 @@ impl Live {
                 pose,
             };
         }
+        let after: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
+        let way = (after - before) / self.tools.len().max(1) as f64;
+        self.drift += (way - self.drift) * NEW;
         is_short
     }
 
+    /// Where what presses has come to the edge of the zone and none is there to take over: the direction across the skin in which
+    /// tools are not followed, for there they would press what is no candidate.
+    fn held_direction(&self) -> Option<Vec3> {
+        if self.plan.exterior.is_empty()
+            || self.contact_radius(self.plan.centre) < EDGE * self.plan.radius
+        {
+            return None;
+        }
+        let pressed = self.pressed()?;
+        let out = pressed.middle - self.plan.centre;
+        let out = out - pressed.along * pressed.along.dot(&out);
+        out.try_normalize(1e-9)
+    }
+
+    /// The middle of what presses.
+    fn pressed(&self) -> Option<Pressed> {
+        let points = &self.model.body.skin.points;
+        let (mut force, mut middle, mut along) = (0.0, Vec3::zeros(), Vec3::zeros());
+        for candidate in &self.problem.candidates {
+            force += candidate.pressure;
+            middle += points[candidate.vertex as usize] * candidate.pressure;
+            along += candidate.normal * candidate.pressure;
+        }
+        (force > 0.0).then(|| Pressed {
+            middle: middle / force,
+            along: along.normalize(),
+        })
+    }
+
     /// One Newton iteration. After an error the state is none to go on from.
-    fn iterate(&mut self, dt: f64, report: &mut LiveReport) -> Result<(), Trouble> {
-        let (model, plan) = (Arc::clone(&self.model), Arc::clone(&self.plan));
+    fn iterate(&mut self, dt: f64, is_near: bool, report: &mut LiveReport) -> Result<(), Trouble> {
+        let plan = Arc::clone(&self.plan);
         if !self.is_fresh {
             self.internal_forces()?;
         }
         if !self.is_outside_fresh {
             self.follow()?;
         }
-        self.find_candidates(dt);
-        let may_serve = self.age < self.params.longest_reuse && self.balance < self.params.reuse;
-        if may_serve && self.spring == 0.0 {
-            self.age += 1;
+        if is_near {
+            self.measure_gaps();
         } else {
-            self.age = u32::MAX;
+            self.find_candidates(dt);
             self.refactor(report)?;
-            self.age = 1;
-            report.is_anew = true;
         }
         self.right_side();
         self.inside.substitute(&plan, &mut self.x);
+        if !is_near {
+            self.inside
+                .comply(&plan, self.has_friction, &mut self.problem);
+        }
         self.inside
-            .prepare(&plan, &self.x, self.has_friction, &mut self.problem);
+            .project(&plan, &self.x, self.has_friction, &mut self.problem);
         self.problem.solve(&self.tools, self.has_friction);
         self.inside.push(&plan, &self.problem, &mut self.x);
         self.inside.back_substitute(&plan, &mut self.x);
@@ -666,17 +740,6 @@ impl Live {
             }
         }
         self.accept_contact(share);
-        if let Some(follower) = &mut self.follower {
-            let x = &mut self.moves;
-            self.outside.settle(
-                &model,
-                &plan,
-                &mut self.state.displacements,
-                x,
-                &mut follower.solve,
-            );
-        }
-        self.follow()?;
         report.n_candidates = self.problem.candidates.len();
         report.n_active = self
             .problem
@@ -685,8 +748,24 @@ impl Live {
             .filter(|c| c.pressure > 0.0)
             .count();
         report.residual = self.residual();
-        self.balance = report.residual;
         Ok(())
+    }
+
+    /// Where the exterior is followed: its displacements and forces with those of the ring, once a step. Within the step it answers
+    /// linearly.
+    fn bring_exterior(&mut self) -> Result<(), Trouble> {
+        let Some(follower) = &mut self.follower else {
+            return Ok(());
+        };
+        self.outside.settle(
+            &self.model,
+            &self.plan,
+            None,
+            &mut self.state.displacements,
+            &mut self.moves,
+            &mut follower.solve,
+        );
+        self.follow()
     }
 
     /// Where the exterior is followed: its forces at the present displacements.
@@ -728,14 +807,16 @@ impl Live {
             .map(|c| c.vertex);
         let size = inside.skin_stiffness(pattern, pressed);
         self.spring_age += 1;
-        if self.spring > 0.0 && self.spring_age > SPRING_PATIENCE {
+        let mut is_less = false;
+        if self.spring > 0.0 && self.spring_age > self.spring_patience {
             self.spring_age = 0;
+            is_less = true;
             self.spring /= SPRING_GROWTH;
             if self.spring < 0.5 * FIRST_SPRING {
                 self.spring = 0.0;
             }
         }
-        let mut there = 0.0;
+        let (mut there, usual) = (0.0, self.spring);
         loop {
             let springs = self.spring * size;
             for candidate in &mut self.problem.candidates {
@@ -752,11 +833,22 @@ impl Live {
                 Ok(shift) => {
                     report.shift = report.shift.max(shift);
                     report.spring = self.spring;
+                    if shift > 0.0 {
+                        // Springs were no help; kept, they would hold the skin stiff for a hundred steps.
+                        self.spring = usual;
+                    }
+                    if self.spring == 0.0 {
+                        self.spring_patience = SPRING_PATIENCE[0];
+                    }
                     return Ok(());
                 }
                 Err(trouble) if may_shift => return Err(trouble),
                 Err(_) => {
                     self.spring_age = 0;
+                    if is_less {
+                        is_less = false;
+                        self.spring_patience = (2 * self.spring_patience).min(SPRING_PATIENCE[1]);
+                    }
                     self.spring = (self.spring * SPRING_GROWTH).max(FIRST_SPRING);
                 }
             }
@@ -842,13 +934,9 @@ impl Live {
                 self.model.supports[node].free_part(&force).norm_squared()
             })
             .sum();
-        let size: f64 = self
-            .problem
-            .candidates
-            .iter()
-            .map(|c| c.force().norm_squared())
-            .sum();
-        ((sum + skin) / size.max(LEAST_FORCE * LEAST_FORCE)).sqrt()
+        let candidates = self.problem.candidates.iter();
+        let size: f64 = candidates.map(|c| c.force().norm()).sum();
+        (sum + skin).sqrt() / size.max(LEAST_FORCE)
     }
 
     /// Vertices of the zone that press or are near a tool, those nearest first.
@@ -906,7 +994,9 @@ impl Live {
                 displacement: Vec3::zeros(),
             });
         }
-        if candidates.len() > MOST_CANDIDATES {
+        let n_pressing = candidates.iter().filter(|c| c.pressure > 0.0).count();
+        let most = (n_pressing + MOST_NEAR).clamp(LEAST_CANDIDATES, MOST_CANDIDATES);
+        if candidates.len() > most {
             let order = |c: &Candidate| {
                 if c.pressure > 0.0 {
                     f64::NEG_INFINITY
@@ -914,16 +1004,30 @@ impl Live {
                     c.gap
                 }
             };
-            candidates.select_nth_unstable_by(MOST_CANDIDATES - 1, |a, b| {
+            candidates.select_nth_unstable_by(most - 1, |a, b| {
                 order(a).total_cmp(&order(b)).then(a.vertex.cmp(&b.vertex))
             });
-            for lost in &candidates[MOST_CANDIDATES..] {
+            for lost in &candidates[most..] {
                 self.pressures[lost.vertex as usize] = 0.0;
                 self.frictions[lost.vertex as usize] = Vec3::zeros();
             }
-            candidates.truncate(MOST_CANDIDATES);
+            candidates.truncate(most);
         }
         candidates.sort_unstable_by_key(|c| c.vertex);
+    }
+
+    /// Where candidates are now; their normals stay those that the compliance is along.
+    fn measure_gaps(&mut self) {
+        for candidate in &mut self.problem.candidates {
+            let vertex = candidate.vertex as usize;
+            let node = self.model.body.node(vertex, 0);
+            let PosedTool { tool, pose } = &self.tools[candidate.tool as usize];
+            candidate.start = self.model.body.positions[node] + self.state.displacements[node];
+            candidate.gap = tool.distance_at(pose, &candidate.start).distance;
+            candidate.pressure = self.pressures[vertex];
+            candidate.friction = self.frictions[vertex];
+            candidate.displacement = Vec3::zeros();
+        }
     }
 
     /// Takes over a share of what contact has found.
@@ -962,25 +1066,16 @@ impl Live {
             .iter()
             .any(|c| c.pressure > 0.0 && self.plan.tree.first_dof(c.vertex as usize) >= ring);
         let radius = self.plan.radius;
-        let displacements = &self.state.displacements;
-        let near = nearest_point(
-            &self.model,
-            displacements,
-            &self.tools,
-            Some(&self.plan.vertices),
-        );
-        let (_, centre) = if near.0 < radius {
-            near
-        } else {
-            nearest_point(&self.model, displacements, &self.tools, None)
-        };
+        let centre = self.next_centre();
         let is_leaving = (centre - self.plan.centre).norm() > self.params.leave * radius;
         let depth = self.depth();
-        let is_stale = (depth - self.depth_at_factor).abs() > self.params.stale;
+        let is_stale =
+            (depth - self.depth_at_factor).abs() > self.params.stale || self.lag > self.longest_lag;
         if !(is_leaving || is_stale || reaches_ring) {
             return;
         }
         self.n_jobs += 1;
+        self.job_age = 0;
         self.depth_at_factor = depth;
         let plan = if is_leaving || reaches_ring {
             let mut radius = self
@@ -1045,6 +1140,28 @@ impl Live {
         batches.begin_others(&self.model, &mut self.memory, &self.state);
     }
 
+    /// Where a zone is to be that is asked for now: at rest, the middle of what presses, and as far ahead as it will go on
+    /// until the zone is there.
+    fn next_centre(&self) -> Vec3 {
+        let Some(Pressed { middle, along }) = self.pressed() else {
+            let displacements = &self.state.displacements;
+            let near = nearest_point(
+                &self.model,
+                displacements,
+                &self.tools,
+                Some(&self.plan.vertices),
+            );
+            if near.0 < self.plan.radius {
+                return near.1;
+            }
+            return nearest_point(&self.model, displacements, &self.tools, None).1;
+        };
+        let lead = self.drift * f64::from(self.latency);
+        let lead = lead - along * along.dot(&lead);
+        let most = self.params.leave * self.plan.radius;
+        middle + lead * (most / lead.norm()).min(1.0)
+    }
+
     /// How far from a point of the skin at rest vertices press, m.
     fn contact_radius(&self, centre: Vec3) -> f64 {
         let points = &self.model.body.skin.points;
@@ -1066,12 +1183,16 @@ impl Live {
 
     /// Brings the displacements outside the zone up to date. Cost: a substitution through the exterior, and memory.
     pub fn settle(&mut self) {
+        self.settle_columns(None);
+    }
+
+    fn settle_columns(&mut self, only: Option<&[u32]>) {
         let mut scratch = palpa_sparse::fronts::SolveScratch::new(&self.plan.tree);
-        let displacements = &mut self.state.displacements;
         self.outside.settle(
             &self.model,
             &self.plan,
-            displacements,
+            only,
+            &mut self.state.displacements,
             &mut self.moves,
             &mut scratch,
         );
@@ -1087,15 +1208,16 @@ impl Live {
     /// Takes over what came of a job.
     pub fn install(&mut self, done: Rebuilt) {
         self.is_job_out = false;
+        self.latency = self.job_age;
         self.shop = Some(done.shop);
         let Some(outside) = done.outside else { return };
-        // What was in no zone until now is where the job found it.
-        for (v, was_inside) in self.plan.is_inside.iter().enumerate() {
-            if !was_inside {
-                let first = self.model.body.node(v, 0);
-                let column = first..first + self.model.body.n_levels;
-                self.state.displacements[column.clone()].copy_from_slice(&outside.at[column]);
-            }
+        if done.inside.is_some() && self.follower.is_none() {
+            // What was in no zone until now is where the old exterior puts it.
+            let entering = done.plan.vertices.iter().copied();
+            let entering: Vec<u32> = entering
+                .filter(|&v| !self.plan.is_inside[v as usize])
+                .collect();
+            self.settle_columns(Some(&entering));
         }
         self.plan = done.plan;
         self.retired = Some(std::mem::replace(&mut self.outside, outside));
@@ -1120,7 +1242,19 @@ impl Live {
         }
         self.is_fresh = false;
         self.is_outside_fresh = false;
-        self.age = u32::MAX;
+    }
+}
+
+fn longest_lag(model: &Model) -> f64 {
+    let materials = model.materials.iter().filter_map(|m| m.prony.as_ref());
+    let shortest = materials
+        .flat_map(Prony::terms)
+        .map(|term| term.tau)
+        .fold(f64::INFINITY, f64::min);
+    if shortest.is_finite() {
+        (LAG_SHARE * shortest).clamp(LAGS[0], LAGS[1])
+    } else {
+        f64::INFINITY
     }
 }
 

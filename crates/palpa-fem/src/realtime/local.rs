@@ -65,6 +65,9 @@ impl LocalModel {
     }
 }
 
+/// Pivot below which a body without its supports counts as not stable, relative to what it would be on its own.
+const LEAST_RELEASE: f64 = 0.05;
+
 /// One or two candidates, and their share of the force.
 #[derive(Clone, Copy)]
 struct Cluster {
@@ -88,6 +91,7 @@ impl ContactProblem {
         }; MOST_CANDIDATES];
         let n = self.clusters(skin, most, &mut clusters);
         let clusters = &clusters[..n];
+        self.release(has_friction);
         out.contacts.clear();
         out.contacts.extend(clusters.iter().map(|cluster| {
             let members = cluster.members.map(|m| &self.candidates[m]);
@@ -160,11 +164,81 @@ impl ContactProblem {
         }
     }
 
-    fn full_block(&self, i: usize, j: usize, has_friction: bool) -> Mat3 {
-        if has_friction {
-            return self.block(i, j);
+    /// Makes the compliance without the supports, which only the step's matrix has: with those of the vertices that have one in
+    /// `N`,
+    ///
+    /// ```text
+    /// W + W N (1/κ − Nᵀ W N)⁻¹ Nᵀ W
+    /// ```
+    /// Where the free body is not stable this is no compliance of anything, and as much of the supports is left as it takes.
+    fn release(&mut self, has_friction: bool) {
+        /// Shares of the supports that are tried to be left out.
+        const SHARES: [f64; 5] = [1.0, 0.9, 0.7, 0.4, 0.1];
+        let (n, per) = (self.candidates.len(), if has_friction { 3 } else { 1 });
+        let size = per * n;
+        self.released[..size * size].copy_from_slice(&self.compliance[..size * size]);
+        let mut rows = [0; MOST_CANDIDATES];
+        let mut m = 0;
+        for (i, candidate) in self.candidates.iter().enumerate() {
+            if candidate.support > 0.0 {
+                rows[m] = i;
+                m += 1;
+            }
         }
-        let along = self.compliance[i + self.candidates.len() * j];
+        let rows = &rows[..m];
+        let (candidates, along) = (&self.candidates, &self.along);
+        let is_stable = SHARES.iter().any(|share| {
+            let entry = |r: usize, c: usize| {
+                let own = if r == c {
+                    1.0 / (share * candidates[rows[r]].support)
+                } else {
+                    0.0
+                };
+                own - along[rows[r] + n * rows[c]]
+            };
+            factor_symmetric(m, entry, &mut self.factor)
+                && (0..m).all(|r| self.factor[r * m + r] > LEAST_RELEASE * entry(r, r))
+        });
+        if !is_stable {
+            return;
+        }
+        // Column r of the spread: what a push along the normal of row r moves.
+        for (r, &i) in rows.iter().enumerate() {
+            for k in 0..size {
+                self.spread[k + size * r] = if has_friction {
+                    let normal = &self.candidates[i].normal;
+                    (0..3)
+                        .map(|c| self.compliance[k + size * (3 * i + c)] * normal[c])
+                        .sum()
+                } else {
+                    self.compliance[k + size * i]
+                };
+            }
+        }
+        for j in 0..size {
+            let mut x = [0.0; MOST_CANDIDATES];
+            for (r, x) in x[..m].iter_mut().enumerate() {
+                *x = self.spread[j + size * r];
+            }
+            substitute_symmetric(m, &self.factor, &mut x[..m]);
+            for (r, x) in x[..m].iter().enumerate() {
+                let spread = &self.spread[size * r..size * (r + 1)];
+                let column = &mut self.released[size * j..size * (j + 1)];
+                for (w, s) in column.iter_mut().zip(spread) {
+                    *w += x * s;
+                }
+            }
+        }
+    }
+
+    /// A block of the compliance without supports.
+    fn full_block(&self, i: usize, j: usize, has_friction: bool) -> Mat3 {
+        let n = self.candidates.len();
+        if has_friction {
+            let n = 3 * n;
+            return Mat3::from_fn(|r, c| self.released[3 * i + r + n * (3 * j + c)]);
+        }
+        let along = self.released[i + n * j];
         self.candidates[i].normal * self.candidates[j].normal.transpose() * along
     }
 

@@ -8,10 +8,12 @@
 
 mod batch;
 mod contact;
+mod elementary;
 mod kernel;
 mod lanes;
 mod live;
 mod local;
+mod principal;
 #[cfg(test)]
 mod tests;
 mod zone;

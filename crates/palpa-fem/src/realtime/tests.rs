@@ -4,7 +4,10 @@ use super::batch::{Batches, History};
 use super::column_pattern;
 use crate::assembly::assemble;
 use crate::columns::SurfaceGroup;
-use crate::law::{Fung, Law, Moduli, MooneyRivlin, NeoHookean, Prony, PronyTerm, Volumetric, Yeoh};
+use crate::law::{
+    Fung, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm,
+    StVenantKirchhoff, Volumetric, Yeoh,
+};
 use crate::model::Model;
 use crate::state::Memory;
 use crate::{Mat3, Material, Materials, ModelParams, State, Supports};
@@ -69,27 +72,59 @@ fn cases() -> Vec<(&'static str, Materials)> {
         Yeoh::from_young(10e3, 0.45, [0.5, 2.0]).unwrap().into(),
         soft(30e3),
     ];
-    let log = Volumetric::Logarithmic { bulk: 3e5 };
-    let strange = [
+    let term = |mu, alpha| OgdenTerm { mu, alpha };
+    let several = [term(4e3, 8.0), term(2e3, -3.5), term(1e3, 0.02)];
+    let powers = [
+        Ogden::from_young(60e3, 0.45, 12.0).unwrap().into(),
+        Ogden::new(&several, Volumetric::Quadratic { bulk: 3e5 })
+            .unwrap()
+            .into(),
         MooneyRivlin::new(8e3, 3e3, Volumetric::Quadratic { bulk: 4e5 })
             .unwrap()
             .into(),
+    ];
+    let log = Volumetric::Logarithmic { bulk: 3e5 };
+    let strange = [
+        StVenantKirchhoff::from_young(50e3, 0.45).unwrap().into(),
         NeoHookean::new(1e4, log).unwrap().into(),
         soft(30e3),
     ];
     vec![
         ("neo-Hookean", materials(&neo_hookean, false)),
         ("Fung and Yeoh", materials(&hardening, false)),
+        ("powers of stretches", materials(&powers, false)),
         ("one by one", materials(&strange, false)),
         ("viscous", materials(&neo_hookean, true)),
         ("viscous, hardening", materials(&hardening, true)),
+        ("viscous, powers", materials(&powers, true)),
     ]
 }
 
+/// What a body goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Strain {
+    /// Every prism in another way, by up to a third.
+    Irregular,
+    /// Stretches that differ by a millionth, and turned by a tenth.
+    NearlyEqual,
+    /// None.
+    Rest,
+}
+
 /// Two deformations of a body.
-fn deformations(model: &Model, size: f64) -> [Vec<Vec3>; 2] {
+fn deformations(model: &Model, strain: Strain) -> [Vec<Vec3>; 2] {
     let mut noise = Noise(11);
-    let stretch = Mat3::new(0.05, 0.1, -0.04, 0.02, 0.06, 0.1, -0.1, 0.03, -0.2);
+    let (stretch, size) = match strain {
+        Strain::Irregular => (
+            Mat3::new(0.05, 0.1, -0.04, 0.02, 0.06, 0.1, -0.1, 0.03, -0.2),
+            3e-4,
+        ),
+        Strain::NearlyEqual => (
+            Mat3::new(1e-3, 0.1, 0.0, -0.1, 1e-3, 0.0, 0.0, 0.0, 6e-3),
+            1e-9,
+        ),
+        Strain::Rest => (Mat3::zeros(), 0.0),
+    };
     [0.6, 1.0].map(|share| {
         let shake = |x: &Vec3, noise: &mut Noise| {
             stretch * x * share + Vec3::from_fn(|_, _| size * noise.next())
@@ -104,6 +139,12 @@ const STEPS: [f64; 2] = [0.05, 0.01];
 
 #[test]
 fn forces_and_stiffness_are_the_elements_with_their_past() {
+    for strain in [Strain::Irregular, Strain::NearlyEqual, Strain::Rest] {
+        forces_and_stiffness_are_the_elements(strain);
+    }
+}
+
+fn forces_and_stiffness_are_the_elements(strain: Strain) {
     let body = body();
     for (name, materials) in cases() {
         for is_fixed in [true, false] {
@@ -115,7 +156,7 @@ fn forces_and_stiffness_are_the_elements_with_their_past() {
             let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
             let mut memory = Memory::new(&model);
             let mut state = State::new(&model);
-            let [first, u] = deformations(&model, 3e-4);
+            let [first, u] = deformations(&model, strain);
             state.displacements = first;
             memory.begin(&model, &state, STEPS[0]);
             memory.commit(&model, &mut state);
@@ -161,7 +202,10 @@ fn forces_and_stiffness_are_the_elements_with_their_past() {
             }
             for (force, expected) in forces.iter().zip(&expected) {
                 let error = (force - expected).norm();
-                assert!(error < 1e-13 * size.max(1.0), "{name}: {error:e} of {size}");
+                assert!(
+                    error < 1e-13 * size.max(1.0),
+                    "{name}, {strain:?}: {error:e} of {size}"
+                );
             }
             let largest = expected_blocks.iter().map(Mat3::norm).fold(0.0, f64::max);
             let (mut worst, mut compared) = (0.0_f64, 0);
@@ -183,7 +227,10 @@ fn forces_and_stiffness_are_the_elements_with_their_past() {
                 compared += 1;
             }
             assert!(compared > 500);
-            assert!(worst < 3e-6 * largest, "{name}: {worst:e} of {largest:e}");
+            assert!(
+                worst < 3e-6 * largest,
+                "{name}, {strain:?}: {worst:e} of {largest:e}"
+            );
         }
     }
 }

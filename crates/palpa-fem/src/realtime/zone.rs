@@ -3,9 +3,10 @@
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
     Compliance, Exterior, FactorScratch, Half, Push, SolveScratch, Tree, Zone, back_substitute,
-    substitute,
+    back_substitute_to, fronts_above, substitute,
 };
 use palpa_sparse::{Block, ColumnPattern, Singular, TooLarge};
+use pulp::{Simd, WithSimd};
 
 use super::MOST_CANDIDATES;
 use super::batch::Batches;
@@ -295,14 +296,8 @@ impl Inside {
         back_substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
     }
 
-    /// Fills a contact problem: the compliance, and displacements by the right side whose forward substitution is `z`.
-    pub(super) fn prepare(
-        &mut self,
-        plan: &Plan,
-        z: &[f32],
-        has_friction: bool,
-        problem: &mut ContactProblem,
-    ) {
+    /// Fills a contact problem's compliance.
+    pub(super) fn comply(&mut self, plan: &Plan, has_friction: bool, problem: &mut ContactProblem) {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         self.pushes.clear();
         for candidate in &problem.candidates {
@@ -324,6 +319,17 @@ impl Inside {
         for (out, w) in problem.compliance.iter_mut().zip(&self.w[..n * n]) {
             *out = f64::from(*w);
         }
+    }
+
+    /// Fills a contact problem's displacements by the right side whose forward substitution is `z`.
+    pub(super) fn project(
+        &mut self,
+        plan: &Plan,
+        z: &[f32],
+        has_friction: bool,
+        problem: &mut ContactProblem,
+    ) {
+        let n = self.pushes.len();
         self.compliance.project(&plan.tree, z, &mut self.moves[..n]);
         for (i, candidate) in problem.candidates.iter_mut().enumerate() {
             candidate.displacement = if has_friction {
@@ -398,11 +404,12 @@ impl Outside {
     }
 
     /// Displacements of the exterior that go with those of the ring: brings `displacements` up to date. Cost: a
-    /// substitution through the exterior.
+    /// substitution through the exterior; of some columns only, through the fronts above them.
     pub(super) fn settle(
         &self,
         model: &Model,
         plan: &Plan,
+        only: Option<&[u32]>,
         displacements: &mut [Vec3],
         x: &mut [f32],
         scratch: &mut SolveScratch<f32>,
@@ -410,6 +417,8 @@ impl Outside {
         if plan.exterior.is_empty() {
             return;
         }
+        let wanted =
+            only.map(|columns| fronts_above(&plan.tree, Half::Exterior, columns.iter().copied()));
         let n = plan.tree.first_zone_dof();
         x[..n].copy_from_slice(&self.right[..n]);
         x[n..].fill(0.0);
@@ -419,11 +428,20 @@ impl Outside {
                 x[dof as usize + c] = change[c] as f32;
             }
         }
-        back_substitute(&plan.tree, Half::Exterior, &self.factor, x, scratch);
-        for &[node, dof] in &plan.exterior {
-            let change = Vec3::from_fn(|c, _| f64::from(x[dof as usize + c]));
-            let change = model.supports[node as usize].free_part(&change);
-            displacements[node as usize] = self.at[node as usize] + change;
+        let (tree, wanted) = (&plan.tree, wanted.as_deref());
+        back_substitute_to(tree, Half::Exterior, wanted, &self.factor, x, scratch);
+        let mut put = |node: usize, dof: usize| {
+            let change = Vec3::from_fn(|c, _| f64::from(x[dof + c]));
+            let change = model.supports[node].free_part(&change);
+            displacements[node] = self.at[node] + change;
+        };
+        match only {
+            Some(columns) => columns.iter().for_each(|&v| {
+                let first = tree.first_dof(v as usize);
+                (0..model.structure.n_free_levels)
+                    .for_each(|l| put(model.body.node(v as usize, l), first + 3 * l));
+            }),
+            None => (plan.exterior.iter()).for_each(|&[n, dof]| put(n as usize, dof as usize)),
         }
     }
 
@@ -541,33 +559,50 @@ impl Workshop {
 
 /// `y −= A x` of a symmetric matrix whose lower triangle is given, column by column.
 fn subtract_symmetric(a: &[f32], n: usize, x: &[f32], y: &mut [f32]) {
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            for j in 0..n {
-                let column = &a[j * n + j + 1..(j + 1) * n];
-                let factor = x[j];
-                let (_, below) = y.split_at_mut(j + 1);
-                let mut lanes = [0.0_f32; 16];
-                let chunks = column.len() / 16 * 16;
-                for (k, (a, x)) in column[..chunks]
-                    .chunks_exact(16)
-                    .zip(x[j + 1..].chunks_exact(16))
-                    .enumerate()
-                {
-                    let y = &mut below[16 * k..16 * k + 16];
-                    for i in 0..16 {
-                        y[i] -= a[i] * factor;
-                        lanes[i] += a[i] * x[i];
-                    }
+    pulp::Arch::new().dispatch(SubtractSymmetric { a, n, x, y });
+}
+
+// A struct, so that it is compiled for the machine's vectors: a closure is not always inlined where it is called.
+struct SubtractSymmetric<'a> {
+    a: &'a [f32],
+    n: usize,
+    x: &'a [f32],
+    y: &'a mut [f32],
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+impl WithSimd for SubtractSymmetric<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { a, n, x, y } = self;
+        for j in 0..n {
+            let column = &a[j * n + j + 1..(j + 1) * n];
+            let factor = x[j];
+            let (_, below) = y.split_at_mut(j + 1);
+            let mut lanes = [0.0_f32; 16];
+            let chunks = column.len() / 16 * 16;
+            for (k, (a, x)) in column[..chunks]
+                .chunks_exact(16)
+                .zip(x[j + 1..].chunks_exact(16))
+                .enumerate()
+            {
+                let y = &mut below[16 * k..16 * k + 16];
+                for i in 0..16 {
+                    y[i] -= a[i] * factor;
+                    lanes[i] += a[i] * x[i];
                 }
-                let mut sum: f32 = lanes.iter().sum();
-                for k in chunks..column.len() {
-                    below[k] -= column[k] * factor;
-                    sum += column[k] * x[j + 1 + k];
-                }
-                y[j] -= a[j * n + j] * factor + sum;
             }
-        },
-    );
+            let mut sum: f32 = lanes.iter().sum();
+            for k in chunks..column.len() {
+                below[k] -= column[k] * factor;
+                sum += column[k] * x[j + 1 + k];
+            }
+            y[j] -= a[j * n + j] * factor + sum;
+        }
+    }
 }

@@ -142,32 +142,6 @@ fn a_press_is_followed_to_the_converged_force() {
 }
 
 #[test]
-fn a_stiffness_that_serves_several_steps_leads_to_the_same_force() {
-    let model = model(13, false);
-    let tool = sphere(0.0);
-    let path: Vec<_> = (0..=4)
-        .map(|k| at(tool, 0.0, 0.0, 1e-3 * f64::from(k)))
-        .collect();
-    let expected = converged(&model, &path);
-    let params = LiveParams {
-        reuse: 0.05,
-        ..params(MODES[1])
-    };
-    let mut live = Live::new(Arc::clone(&model), &path[0], params).unwrap();
-    let mut n_anew = 0;
-    for k in 1..=80 {
-        let report = live.step(&at(tool, 0.0, 0.0, 0.05e-3 * f64::from(k)), 0.001);
-        n_anew += u32::from(report.is_anew);
-        if let Some(job) = live.take_job() {
-            live.install(job.run());
-        }
-    }
-    assert!((20..60).contains(&n_anew), "{n_anew}");
-    let error = (live.tool_force(0) - expected).norm() / expected.norm();
-    assert!(error < 0.01, "{error}");
-}
-
-#[test]
 fn a_stroke_goes_from_zone_to_zone() {
     let model = model(13, false);
     for friction in [0.0, 0.4] {
@@ -205,6 +179,45 @@ fn a_stroke_goes_from_zone_to_zone() {
             }
         }
     }
+}
+
+/// The tool goes on while a zone is being made for it, in which columns are that were in none.
+#[test]
+fn zones_that_come_late_lose_nothing() {
+    const LATE: u32 = 8;
+    let model = model(25, false);
+    let tool = sphere(0.0);
+    let down = (1..=10).map(|k| at(tool, -10e-3, 0.0, 0.3e-3 * f64::from(k)));
+    let along = (1..=80).map(|k| at(tool, -10e-3 + 0.25e-3 * f64::from(k), 0.0, 3e-3));
+    let end = (0..=2).map(|k| at(tool, 10e-3, 0.0, 1.5e-3 * f64::from(k)));
+    let expected = converged(&model, &end.collect::<Vec<_>>());
+    let start = at(tool, -10e-3, 0.0, 0.0);
+    let mut live = Live::new(
+        Arc::clone(&model),
+        &start,
+        params((12e-3, ExteriorMode::Linear)),
+    )
+    .unwrap();
+    let (mut under, mut zones, mut before) = (None, 1, 0.0_f64);
+    for (k, tools) in (0_u32..).zip(down.chain(along)) {
+        if let Some((_, done)) = under.take_if(|(due, _)| *due <= k) {
+            live.install(done);
+        }
+        let report = live.step(&tools, 0.005);
+        assert_eq!(report.outcome, StepOutcome::Arrived, "{k}: {report:?}");
+        zones = zones.max(report.zone);
+        if let Some(job) = live.take_job() {
+            under = Some((k + LATE, job.run()));
+        }
+        let force = live.tool_force(0).norm();
+        if k > 15 {
+            assert!((force / before - 1.0).abs() < 0.03, "{k}: {force} {before}");
+        }
+        before = force;
+    }
+    assert!(zones > 3, "{zones} zones");
+    let error = (live.tool_force(0) - expected).norm() / expected.norm();
+    assert!(error < 0.02, "{error}");
 }
 
 #[test]

@@ -296,7 +296,13 @@ fn the_coupling_is_a_spring_in_series() {
     let tool = &report.tools[0];
     assert!((tool.force.z - 2.0).abs() < 0.02, "{tool:?}");
     assert!((tool.softening - 0.8).abs() < 0.01, "{tool:?}");
-    assert!((tool.stretch - 0.8e-3).abs() < 1e-5, "{tool:?}");
+    assert!((tool.stretch.z - 0.8e-3).abs() < 1e-5, "{tool:?}");
+    // A patch that says nothing leaves the tool at the device.
+    patch.id = 9999;
+    patch.contacts[0].position.x = f64::NAN;
+    servo.send(patch);
+    let report = servo.tick(Some(Vec3::new(0.0, 0.0, RADIUS - 1e-3)));
+    assert_eq!(report.tools[0].stretch, Vec3::zeros());
 }
 
 #[test]

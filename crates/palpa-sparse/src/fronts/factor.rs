@@ -11,6 +11,7 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, Par};
+use pulp::{Simd, WithSimd};
 
 use super::Number;
 use super::tree::{Front, FrontPair, Half, Tree};
@@ -214,11 +215,41 @@ fn add_update<T: Number>(
     into: &mut [T],
     height: usize,
 ) {
-    // Compiled for the machine's vectors.
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || add_update_wide(b, to_parent, update, first, into, height),
-    );
+    pulp::Arch::new().dispatch(AddUpdate {
+        b,
+        to_parent,
+        update,
+        first,
+        into,
+        height,
+    });
+}
+
+// A struct, not a closure: `FnOnce::call_once` of a closure is not always inlined, and then not compiled for the machine's
+// vectors.
+struct AddUpdate<'a, T> {
+    b: usize,
+    to_parent: &'a [u32],
+    update: &'a [T],
+    first: usize,
+    into: &'a mut [T],
+    height: usize,
+}
+
+impl<T: Number> WithSimd for AddUpdate<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        add_update_wide(
+            self.b,
+            self.to_parent,
+            self.update,
+            self.first,
+            self.into,
+            self.height,
+        );
+    }
 }
 
 #[inline(always)]
@@ -270,10 +301,30 @@ fn put_pairs<T: Number>(
     into: &mut [T],
     height: usize,
 ) {
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || put_pairs_wide(tree, pairs, blocks, into, height),
-    );
+    pulp::Arch::new().dispatch(PutPairs {
+        tree,
+        pairs,
+        blocks,
+        into,
+        height,
+    });
+}
+
+struct PutPairs<'a, T> {
+    tree: &'a Tree,
+    pairs: &'a [FrontPair],
+    blocks: &'a [Block<T>],
+    into: &'a mut [T],
+    height: usize,
+}
+
+impl<T: Number> WithSimd for PutPairs<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        put_pairs_wide(self.tree, self.pairs, self.blocks, self.into, self.height);
+    }
 }
 
 #[inline(always)]

@@ -18,7 +18,7 @@ mod tree;
 
 pub use compliance::{Compliance, Push};
 pub use factor::{Exterior, FactorScratch, Zone};
-pub use solve::{SolveScratch, back_substitute, substitute};
+pub use solve::{SolveScratch, back_substitute, back_substitute_to, fronts_above, substitute};
 pub use tree::{Half, Tree};
 
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, Neg, Sub, SubAssign};

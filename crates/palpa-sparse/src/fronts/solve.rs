@@ -40,6 +40,7 @@ pub fn substitute<T: Number>(
     pulp::Arch::new().dispatch(Pass::<T, true> {
         tree,
         half,
+        wanted: None,
         panels: panels.as_ref(),
         x,
         part: &mut scratch.part,
@@ -54,9 +55,39 @@ pub fn back_substitute<T: Number>(
     x: &mut [T],
     scratch: &mut SolveScratch<T>,
 ) {
+    back_substitute_to(tree, half, None, panels, x, scratch);
+}
+
+/// The fronts of a half that a solution on these columns depends on: what [`back_substitute_to`] needs to visit.
+pub fn fronts_above(tree: &Tree, half: Half, columns: impl Iterator<Item = u32>) -> Vec<bool> {
+    let range = tree.range(half);
+    let mut is_above = vec![false; range.len()];
+    for column in columns {
+        let mut front = Some(tree.front_of[tree.place[column as usize] as usize]);
+        while let Some(f) = front.filter(|&f| range.contains(&(f as usize))) {
+            let seen = &mut is_above[f as usize - range.start];
+            if std::mem::replace(seen, true) {
+                break;
+            }
+            front = tree.fronts[f as usize].parent;
+        }
+    }
+    is_above
+}
+
+/// [`back_substitute`] through some of the fronts only, those of [`fronts_above`]: `x` is the solution there alone.
+pub fn back_substitute_to<T: Number>(
+    tree: &Tree,
+    half: Half,
+    wanted: Option<&[bool]>,
+    panels: &impl AsRef<[T]>,
+    x: &mut [T],
+    scratch: &mut SolveScratch<T>,
+) {
     pulp::Arch::new().dispatch(Pass::<T, false> {
         tree,
         half,
+        wanted,
         panels: panels.as_ref(),
         x,
         part: &mut scratch.part,
@@ -66,6 +97,8 @@ pub fn back_substitute<T: Number>(
 struct Pass<'a, T, const FORWARD: bool> {
     tree: &'a Tree,
     half: Half,
+    /// Which fronts of the half; all if not given.
+    wanted: Option<&'a [bool]>,
     panels: &'a [T],
     x: &'a mut [T],
     part: &'a mut [T],
@@ -79,11 +112,11 @@ impl<T: Number, const FORWARD: bool> WithSimd for Pass<'_, T, FORWARD> {
         let b = self.tree.width;
         let fronts = &self.tree.fronts[self.tree.range(self.half)];
         for i in 0..fronts.len() {
-            let front = if FORWARD {
-                &fronts[i]
-            } else {
-                &fronts[fronts.len() - 1 - i]
-            };
+            let i = if FORWARD { i } else { fronts.len() - 1 - i };
+            if self.wanted.is_some_and(|wanted| !wanted[i]) {
+                continue;
+            }
+            let front = &fronts[i];
             let (own, border) = (front.own.len() * b, front.border.len() * b);
             let height = own + border;
             let panel = &self.panels[front.panel..][..height * own];

@@ -143,6 +143,8 @@ pub struct Ridden {
     pub n_steps: usize,
     /// CPU time of the background's work, and of the steps, s.
     pub cpu: [f64; 2],
+    /// Pieces of background work.
+    pub n_jobs: usize,
     /// Time between steps, s, and how far the tool went in it, m.
     pub dt: f64,
     /// See `dt`.
@@ -205,10 +207,16 @@ pub fn ride(model: &Arc<Model>, ride: &Ride, params: LiveParams) -> Result<Ridde
     const PILOT: f64 = 4e-3;
     let pilot = run(model, ride, params, LONGEST_TRAVEL, None, ABOVE + PILOT)?;
     let rate = 1.0 / pilot.median();
-    let per_mm = (1e-3 * rate / FASTEST).ceil() as usize;
+    let mut speed = FASTEST;
+    if pilot.n_jobs > 0 && params.zone_radius.is_finite() {
+        // No faster than zones come, and where the exterior is followed with an old stiffness, its stiffness.
+        let job = pilot.cpu[0] / pilot.n_jobs as f64;
+        speed = speed.min(params.longest_way() / job);
+    }
+    let per_mm = (1e-3 * rate / speed).ceil() as usize;
     let least = (1e-3 / LONGEST_TRAVEL).ceil() as usize;
     let travel = 1e-3 / per_mm.clamp(least, MOST_STEPS_PER_MM) as f64;
-    let dt = (travel / FASTEST).max(1.0 / rate);
+    let dt = (travel / speed).max(1.0 / rate);
     run(model, ride, params, travel, Some(dt), ride.length())
 }
 
@@ -228,6 +236,7 @@ fn run(
         times: Vec::with_capacity(n_steps),
         n_steps,
         cpu: [0.0; 2],
+        n_jobs: 0,
         dt,
         travel,
         forces: Vec::with_capacity(n_steps),
@@ -255,6 +264,7 @@ fn run(
             let result = job.run();
             let late = clock.elapsed();
             ridden.cpu[0] += late.as_secs_f64();
+            ridden.n_jobs += 1;
             let due = step + 1 + (late.as_secs_f64() / dt) as usize;
             under = Some(Under { result, due });
         }

@@ -15,6 +15,7 @@ pub mod replay;
 pub mod reproduce;
 pub mod schema;
 pub mod verify;
+pub mod z_width;
 
 use crate::cli::Context;
 
@@ -42,6 +43,7 @@ pub enum Command {
     Reproduce(reproduce::Args),
     Schema(schema::Args),
     Verify(verify::Args),
+    ZWidth(z_width::Args),
 }
 
 impl Command {
@@ -57,6 +59,7 @@ impl Command {
             Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
             Self::Verify(_) => "verify",
+            Self::ZWidth(_) => "z-width",
         }
     }
 
@@ -75,6 +78,7 @@ impl Command {
             Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),
             Self::Verify(args) => verify::run(args, context),
+            Self::ZWidth(args) => z_width::run(args, context),
         }
     }
 }

@@ -16,7 +16,7 @@ pub use hand::{device_model, grip, path};
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
 pub use tissue::LiveTissue;
-pub use trace::{TraceRow, force_while_moving, trace_picture};
+pub use trace::{TraceRow, converged_forces, force_while_moving, trace_picture};
 
 use std::sync::Arc;
 
@@ -32,9 +32,12 @@ use crate::build::build;
 use crate::press::tissue::Indentation;
 
 /// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
-/// least so much, m. With 1.0 the first strokes of a forearm failed until the zone had grown.
-const ZONE_RADII: f64 = 1.6;
+/// least so much, m.
+const ZONE_RADII: f64 = 1.2;
 const LEAST_ZONE: f64 = 12e-3;
+/// How far a tool may go in a step of the tissue with the force at the device within about 2 % of the converged one, m: see
+/// "Force while moving" in docs/realtime.md.
+pub const GOOD_TRAVEL: f64 = 0.2e-3;
 /// Distance of the points along the hand's way at which the body is made fine, m.
 const WAY_STEP: f64 = 4e-3;
 
@@ -84,7 +87,7 @@ impl LiveScene {
             mesh_size: indentation.mesh.mesh_size,
             params: LiveParams {
                 zone_radius: zone_radius(scene),
-                exterior: ExteriorMode::Followed,
+                exterior: ExteriorMode::Linear,
                 ..LiveParams::default()
             },
             model: Arc::new(indentation.model),

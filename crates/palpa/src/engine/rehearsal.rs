@@ -65,6 +65,7 @@ pub fn rehearse<T: Tissue>(
     let mut is_made = false;
     let mut job: Option<(u64, T::Done)> = None;
     let mut position = Vec3::zeros();
+    let mut stretch = Vec3::zeros();
     let mut step = 0;
     let mut ticks = Vec::with_capacity(n_ticks as usize);
     tissue.prepare();
@@ -84,6 +85,7 @@ pub fn rehearse<T: Tissue>(
             if let Some((_, done)) = job.take_if(|(due, _)| *due <= step) {
                 tissue.install(done);
             }
+            let tool = position + stretch;
             let input = TissueInput {
                 step,
                 tick,
@@ -91,7 +93,7 @@ pub fn rehearse<T: Tissue>(
                 now,
                 dt: every as f64 * period,
                 period: every as f64 * period,
-                poses: [Pose::translation(position.x, position.y, position.z); MAX_TOOLS],
+                poses: [Pose::translation(tool.x, tool.y, tool.z); MAX_TOOLS],
                 n_tools: 1,
             };
             let done = tissue.step(&input, &mut working);
@@ -106,6 +108,7 @@ pub fn rehearse<T: Tissue>(
         }
         let mut command = [ForceCommand::ZERO];
         let report = servo.tick(now, &[state], &mut patches, &mut command);
+        stretch = report.tools[0].stretch;
         // A device that is away cannot be told.
         let _ = device.write(now, &command[0]);
         ticks.push(RehearsalTick {

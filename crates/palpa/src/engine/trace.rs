@@ -74,16 +74,10 @@ pub fn force_while_moving(
             .map_or((0, 0), |r| (r.n_active, r.n_candidates));
         step_forces.push((input.tick as usize, tissue.force(0).z, last));
     });
-    let mut converged = Converged::new(live);
-    let is_free = |position: Vec3| position.z > -above;
+    let places = ticks.iter().step_by(every).map(|tick| tick.position);
+    let converged = converged_forces(live, above, places)?;
     let mut rows = Vec::new();
-    for (k, tick) in ticks.iter().enumerate().step_by(every) {
-        let truth = if is_free(tick.position) {
-            converged.let_go();
-            Vec3::zeros()
-        } else {
-            converged.force(tick.position)?
-        };
+    for ((k, tick), truth) in ticks.iter().enumerate().step_by(every).zip(converged) {
         let before = &ticks[k.saturating_sub(1)];
         let known = step_forces.partition_point(|(at, ..)| *at <= k);
         let step = known.checked_sub(1).map(|i| step_forces[i]);
@@ -104,6 +98,28 @@ pub fn force_while_moving(
         });
     }
     Ok(rows)
+}
+
+/// Converged quasi-static forces on the tool at places of the device, each found from the one before; N, in the device's
+/// frame. Above the first touch (`above` under the device's origin, m) there is none.
+///
+/// # Errors
+/// When at a place no converged force is found.
+pub fn converged_forces(
+    live: &LiveScene,
+    above: f64,
+    places: impl IntoIterator<Item = Vec3>,
+) -> anyhow::Result<Vec<Vec3>> {
+    let mut converged = Converged::new(live);
+    let force = |place: Vec3| {
+        if place.z > -above {
+            converged.let_go();
+            Ok(Vec3::zeros())
+        } else {
+            converged.force(place)
+        }
+    };
+    places.into_iter().map(force).collect()
 }
 
 /// The body's equilibria, one after the other.

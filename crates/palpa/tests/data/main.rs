@@ -7,9 +7,12 @@
 mod awkward;
 mod bench;
 mod ccx;
+mod faults;
+mod lump_stroke;
 mod manifest;
 mod moving;
 mod real;
+mod stable;
 mod verify;
 
 use std::path::PathBuf;

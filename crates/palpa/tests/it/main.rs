@@ -6,6 +6,7 @@ mod bench;
 mod check;
 mod cli;
 mod export;
+mod live;
 mod output;
 mod plot;
 mod press;

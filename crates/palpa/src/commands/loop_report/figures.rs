@@ -1,11 +1,12 @@
 //! The figures of a run.
 
+use palpa_fem::realtime::LiveParams;
 use palpa_rt::{ForceReport, Log, Quantiles, Report};
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
 use crate::cli::Context;
-use crate::engine::LiveScene;
+use crate::engine::{GOOD_TRAVEL, LiveScene};
 use crate::table::Table;
 
 /// What a run must keep, as the project promises it: thread-CPU time of a tick, s; change of force where a patch comes,
@@ -71,6 +72,8 @@ impl From<Quantiles> for Times {
 struct TissueFigures {
     steps: u64,
     steps_per_s: f64,
+    /// Up to which speed of the tool the force keeps its accuracy: steps are short enough, and zones are there in time.
+    fastest_tool_mm_per_s: f64,
     step_cpu_us: Times,
     step_wall_us: Times,
     held_back: u64,
@@ -90,6 +93,8 @@ struct ForceFigures {
     rms_worst_n: f64,
     arrival_max_n: f64,
     arrival_p999_n: f64,
+    /// Beyond what the device's own displacement makes with the tissue's stiffness.
+    arrival_alone_max_n: f64,
     other_p999_n: f64,
     other_max_n: f64,
     /// By the law's own count.
@@ -127,6 +132,7 @@ impl Figures {
                 rms_worst_n: force.rms_band_worst,
                 arrival_max_n: force.arrival_max,
                 arrival_p999_n: force.arrival_p999,
+                arrival_alone_max_n: force.arrival_alone_max,
                 other_p999_n: force.other_p999,
                 other_max_n: force.other_max,
                 energy_in_mj: last.map_or(0.0, |d| d.energy_in * 1e3),
@@ -153,6 +159,7 @@ impl Figures {
             tissue: TissueFigures {
                 steps: report.steps,
                 steps_per_s: report.step_rate,
+                fastest_tool_mm_per_s: 1e3 * fastest_tool(report, &live.params),
                 step_cpu_us: report.step_cpu.into(),
                 step_wall_us: report.step_wall.into(),
                 held_back: report.held_back,
@@ -194,11 +201,18 @@ impl Figures {
             ));
         }
         for d in &self.devices {
-            let most = MOST_ARRIVAL.min(2.0 * d.other_p999_n);
-            if d.arrival_max_n > most {
+            // A device that goes by 45 µm from tick to tick changes the force by 0.02 N wherever it is.
+            if d.arrival_alone_max_n > MOST_ARRIVAL {
                 failures.push(format!(
-                    "force changes by {:.4} N where a patch arrives, more than {most:.4}",
-                    d.arrival_max_n
+                    "force changes by {:.4} N more than by the device's own displacement where a patch arrives, which is more \
+                     than {MOST_ARRIVAL}",
+                    d.arrival_alone_max_n
+                ));
+            }
+            if d.arrival_max_n > 2.0 * d.other_p999_n {
+                failures.push(format!(
+                    "force changes by {:.4} N where a patch arrives, more than twice the p99.9 of other ticks, {:.4}",
+                    d.arrival_max_n, d.other_p999_n
                 ));
             }
             if d.rms_still_n > MOST_RMS {
@@ -246,11 +260,21 @@ impl Figures {
             self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.backed_off, t.held_back, t.zones,
             t.jobs, 100.0 * t.background_cpu_share
         ))?;
+        context.say(format!(
+            "forces keep their accuracy up to a tool speed of {:.0} mm/s: {:.2} mm a step",
+            t.fastest_tool_mm_per_s,
+            GOOD_TRAVEL * 1e3
+        ))?;
         for d in &self.devices {
             context.say(format!(
-                "force: at most {:.2} N; 20-400 Hz {:.4} N with the hand still; changes where a patch arrives {:.4} N at most \
-                 (p99.9 {:.4}), else {:.4} (p99.9)",
-                d.max_force_n, d.rms_still_n, d.arrival_max_n, d.arrival_p999_n, d.other_p999_n
+                "force: at most {:.2} N; 20-400 Hz {:.4} N with the hand still; changes where a patch arrives {:.4} N at most, \
+                 {:.4} of it not by the device's own displacement (p99.9 {:.4}), else {:.4} (p99.9)",
+                d.max_force_n,
+                d.rms_still_n,
+                d.arrival_max_n,
+                d.arrival_alone_max_n,
+                d.arrival_p999_n,
+                d.other_p999_n
             ))?;
             context.say(format!(
                 "energy: {:.2} mJ taken in, {:.2} given out, never more than {:.3} beyond (budget {:.1}); softened by at most \
@@ -283,6 +307,15 @@ impl Figures {
         }
         Ok(())
     }
+}
+
+/// Speed at which a tool goes [`GOOD_TRAVEL`] in a step, or leaves the middle of a zone while the next is being made, m/s.
+fn fastest_tool(report: &Report, params: &LiveParams) -> f64 {
+    let by_steps = GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50);
+    if report.jobs.count == 0 {
+        return by_steps;
+    }
+    by_steps.min(params.longest_way() / report.jobs.p50)
 }
 
 fn count(counts: &mut Vec<(String, u64)>, name: &str) {
