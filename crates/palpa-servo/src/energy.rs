@@ -27,7 +27,7 @@ const DAMPING_DUST: f64 = 1e-4;
 pub(crate) struct Energy {
     pub(crate) taken: f64,
     pub(crate) given: f64,
-    pub(crate) bank: f64,
+    bank: f64,
     pub(crate) damping: f64,
     /// Work of the hand since the tool was last off the tissue, and the bank then.
     ledger: f64,
@@ -42,6 +42,17 @@ impl Energy {
             damping: 0.0,
             ledger: 0.0,
         }
+    }
+
+    /// What is banked, J; negative is energy generated.
+    pub(crate) fn bank(&self) -> f64 {
+        self.bank
+    }
+
+    /// Begins anew with nothing banked: while the force ramps, work says nothing of the tissue.
+    pub(crate) fn forget(&mut self) {
+        self.bank = 0.0;
+        self.ledger = 0.0;
     }
 
     /// Counts the tick that ended: force `held` over `travel`, and what the model's store grew by.
@@ -122,5 +133,15 @@ mod tests {
                 energy.bank
             );
         }
+    }
+
+    #[test]
+    fn what_is_forgotten_does_not_come_back_off_the_tissue() {
+        let (params, mut energy) = (ServoParams::default(), Energy::new());
+        energy.count(&Vec3::z(), &(Vec3::z() * 1e-3), 0.0, 1e-3, &params);
+        assert!(energy.bank() < -9e-4);
+        energy.forget();
+        energy.count(&Vec3::zeros(), &Vec3::zeros(), 0.0, 1e-3, &params);
+        assert!(energy.bank().abs() < 1e-12, "{}", energy.bank());
     }
 }

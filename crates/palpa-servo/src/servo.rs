@@ -178,7 +178,7 @@ impl Servo {
             self.solver.release_anchors(patch, &poses);
             for tool in &mut self.tools {
                 tool.transfer = ForceCommand::ZERO;
-                tool.energy.bank = 0.0;
+                tool.energy.forget();
             }
         }
         report.gain = self.ramp.gain;
@@ -272,7 +272,7 @@ impl Servo {
             tool.energy
                 .count(&tool.command.force, &travel, grown, dt, &self.params);
             if self.ramp.gain < 1.0 {
-                tool.energy.bank = 0.0;
+                tool.energy.forget();
             }
             if stored.is_finite() {
                 tool.stored = stored;
@@ -491,7 +491,7 @@ impl Tool {
         report.damping = damping;
         report.energy_in = self.energy.taken;
         report.energy_out = self.energy.given;
-        report.bank = self.energy.bank;
+        report.bank = self.energy.bank();
     }
 
     /// Along a straight line to zero in the time that is left.
