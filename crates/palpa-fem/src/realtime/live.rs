@@ -132,6 +132,8 @@ pub struct LiveReport {
     pub iterations: usize,
     /// Forces out of balance in the zone, as a share of the tools'.
     pub residual: f64,
+    /// The same in an exterior that is followed.
+    pub outside: f64,
     /// Vertices that press.
     pub n_active: usize,
     /// Candidates.
@@ -326,8 +328,9 @@ pub struct Live {
     forces: Vec<Vec3>,
     /// Whether they are those of the present displacements.
     is_fresh: bool,
-    /// Whether the exterior's are, where it is followed.
+    /// Whether the exterior's are, where it is followed, and how much they are out of balance, N.
     is_outside_fresh: bool,
+    outside_residual: f64,
     x: Vec<f32>,
     moves: Vec<f32>,
     before: Vec<Vec3>,
@@ -420,6 +423,7 @@ impl Live {
             forces: vec![Vec3::zeros(); n],
             is_fresh: false,
             is_outside_fresh: false,
+            outside_residual: 0.0,
             x: vec![0.0; n_dofs],
             moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
@@ -513,6 +517,7 @@ impl Live {
             },
             iterations: 0,
             residual: 0.0,
+            outside: 0.0,
             n_active: 0,
             n_candidates: 0,
             shift: 0.0,
@@ -533,11 +538,16 @@ impl Live {
                 }
             }
         }
-        let is_lost = report.outcome == StepOutcome::Failed
+        let mut is_lost = report.outcome == StepOutcome::Failed
             || report.residual.is_nan()
             || report.residual > LOST;
         // What has failed goes back to where the exterior is known.
-        if is_lost || self.bring_exterior().is_err() {
+        if !is_lost {
+            is_lost = self.bring_exterior().is_err();
+            report.outside = self.outside_residual / self.tools_force();
+            is_lost |= report.outside.is_nan() || report.outside > LOST;
+        }
+        if is_lost {
             report.outcome = StepOutcome::Failed;
             self.n_failed += 1;
             if self.n_failed < MOST_FAILED {
@@ -546,7 +556,7 @@ impl Live {
                 self.start_again();
             }
             self.pace = (self.pace * 0.25).max(LEAST_PACE);
-        } else if report.residual > ROUGH || report.shift > 0.0 {
+        } else if report.residual.max(report.outside) > ROUGH || report.shift > 0.0 {
             report.outcome = StepOutcome::BackedOff;
             self.pace = (self.pace * 0.5).max(LEAST_PACE);
         } else {
@@ -775,7 +785,7 @@ impl Live {
             (&mut self.follower, Arc::get_mut(&mut self.outside))
         {
             let displacements = &self.state.displacements;
-            outside.follow(
+            self.outside_residual = outside.follow(
                 &self.model,
                 &self.memory,
                 &self.plan,
@@ -934,9 +944,14 @@ impl Live {
                 self.model.supports[node].free_part(&force).norm_squared()
             })
             .sum();
+        (sum + skin).sqrt() / self.tools_force()
+    }
+
+    /// What forces out of balance are relative to, N.
+    fn tools_force(&self) -> f64 {
         let candidates = self.problem.candidates.iter();
         let size: f64 = candidates.map(|c| c.force().norm()).sum();
-        (sum + skin).sqrt() / size.max(LEAST_FORCE)
+        size.max(LEAST_FORCE)
     }
 
     /// Vertices of the zone that press or are near a tool, those nearest first.
@@ -1069,8 +1084,9 @@ impl Live {
         let centre = self.next_centre();
         let is_leaving = (centre - self.plan.centre).norm() > self.params.leave * radius;
         let depth = self.depth();
-        let is_stale =
-            (depth - self.depth_at_factor).abs() > self.params.stale || self.lag > self.longest_lag;
+        let is_stale = (depth - self.depth_at_factor).abs() > self.params.stale
+            || self.lag > self.longest_lag
+            || self.outside_residual > self.params.tolerance * self.tools_force();
         if !(is_leaving || is_stale || reaches_ring) {
             return;
         }

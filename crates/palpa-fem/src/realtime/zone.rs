@@ -469,11 +469,15 @@ impl Outside {
             self.factor
                 .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
         }
-        self.follow(model, memory, plan, follower, displacements)
+        // The stiffness is the true one: nothing can have turned.
+        follower.forces.fill(Vec3::zeros());
+        follower.share = 1.0;
+        self.follow(model, memory, plan, follower, displacements)?;
+        Ok(())
     }
 
     /// Is linear about other displacements, with the stiffness that it has. Cost: forces of the exterior's prisms and a
-    /// substitution.
+    /// substitution. Returns the exterior's own forces out of balance, N.
     pub(super) fn follow(
         &mut self,
         model: &Model,
@@ -481,20 +485,30 @@ impl Outside {
         plan: &Plan,
         follower: &mut Follower,
         displacements: &[Vec3],
-    ) -> Result<(), Trouble> {
+    ) -> Result<f64, Trouble> {
         if plan.exterior.is_empty() {
-            return Ok(());
+            return Ok(0.0);
         }
+        std::mem::swap(&mut follower.forces, &mut follower.before);
         follower.forces.fill(Vec3::zeros());
         follower
             .batches
             .add_forces(model, memory, displacements, &mut follower.forces)?;
         self.at.copy_from_slice(displacements);
         self.right[plan.tree.first_zone_dof()..].fill(0.0);
-        for &[node, dof] in plan.exterior.iter().chain(&plan.ring) {
+        let (mut square, mut turned) = (0.0, 0.0);
+        for &[node, _] in &plan.exterior {
+            let free = |force: &Vec3| model.supports[node as usize].free_part(force);
+            let force = free(&follower.forces[node as usize]);
+            square += force.norm_squared();
+            turned += force.dot(&free(&follower.before[node as usize]));
+        }
+        follower.relax(turned);
+        let relaxed = plan.exterior.iter().map(|n| (n, follower.share));
+        for (&[node, dof], share) in relaxed.chain(plan.ring.iter().map(|n| (n, 1.0))) {
             let force = model.supports[node as usize].free_part(&follower.forces[node as usize]);
             for c in 0..3 {
-                self.right[dof as usize + c] = -force[c] as f32;
+                self.right[dof as usize + c] = -(share * force[c]) as f32;
             }
         }
         let right = &mut self.right;
@@ -505,7 +519,7 @@ impl Outside {
             right,
             &mut follower.solve,
         );
-        Ok(())
+        Ok(square.sqrt())
     }
 }
 
@@ -514,6 +528,9 @@ impl Outside {
 pub(super) struct Follower {
     pub(super) batches: Batches,
     forces: Vec<Vec3>,
+    before: Vec<Vec3>,
+    /// Share of its forces out of balance that is taken back at once.
+    share: f64,
     pub(super) solve: SolveScratch<f32>,
 }
 
@@ -534,8 +551,23 @@ impl Follower {
                 with_tangent,
             ),
             forces: vec![Vec3::zeros(); model.n_nodes()],
+            before: vec![Vec3::zeros(); model.n_nodes()],
+            share: 1.0,
             solve: SolveScratch::new(&plan.tree),
         }
+    }
+
+    /// Where forces turn back on themselves from step to step (`turned` is the product of two) the old stiffness is less than
+    /// half the true one somewhere, and to take them back whole would raise them.
+    fn relax(&mut self, turned: f64) {
+        /// The least share, and its growth where they do not turn.
+        const LEAST: f64 = 0.2;
+        const GROWTH: f64 = 1.1;
+        self.share = if turned < 0.0 {
+            (0.5 * self.share).max(LEAST)
+        } else {
+            (GROWTH * self.share).min(1.0)
+        };
     }
 }
 

@@ -9,12 +9,23 @@ use palpa_fem::{
     Load, Material, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State,
     Supports, Workspace, advance,
 };
-use palpa_mesh::Vec3;
 use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
+use palpa_mesh::{LayeredBody, Vec3};
 
 /// Skin, fat and muscle, 60 mm square; its supports hold the base and, if asked, two sides.
 fn model(n: usize, with_sides: bool) -> Arc<Model> {
     model_of(n, with_sides, None)
+}
+
+/// A square block of so many cells a side.
+fn block(n: usize, side: f64, jitter: Option<u64>, levels: &LevelStack) -> LayeredBody {
+    let grid = Grid {
+        n_cells: [n, n],
+        diagonal: Diagonal::Alternate,
+        jitter,
+    };
+    let place = |u: f64, v: f64| Vec3::new(side * (u - 0.5), side * (v - 0.5), 0.0);
+    mapped_grid(&grid, place, levels)
 }
 
 fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
@@ -22,21 +33,7 @@ fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
         depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
         interval_layer: vec![0, 1, 1, 2],
     };
-    let grid = Grid {
-        n_cells: [n, n],
-        diagonal: Diagonal::Alternate,
-        jitter: Some(2),
-    };
-    let place = |u: f64, v: f64| Vec3::new(0.06 * u - 0.03, 0.06 * v - 0.03, 0.0);
-    let body = mapped_grid(&grid, place, &levels);
-    let material = |young| {
-        let law = NeoHookean::from_young(young, 0.45).unwrap();
-        Material {
-            prony: prony.cloned(),
-            ..Material::new("t", law)
-        }
-    };
-    let materials = Materials::of_layers(vec![material(100e3), material(5e3), material(30e3)]);
+    let body = block(n, 0.06, Some(2), &levels);
     let mut supports = Supports::on_base(&body);
     if with_sides {
         let x = 0.03 - 1e-9;
@@ -48,7 +45,19 @@ fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
             }
         }
     }
-    Arc::new(Model::build(&body, &materials, &supports, ModelParams::default()).unwrap())
+    model_on(&body, &supports, prony)
+}
+
+fn model_on(body: &LayeredBody, supports: &Supports, prony: Option<&Prony>) -> Arc<Model> {
+    let material = |young| {
+        let law = NeoHookean::from_young(young, 0.45).unwrap();
+        Material {
+            prony: prony.cloned(),
+            ..Material::new("t", law)
+        }
+    };
+    let materials = Materials::of_layers(vec![material(100e3), material(5e3), material(30e3)]);
+    Arc::new(Model::build(body, &materials, supports, ModelParams::default()).unwrap())
 }
 
 fn sphere(friction: f64) -> Tool {
@@ -176,6 +185,42 @@ fn a_stroke_goes_from_zone_to_zone() {
             if friction > 0.0 {
                 // It is dragged back.
                 assert!(force.x < -0.2 * force.z, "{force}");
+            }
+        }
+    }
+}
+
+/// Where the coarse block is near to giving way under the ball, the true stiffness of the exterior is more than twice that of
+/// a moment before: taken back whole, its forces out of balance would grow from step to step, and swing.
+#[test]
+fn a_followed_exterior_does_not_swing() {
+    let levels = LevelStack {
+        depths: vec![0.0, 2e-3, 12e-3, 40e-3],
+        interval_layer: vec![0, 1, 2],
+    };
+    let body = block(15, 0.1, None, &levels);
+    let model = model_on(&body, &Supports::on_base(&body), None);
+    let tool = Tool::new(Sphere::new(10e-3).unwrap(), 0.0).unwrap();
+    let start = at(tool, -10e-3, 0.0, -1e-3);
+    let whole = LiveParams {
+        exterior: ExteriorMode::Followed,
+        ..LiveParams::default()
+    };
+    for step in [0.02e-3, 0.0179e-3] {
+        let mut live = Live::new(Arc::clone(&model), &start, whole).unwrap();
+        let down = (1..=120_i32).map(|k| at(tool, -10e-3, 0.0, 0.05e-3 * f64::from(k) - 1e-3));
+        let along = (1..=320_i32).map(|k| at(tool, -10e-3 + step * f64::from(k), 0.0, 5e-3));
+        let mut before = 0.0;
+        for (k, tools) in down.chain(along).enumerate() {
+            let report = live.step(&tools, 4e-4);
+            assert_eq!(report.outcome, StepOutcome::Arrived, "{report:?}");
+            assert!(report.outside < 0.02, "{report:?}");
+            let force = live.tool_force(0).norm();
+            let change: f64 = force / before - 1.0;
+            assert!(k <= 120 || change.abs() < 0.01, "{k}: {change}");
+            before = force;
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
             }
         }
     }
