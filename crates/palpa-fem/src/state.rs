@@ -63,6 +63,25 @@ pub(crate) struct PhaseHistory {
     volume: Vec<[f64; 1]>,
 }
 
+impl PhaseHistory {
+    /// Takes over what the phases of other pairs remember in which this pair's two wedges are, and which of their two.
+    pub(crate) fn carry(&mut self, old: [(&Self, usize); 2]) {
+        let n = self.points.len() / N_POINTS;
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        let [(a, _), (b, _)] = old;
+        for i in 0..2 * n {
+            self.points[i] = std::array::from_fn(|c| mean(a.points[i][c], b.points[i][c]));
+        }
+        for (into, (a, b)) in self.volume.iter_mut().zip(a.volume.iter().zip(&b.volume)) {
+            into[0] = mean(a[0], b[0]);
+        }
+        for (k, (old, half)) in old.into_iter().enumerate() {
+            let from = &old.points[2 * n * (half + 1)..2 * n * (half + 2)];
+            self.points[2 * n * (k + 1)..2 * n * (k + 2)].copy_from_slice(from);
+        }
+    }
+}
+
 impl State {
     /// A body at rest.
     pub fn new(model: &Model) -> Self {

@@ -303,6 +303,9 @@ pub(crate) struct MeshTable {
     /// Most skin vertices that refinement may lead to, 100 to 500000; then the body stays as fine as they allow.
     /// Default: 20000.
     pub(crate) max_vertices: u32,
+    /// Whether in real time what is fine near the tool moves with it, so that the hand may go anywhere; else the body is
+    /// fine along the whole way of the scene's motion. Default: false.
+    pub(crate) moves: bool,
 }
 
 impl Default for MeshTable {
@@ -313,6 +316,7 @@ impl Default for MeshTable {
             near_lumps: None,
             growth: 0.5,
             max_vertices: 20_000,
+            moves: false,
         }
     }
 }

@@ -63,6 +63,8 @@ pub struct Mesh {
     pub growth: f64,
     /// Most skin vertices that refinement may lead to.
     pub max_vertices: usize,
+    /// Whether in real time what is fine near the tool moves with it; else it lies along the whole way of the motion.
+    pub moves: bool,
 }
 
 impl Mesh {

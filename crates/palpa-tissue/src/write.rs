@@ -96,6 +96,7 @@ fn mesh(mesh: &Mesh) -> MeshTable {
         near_lumps: mesh.near_lumps.map(Length::from_si),
         growth: mesh.growth,
         max_vertices: u32::try_from(mesh.max_vertices).unwrap_or(u32::MAX),
+        moves: mesh.moves,
     }
 }
 

@@ -92,6 +92,26 @@ impl History {
         }
     }
 
+    /// Takes over what the pairs of another body remember in which this pair's two wedges are, and which of their two.
+    pub(super) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
+        if !old.iter().all(|&(old, _)| from.is_known[old]) {
+            return;
+        }
+        self.is_known[pair] = true;
+        for row in 0..self.n_rows {
+            let into = self.row(pair, row);
+            let into = &mut self.numbers[into];
+            let [a, b] = old.map(|(old, _)| &from.numbers[from.row(old, row)]);
+            let mean = |i: usize| 0.5 * (a[i] + b[i]);
+            // The means of a pair at its two depths, and its pressure.
+            (0..12).chain([ROW - 1]).for_each(|i| into[i] = mean(i));
+            for ((k, (_, half)), old) in old.into_iter().enumerate().zip([a, b]) {
+                into[12 * (k + 1)..12 * (k + 2)]
+                    .copy_from_slice(&old[12 * (half + 1)..12 * (half + 2)]);
+            }
+        }
+    }
+
     fn row(&self, pair: usize, row: usize) -> std::ops::Range<usize> {
         let first = (pair * self.n_rows + row) * ROW;
         first..first + ROW

@@ -18,7 +18,10 @@ mod principal;
 mod tests;
 mod zone;
 
-pub use live::{ExteriorMode, Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome};
+pub use live::{
+    ExteriorMode, FineBodies, Live, LiveParams, LiveReport, Rebuild, Rebuilt, RoamDone, RoamJob,
+    Roaming, StepOutcome,
+};
 pub use local::{LocalContact, LocalModel, LocalTool};
 
 use palpa_sparse::ColumnPattern;

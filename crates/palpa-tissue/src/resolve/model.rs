@@ -56,6 +56,7 @@ impl Reader<'_> {
                 .key("max_vertices")
                 .within(mesh.max_vertices, &limits::MESH_VERTICES)?
                 as usize,
+            moves: mesh.moves,
         })
     }
 

@@ -99,6 +99,7 @@ fn everything_is_understood_and_survives_being_written() {
         near_lumps: Some(1.5e-3),
         growth: 0.5,
         max_vertices: 5000,
+        moves: true,
     };
     assert_eq!(scene.mesh, mesh);
     let press = &scene.press;

@@ -1,17 +1,19 @@
 //! A scene in real time: the moving step behind the engine's [`palpa_rt::Tissue`], in the frame of a device.
 //!
 //! ```text
-//! scene ─► body, refined along the hand's way ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand
+//! scene ─► body, fine along the hand's way or where the tool is ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand
 //! ```
 //! The device's frame is that of the tool where it presses: z out of the tissue, x along the tool's length. Its origin is
 //! where the tool's tip hangs, [`palpa_tissue::Motion::above`] over the first touch.
 
+mod fine;
 mod hand;
 mod record;
 mod rehearsal;
 mod tissue;
 mod trace;
 
+pub use fine::FineScene;
 pub use hand::{device_model, grip, path};
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
@@ -21,7 +23,7 @@ pub use trace::{TraceRow, converged_forces, force_while_moving, trace_picture};
 use std::sync::Arc;
 
 use anyhow::bail;
-use palpa_fem::realtime::{ExteriorMode, LiveParams};
+use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
 use palpa_mesh::Vec3;
@@ -50,6 +52,8 @@ pub struct LiveScene {
     pub tool: RigidTool,
     /// Where the device's frame is: its origin is where the tool's tip hangs at rest.
     pub scene_from_device: Pose,
+    /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
+    pub meshes: Option<Arc<FineScene>>,
     /// How the moving step goes about its work.
     pub params: LiveParams,
     /// Mean length of the skin's edges near the tool, m.
@@ -72,7 +76,9 @@ impl LiveScene {
             );
         }
         let built = build(scene)?;
-        let indentation = Indentation::build_along(scene, &built, &way(scene))?;
+        let moves = scene.mesh.moves && scene.mesh.refine;
+        let way = if moves { Vec::new() } else { way(scene) };
+        let indentation = Indentation::build_along(scene, &built, &way)?;
         let mut notes = built.notes.clone();
         notes.extend(indentation.notes.iter().cloned());
         if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
@@ -83,14 +89,24 @@ impl LiveScene {
         let Some(posed) = indentation.tool_at(-scene.motion.above) else {
             bail!("the tool is bonded to the skin");
         };
+        let meshes = if moves {
+            Some(Arc::new(FineScene::new(scene, &built)?))
+        } else {
+            None
+        };
+        let model = match &meshes {
+            Some(meshes) => meshes.model(meshes.place(built.press_at))?,
+            None => Arc::new(indentation.model),
+        };
         Ok(Self {
+            meshes,
             mesh_size: indentation.mesh.mesh_size,
             params: LiveParams {
                 zone_radius: zone_radius(scene),
                 exterior: ExteriorMode::Linear,
                 ..LiveParams::default()
             },
-            model: Arc::new(indentation.model),
+            model,
             tool: posed.tool,
             scene_from_device: posed.pose,
             notes,
@@ -102,12 +118,20 @@ impl LiveScene {
     /// # Errors
     /// When the body cannot be factored.
     pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
-        LiveTissue::new(
-            Arc::clone(&self.model),
+        let tools = [self.posed(Vec3::zeros())];
+        let body = match &self.meshes {
+            Some(meshes) => {
+                let at = tools[0].pose.translation.vector;
+                Roaming::new(Arc::<FineScene>::clone(meshes), &tools, self.params, at)?
+            }
+            None => Roaming::fixed(Live::new(Arc::clone(&self.model), &tools, self.params)?),
+        };
+        Ok(LiveTissue::new(
+            body,
             vec![self.tool],
             self.scene_from_device,
-            self.params,
-        )
+            self.params.tolerance,
+        ))
     }
 
     /// The tool where the device is at `position` in its own frame, m.

@@ -1,21 +1,17 @@
 //! The moving step as the engine's tissue.
 
-use std::sync::Arc;
-
-use palpa_fem::realtime::{
-    Live, LiveParams, LiveReport, LocalModel, Rebuild, Rebuilt, StepOutcome,
-};
+use palpa_fem::PosedTool;
+use palpa_fem::realtime::{Live, LiveReport, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome};
 use palpa_fem::shape::Tool as RigidTool;
-use palpa_fem::{Model, PosedTool};
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
 use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
 
-/// The finite elements of [`Live`] under tools whose poses come in a device's frame.
+/// The finite elements of [`Roaming`] under tools whose poses come in a device's frame.
 #[derive(Debug)]
 pub struct LiveTissue {
-    live: Live,
+    body: Roaming,
     /// Their frames are those of the devices' hand-pieces.
     tools: Vec<RigidTool>,
     scene_from_device: Pose,
@@ -27,18 +23,15 @@ pub struct LiveTissue {
 }
 
 impl LiveTissue {
-    /// At rest, with the tools at the device's origin.
-    ///
-    /// # Errors
-    /// When the body is too large to be factored, or cannot be at rest.
+    /// A body under tools that hang at the device's origin; residuals are judged by `tolerance`.
     pub fn new(
-        model: Arc<Model>,
+        body: Roaming,
         mut tools: Vec<RigidTool>,
         scene_from_device: Pose,
-        params: LiveParams,
-    ) -> anyhow::Result<Self> {
+        tolerance: f64,
+    ) -> Self {
         tools.truncate(MAX_TOOLS);
-        let posed: Vec<PosedTool> = tools
+        let posed = tools
             .iter()
             .map(|&tool| PosedTool {
                 tool,
@@ -49,20 +42,25 @@ impl LiveTissue {
         local.contacts.reserve(MAX_CONTACTS);
         local.tools.reserve(MAX_TOOLS);
         local.compliance.reserve(9 * MAX_CONTACTS * MAX_CONTACTS);
-        Ok(Self {
-            live: Live::new(model, &posed, params)?,
+        Self {
+            body,
             tools,
             scene_from_device,
-            tolerance: params.tolerance,
+            tolerance,
             posed,
             local,
             last: None,
-        })
+        }
     }
 
     /// The moving step.
     pub fn live(&self) -> &Live {
-        &self.live
+        self.body.live()
+    }
+
+    /// How many meshes there were, and how many could not be taken up.
+    pub fn n_meshes(&self) -> [u64; 2] {
+        self.body.n_meshes()
     }
 
     /// What the last step said of itself.
@@ -74,7 +72,7 @@ impl LiveTissue {
     pub fn force(&self, tool: usize) -> Vec3 {
         self.scene_from_device
             .rotation
-            .inverse_transform_vector(&self.live.tool_force(tool))
+            .inverse_transform_vector(&self.live().tool_force(tool))
     }
 
     fn pose_tools(&mut self, input: &TissueInput) {
@@ -103,11 +101,13 @@ impl LiveTissue {
                 stiffness: back * tool.stiffness * turn,
             };
         }
+        // Vertices of another mesh are others, whatever their numbers.
+        let mesh = ((self.body.n_meshes()[0] % 16) as u32) << 27;
         let n = self.local.contacts.len().min(MAX_CONTACTS);
         patch.n_contacts = n;
         for (out, contact) in patch.contacts.iter_mut().zip(&self.local.contacts) {
             *out = Candidate {
-                vertex: contact.vertex,
+                vertex: contact.vertex ^ mesh,
                 tool: u32::try_from(contact.tool).unwrap_or(u32::MAX),
                 position: frame
                     .inverse_transform_point(&contact.position.into())
@@ -130,21 +130,25 @@ impl LiveTissue {
 }
 
 impl Tissue for LiveTissue {
-    type Job = Rebuild;
-    type Done = Rebuilt;
+    type Job = RoamJob;
+    type Done = RoamDone;
 
     /// A step in the air: memory is there and touched before anything presses.
     fn prepare(&mut self) {
         let posed = std::mem::take(&mut self.posed);
-        self.live.step(&posed, 0.0);
-        self.live.local_model(MAX_CONTACTS, &mut self.local);
+        self.body.step(&posed, 0.0);
+        self.body
+            .live_mut()
+            .local_model(MAX_CONTACTS, &mut self.local);
         self.posed = posed;
     }
 
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
-        let report = self.live.step(&self.posed, input.dt);
-        self.live.local_model(MAX_CONTACTS, &mut self.local);
+        let report = self.body.step(&self.posed, input.dt);
+        self.body
+            .live_mut()
+            .local_model(MAX_CONTACTS, &mut self.local);
         self.fill(patch);
         self.last = Some(report);
         TissueStep {
@@ -164,15 +168,15 @@ impl Tissue for LiveTissue {
         }
     }
 
-    fn take_job(&mut self) -> Option<Rebuild> {
-        self.live.take_job()
+    fn take_job(&mut self) -> Option<RoamJob> {
+        self.body.take_job()
     }
 
-    fn run(job: Rebuild) -> Rebuilt {
+    fn run(job: RoamJob) -> RoamDone {
         job.run()
     }
 
-    fn install(&mut self, done: Rebuilt) {
-        self.live.install(done);
+    fn install(&mut self, done: RoamDone) {
+        self.body.install(done);
     }
 }

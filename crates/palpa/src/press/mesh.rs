@@ -28,9 +28,6 @@ const SLACK: f64 = 1.4;
 /// An interval that is too high by less than this factor is not worth another level in the whole body.
 const SPARED: f64 = 1.05;
 
-/// The least edge length wanted in a part of a triangle of the grown skin, given its corners. m
-type Wish = Box<dyn Fn(u32, &[Vec3; 3]) -> f64>;
-
 /// The greatest height wanted between two places of an interval, as shares of it.
 type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
 
@@ -117,6 +114,14 @@ impl PressedBody {
     }
 }
 
+/// Where the skin is to be fine: edges of `h` within `radius` of the points, all in metres.
+#[derive(Debug, Clone)]
+struct Fine {
+    points: Vec<Vec3>,
+    radius: f64,
+    h: f64,
+}
+
 /// More columns near the tool and above lumps.
 fn refine_near(
     scene: &Scene,
@@ -127,15 +132,7 @@ fn refine_near(
     notes: &mut Vec<String>,
 ) -> Refined {
     let body = &built.growth.body;
-    let params = RefineParams {
-        max_vertices: scene.mesh.max_vertices,
-        ..RefineParams::default()
-    };
-    if !scene.mesh.refine {
-        return refine(body, &params, |_, _| f64::INFINITY);
-    }
-    let growth = scene.mesh.growth;
-    let mut wishes: Vec<Wish> = Vec::new();
+    let mut fine = Vec::new();
     if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
         let (mut points, radius) = footprint(scene, built.press_at, &place.direction);
         let along = along_skin(scene, &place.direction);
@@ -144,37 +141,104 @@ fn refine_near(
             let over = built.press_at + along * far;
             points.extend(index.closest(over).map(|closest| closest.point));
         }
-        wishes.push(Box::new(near_points(&points, radius, SLACK * h, growth)));
+        let h = SLACK * h;
+        fine.push(Fine { points, radius, h });
     }
-    if !lumps.is_empty() {
-        let shadows = Shadows::new(body);
-        for (lump, given) in lumps.iter().zip(&scene.lumps) {
-            let Some(h) = scene.mesh.near_lump_of(given) else {
-                notes.push(format!(
-                    "the mesh is not refined round the lump \"{}\", whose size it does not know; set [mesh] near_lumps",
-                    given.name
-                ));
-                continue;
-            };
-            let (points, radius) = backbone(lump);
-            for point in points {
-                let shadow = shadows.of(point);
-                let wide = shadow.convergence;
-                wishes.push(Box::new(near_points(
-                    &[shadow.on_skin],
-                    radius * wide,
-                    SLACK * h * wide,
-                    growth,
-                )));
-            }
-        }
-    }
+    fine.extend(over_lumps(scene, body, lumps, notes));
+    refined(scene, body, &fine)
+}
+
+/// As fine as it is wanted, if the scene lets it be refined.
+fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
+    let params = RefineParams {
+        max_vertices: scene.mesh.max_vertices,
+        ..RefineParams::default()
+    };
+    let near = |fine: &Fine| near_points(&fine.points, fine.radius, fine.h, scene.mesh.growth);
+    let fine = fine.iter().filter(|_| scene.mesh.refine);
+    let wishes: Vec<_> = fine.map(near).collect();
     refine(body, &params, move |t, corners| {
         wishes
             .iter()
             .map(|wish| wish(t, corners))
             .fold(f64::INFINITY, f64::min)
     })
+}
+
+/// The skin over lumps.
+fn over_lumps(
+    scene: &Scene,
+    body: &LayeredBody,
+    lumps: &[Lump],
+    notes: &mut Vec<String>,
+) -> Vec<Fine> {
+    if lumps.is_empty() || !scene.mesh.refine {
+        return Vec::new();
+    }
+    let shadows = Shadows::new(body);
+    let mut fine = Vec::new();
+    for (lump, given) in lumps.iter().zip(&scene.lumps) {
+        let Some(h) = scene.mesh.near_lump_of(given) else {
+            notes.push(format!(
+                "the mesh is not refined round the lump \"{}\", whose size it does not know; set [mesh] near_lumps",
+                given.name
+            ));
+            continue;
+        };
+        let (points, radius) = backbone(lump);
+        for point in points {
+            let shadow = shadows.of(point);
+            let wide = shadow.convergence;
+            fine.push(Fine {
+                points: vec![shadow.on_skin],
+                radius: radius * wide,
+                h: SLACK * h * wide,
+            });
+        }
+    }
+    fine
+}
+
+/// A body that can be made fine round any place of its skin. Its levels are those that the scene's own place wants.
+#[derive(Debug)]
+pub struct CoarseBody {
+    /// As it was grown, with these levels.
+    pub body: LayeredBody,
+    /// Where it is fine in any case.
+    fine: Vec<Fine>,
+    /// Length of edges near the tool, m; none of a tool that asks for none.
+    h: Option<f64>,
+}
+
+impl CoarseBody {
+    /// The scene's body.
+    ///
+    /// # Errors
+    /// When direction or depth do not fit the place.
+    pub fn build(scene: &Scene, built: &BuiltBody, lumps: &[Lump]) -> anyhow::Result<Self> {
+        let grown = &built.growth.body;
+        // What there is to say is said of the body that is pressed first.
+        let mut notes = Vec::new();
+        let place = Place::find(scene, grown, built.press_vertex, &mut notes)?;
+        let (body, _) = split_near(scene, grown.clone(), &place, lumps);
+        let h = scene.mesh.near_tool_of(&scene.tool);
+        Ok(Self {
+            fine: over_lumps(scene, &body, lumps, &mut notes),
+            h: h.map(|h| SLACK * h),
+            body,
+        })
+    }
+
+    /// Made fine within a radius round a point of the skin, m.
+    pub fn fine_round(&self, scene: &Scene, point: Vec3, radius: f64) -> LayeredBody {
+        let mut fine = self.fine.clone();
+        fine.extend(self.h.map(|h| Fine {
+            points: vec![point],
+            radius,
+            h,
+        }));
+        refined(scene, &self.body, &fine).body
+    }
 }
 
 /// Points of the skin that the tool presses on, and how far round them it reaches. m

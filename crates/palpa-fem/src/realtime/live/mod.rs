@@ -1,5 +1,8 @@
 //! The moving step.
 
+mod carry;
+mod roaming;
+
 use std::sync::Arc;
 
 use palpa_mesh::Vec3;
@@ -15,6 +18,8 @@ use crate::error::FemError;
 use crate::law::Prony;
 use crate::model::Model;
 use crate::state::{Memory, State};
+use carry::Come;
+pub use roaming::{FineBodies, RoamDone, RoamJob, Roaming};
 
 /// First spring that holds vertices under a tool where the free body is not stable, relative to their own stiffness, its
 /// growth, the largest, and the least and most iterations after which a smaller one is tried: twice as many each time that it does
@@ -381,32 +386,57 @@ impl Live {
         tools: &[PosedTool],
         params: LiveParams,
     ) -> Result<Self, FemError> {
+        let come = Come::rest(&model);
+        let centre = nearest_point(&model, &come.state.displacements, tools, None).1;
+        Self::at(model, tools, params, centre, come, 0)
+    }
+
+    /// A body that goes on from what it has come to, with its first zone round a point of the skin at rest. Zones are counted from
+    /// `n_before` on.
+    fn at(
+        model: Arc<Model>,
+        tools: &[PosedTool],
+        params: LiveParams,
+        centre: Vec3,
+        come: Come,
+        n_before: u64,
+    ) -> Result<Self, FemError> {
         let pattern = Arc::new(column_pattern(&model));
-        let state = State::new(&model);
+        let state = come.state;
         let mut memory = Memory::new(&model);
         memory.begin(&model, &state, 0.0);
-        let centre = nearest_point(&model, &state.displacements, tools, None).1;
-        let plan = Plan::new(&model, &pattern, 1, centre, params.zone_radius)?;
-        let inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
+        let n_zones = n_before + 1;
+        let plan = Plan::new(&model, &pattern, n_zones, centre, params.zone_radius)?;
+        let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
         let mut shop = Box::new(Shop::new(&model, &memory, &pattern, &plan));
+        let is_followed = params.exterior == ExteriorMode::Followed;
+        let mut follower =
+            is_followed.then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
+        if let Some(history) = &come.history {
+            inside.batches.load(history);
+            shop.follower.batches.load(history);
+            if let Some(follower) = &mut follower {
+                follower.batches.load(history);
+            }
+        }
         if model.has_memory {
             shop.follower.batches.begin(&model, &mut memory, &state);
         }
         let mut outside = Outside::new(&model, &plan);
+        outside.id = n_before;
         let Shop {
-            follower, workshop, ..
+            follower: others,
+            workshop,
+            ..
         } = &mut *shop;
-        let rest = &state.displacements;
+        let here = &state.displacements;
         outside
-            .refactor(&model, &memory, &pattern, &plan, follower, workshop, rest)
+            .refactor(&model, &memory, &pattern, &plan, others, workshop, here)
             .map_err(|trouble| match trouble {
                 Trouble::Inverted(at) => FemError::NoRest { at: at.into() },
                 Trouble::Singular => FemError::NoRest { at: centre.into() },
             })?;
-        let is_followed = params.exterior == ExteriorMode::Followed;
-        let follower =
-            is_followed.then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
-        let (n, n_vertices) = (model.n_nodes(), model.body.n_vertices());
+        let n = model.n_nodes();
         let n_dofs = model.structure.n_dofs();
         Ok(Self {
             plan: Arc::new(plan),
@@ -417,9 +447,11 @@ impl Live {
             retired: None,
             problem: ContactProblem::new(),
             has_friction: false,
-            pressures: vec![0.0; n_vertices],
-            frictions: vec![Vec3::zeros(); n_vertices],
-            anchors: vec![Vec3::zeros(); n_vertices],
+            good: state.displacements.clone(),
+            good_pressures: come.pressures.clone(),
+            pressures: come.pressures,
+            frictions: come.frictions,
+            anchors: come.anchors,
             forces: vec![Vec3::zeros(); n],
             is_fresh: false,
             is_outside_fresh: false,
@@ -428,8 +460,6 @@ impl Live {
             moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
             tools: tools.to_vec(),
-            good: vec![Vec3::zeros(); n],
-            good_pressures: vec![0.0; n_vertices],
             good_tools: tools.to_vec(),
             pace: 1.0,
             n_failed: 0,
@@ -439,8 +469,8 @@ impl Live {
             spring_patience: SPRING_PATIENCE[0],
             job: None,
             is_job_out: false,
-            n_jobs: 0,
-            n_zones: 1,
+            n_jobs: n_before,
+            n_zones,
             job_age: 0,
             latency: 0,
             drift: Vec3::zeros(),
@@ -1133,11 +1163,15 @@ impl Live {
     /// What the prisms remember that step by step are moved on here.
     fn history(&self) -> History {
         let mut history = History::new(&self.model);
-        self.inside.batches.store(&mut history);
-        if let Some(follower) = &self.follower {
-            follower.batches.store(&mut history);
-        }
+        self.remember(&mut history);
         history
+    }
+
+    fn remember(&self, history: &mut History) {
+        self.inside.batches.store(history);
+        if let Some(follower) = &self.follower {
+            follower.batches.store(history);
+        }
     }
 
     /// Moves on the memory of those prisms of a linear exterior that are evaluated one by one: they are few.

@@ -1,0 +1,188 @@
+//! From one mesh of a body to another of the same body.
+
+use palpa_mesh::{SurfaceIndex, Vec3};
+
+use super::{History, Live, State};
+use crate::model::Model;
+
+/// Where the columns and prisms of a body are in another mesh of it, whose skin at rest and whose levels are the same.
+#[derive(Debug, Clone)]
+pub(super) struct Carry {
+    /// For each vertex those of the old triangle that it is in, and their weights.
+    parts: Vec<[(u32, f64); 3]>,
+    /// For each vertex the old one at the same place.
+    same: Vec<Option<u32>>,
+    /// For each group of triangles, and each of its two, the old group and which of its two.
+    wedges: Vec<[(u32, u8); 2]>,
+}
+
+/// What a body has come to.
+#[derive(Debug, Clone)]
+pub(super) struct Come {
+    pub(super) state: State,
+    pub(super) history: Option<History>,
+    pub(super) pressures: Vec<f64>,
+    pub(super) frictions: Vec<Vec3>,
+    pub(super) anchors: Vec<Vec3>,
+}
+
+impl Come {
+    pub(super) fn rest(model: &Model) -> Self {
+        let n = model.body.n_vertices();
+        Self {
+            state: State::new(model),
+            history: None,
+            pressures: vec![0.0; n],
+            frictions: vec![Vec3::zeros(); n],
+            anchors: vec![Vec3::zeros(); n],
+        }
+    }
+
+    /// What a body has come to, all of it up to date but for the memory of a linear exterior.
+    pub(super) fn of(live: &mut Live) -> Self {
+        live.settle();
+        let history = live.model.has_memory.then(|| {
+            let mut history = History::new(&live.model);
+            if let Some(shop) = &live.shop {
+                shop.follower.batches.store(&mut history);
+            }
+            live.remember(&mut history);
+            history
+        });
+        Self {
+            state: live.state.clone(),
+            history,
+            pressures: live.pressures.clone(),
+            frictions: live.frictions.clone(),
+            anchors: live.anchors.clone(),
+        }
+    }
+}
+
+impl Carry {
+    /// Cost: a search for each vertex and each triangle.
+    pub(super) fn new(old: &Model, new: &Model) -> Self {
+        /// Of an edge: vertices of two meshes that are nearer than this are the same.
+        const SAME: f64 = 1e-6;
+        let skin = &old.body.skin;
+        let index = SurfaceIndex::build(skin);
+        let (mut parts, mut same) = (Vec::new(), Vec::new());
+        for point in &new.body.skin.points {
+            let Some(closest) = index.closest(*point) else {
+                continue;
+            };
+            let corners = skin.corners(closest.triangle as usize);
+            let part = |p: Vec3, q: Vec3| (p - closest.point).cross(&(q - closest.point)).norm();
+            let [a, b, c] = corners;
+            let weights = [part(b, c), part(c, a), part(a, b)];
+            let sum: f64 = weights.iter().sum();
+            let vertices = skin.triangles[closest.triangle as usize];
+            parts.push([0, 1, 2].map(|k| (vertices[k], weights[k] / sum)));
+            let size = (b - a).norm();
+            let at = (0..3).find(|&k| (corners[k] - point).norm() < SAME * size);
+            same.push(at.map(|k| vertices[k]));
+        }
+        let mut place = vec![(0, 0); skin.triangles.len()];
+        for (g, group) in (0_u32..).zip(&old.structure.groups) {
+            for (k, &t) in (0_u8..).zip(&group.triangles[..usize::from(group.shape.n_wedges)]) {
+                place[t as usize] = (g, k);
+            }
+        }
+        let find = |t: u32| {
+            let middle = new.body.skin.corners(t as usize).iter().sum::<Vec3>() / 3.0;
+            let closest = index.closest(middle);
+            closest.map_or((0, 0), |closest| place[closest.triangle as usize])
+        };
+        let wedges = (new.structure.groups.iter().filter(|_| new.has_memory))
+            .map(|group| group.triangles.map(find))
+            .collect();
+        Self {
+            parts,
+            same,
+            wedges,
+        }
+    }
+
+    /// What the old mesh came to, on the new one.
+    pub(super) fn onto(&self, old: &Model, come: &Come, new: &Model) -> Come {
+        let mut out = Come::rest(new);
+        for v in 0..self.parts.len() {
+            for l in 0..new.body.n_levels {
+                out.state.displacements[new.body.node(v, l)] =
+                    self.displacement(v, l, new, &come.state.displacements);
+            }
+            if let Some(u) = self.same[v] {
+                out.pressures[v] = come.pressures[u as usize];
+                out.frictions[v] = come.frictions[u as usize];
+                out.anchors[v] = come.anchors[u as usize];
+            }
+        }
+        if new.has_memory {
+            self.carry_phases(old, &come.state, new, &mut out.state);
+            out.history = come.history.as_ref().map(|h| self.history(old, h, new));
+        }
+        out
+    }
+
+    /// Displacement of the place of a new vertex in the old mesh, m.
+    pub(super) fn displacement(&self, v: usize, level: usize, new: &Model, old: &[Vec3]) -> Vec3 {
+        if let Some(u) = self.same[v] {
+            return old[new.body.node(u as usize, level)];
+        }
+        let parts = self.parts[v].iter();
+        parts
+            .map(|&(u, weight)| old[new.body.node(u as usize, level)] * weight)
+            .sum()
+    }
+
+    /// The old vertex at the place of a new one.
+    pub(super) fn same(&self, v: usize) -> Option<usize> {
+        self.same[v].map(|u| u as usize)
+    }
+
+    /// What pairs in lanes remember.
+    pub(super) fn history(&self, old: &Model, from: &History, new: &Model) -> History {
+        let mut history = History::new(new);
+        for (pair, places) in self.pairs(old, new) {
+            history.carry(pair, from, places);
+        }
+        history
+    }
+
+    /// What pairs that are evaluated one by one remember.
+    fn carry_phases(&self, old: &Model, from: &State, new: &Model, into: &mut State) {
+        let phases = |model: &Model, pair: usize| {
+            model.first_phase[pair] as usize..model.first_phase[pair + 1] as usize
+        };
+        for (pair, places) in self.pairs(old, new) {
+            for p in phases(new, pair) {
+                let material = new.phases[p].material;
+                let past = places.map(|(pair, half)| {
+                    let mut all = phases(old, pair);
+                    all.find(|&q| old.phases[q].material == material)
+                        .map(|q| (&from.history[q], half))
+                });
+                if let [Some(a), Some(b)] = past {
+                    into.history[p].carry([a, b]);
+                }
+            }
+        }
+    }
+
+    /// The new pairs, and for both of their wedges the old pair and which of its wedges.
+    fn pairs(
+        &self,
+        old: &Model,
+        new: &Model,
+    ) -> impl Iterator<Item = (usize, [(usize, usize); 2])> {
+        let [n_new, n_old] = [new, old].map(Model::n_groups);
+        (0..new.body.n_levels - 1).flat_map(move |interval| {
+            self.wedges.iter().enumerate().map(move |(g, places)| {
+                let place = |(group, half): (u32, u8)| {
+                    (interval * n_old + group as usize, usize::from(half))
+                };
+                (interval * n_new + g, places.map(place))
+            })
+        })
+    }
+}
