@@ -53,8 +53,10 @@ pub struct EngineParams {
     pub servo_wish: Wish,
     /// What the tissue's thread wishes for.
     pub tissue_wish: Wish,
-    /// What the background's and the recorder's threads wish for.
+    /// What the background's thread wishes for: zones that come late hold the tissue back, so it is no less than others.
     pub background_wish: Wish,
+    /// What the recorder's thread wishes for.
+    pub recorder_wish: Wish,
     /// Whether memory shall be kept in RAM.
     pub lock_memory: bool,
 }
@@ -71,7 +73,8 @@ impl Default for EngineParams {
                 core: None,
             },
             tissue_wish: Wish::NORMAL,
-            background_wish: Wish {
+            background_wish: Wish::NORMAL,
+            recorder_wish: Wish {
                 priority: Priority::Nice(10),
                 core: None,
             },
@@ -345,7 +348,7 @@ impl Engine {
         };
         self.spawn(
             "palpa-recorder",
-            params.background_wish,
+            params.recorder_wish,
             SMALL_STACK,
             |stop| recorder.run(stop),
         )?;

@@ -4,7 +4,7 @@
 mod parquet;
 
 use crate::{
-    log::{LogError, Row, Rows},
+    log::{Ending, LogError, Row, Rows},
     record::{DeviceRecord, Record, StepRecord, TickRecord, Value},
     recorder::EventRow,
 };
@@ -43,6 +43,15 @@ pub enum ExportError {
     },
 }
 
+/// Tables of a log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Exported {
+    /// Ticks, steps, a table for each device, and what happened.
+    pub files: Vec<PathBuf>,
+    /// How the log ended, and the tables with it.
+    pub ending: Ending,
+}
+
 /// Writes a log as tables `ticks`, `device0`…, `steps` and, always as text, `events.csv` into a folder, which is made
 /// if need be. The log is read as it goes; memory does not grow with its length. Returns the files.
 ///
@@ -52,9 +61,9 @@ pub fn export(
     log: impl AsRef<Path>,
     folder: impl AsRef<Path>,
     table: Table,
-) -> Result<Vec<PathBuf>, ExportError> {
+) -> Result<Exported, ExportError> {
     let folder = folder.as_ref();
-    let rows = Rows::open(log)?;
+    let mut rows = Rows::open(log)?;
     std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
     let mut ticks = Sink::new::<TickRecord>(folder, "ticks", table)?;
     let mut devices: [Option<Sink>; MAX_TOOLS] = Default::default();
@@ -62,7 +71,7 @@ pub fn export(
     let events_path = folder.join("events.csv");
     let mut events = csv::Writer::from_path(&events_path).map_err(|e| failed(&events_path, &e))?;
     (events.write_record(["time", "level", "text"])).map_err(|e| failed(&events_path, &e))?;
-    for row in rows {
+    for row in &mut rows {
         match row? {
             Row::Tick(tick) => ticks.add(&tick)?,
             Row::Step(step) => steps.add(&step)?,
@@ -97,7 +106,8 @@ pub fn export(
         files.push(sink.finish()?);
     }
     files.push(events_path);
-    Ok(files)
+    let ending = rows.ending().clone();
+    Ok(Exported { files, ending })
 }
 
 /// A table being written.

@@ -85,16 +85,16 @@ mod tissue_thread;
 pub use clock::{Clock, ManualClock, RealClock, thread_cpu};
 pub use engine::{Engine, EngineParams, Report, Snapshot, StartError};
 pub use event::{Event, Happening, Level};
-pub use export::{ExportError, Table, export};
+pub use export::{ExportError, Exported, Table, export};
 pub use fault::FaultHooks;
 pub use histogram::{Histogram, Quantiles};
-pub use log::{Header, Log, LogError, Row, Rows};
+pub use log::{Ending, Header, Log, LogError, Row, Rows};
 pub use mailbox::{Reader, Writer, mailbox};
 pub use record::{
     DeviceRecord, Field, Record, ServoRecord, SpecRecord, StepRecord, TickRecord, Value,
 };
 pub use recorder::{EventRow, RecorderParams, cpu_features};
-pub use replay::{ForceDifference, ReplayParams, ReplayReport, Verdict, replay};
+pub use replay::{ForceDifference, ReplayParams, ReplayReport, Verdict, replay, replay_watched};
 pub use servo_loop::{LoopStats, ServoLoop, TickEntry};
 pub use smoothness::{ForceReport, ForceStats};
 pub use threads::{Granted, Priority, Wish, lock_memory};

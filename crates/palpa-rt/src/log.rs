@@ -36,8 +36,8 @@ pub enum LogError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It is no MCAP file, or damaged where it should not be.
-    #[error("{}: not a readable log: {reason}", path.display())]
+    /// It is no MCAP file, or damaged before anything was recorded.
+    #[error("{}: no log that can be read: {reason}; logs are MCAP files as `palpa loop-report` writes them", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
@@ -86,8 +86,20 @@ pub struct Rows {
     file: File,
     reader: LinearReader,
     topics: BTreeMap<u16, Topic>,
-    is_whole: bool,
+    ending: Ending,
     is_over: bool,
+}
+
+/// How a log ends.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum Ending {
+    /// It was closed properly.
+    Whole,
+    /// It reaches to the last chunk that was written whole, as after a crash.
+    #[default]
+    CutOff,
+    /// What comes next cannot be read, though there is more.
+    Damaged(String),
 }
 
 /// A whole log in memory.
@@ -105,8 +117,8 @@ pub struct Log {
     pub steps: Vec<StepRecord>,
     /// What happened.
     pub events: Vec<EventRow>,
-    /// Whether it was closed properly; if not, it reaches to the last chunk that was written whole.
-    pub is_whole: bool,
+    /// How it ends.
+    pub ending: Ending,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -149,7 +161,7 @@ impl Log {
                 Row::Event(event) => log.events.push(event),
             }
         }
-        log.is_whole = rows.is_whole;
+        log.ending = rows.ending;
         Ok(log)
     }
 
@@ -187,9 +199,14 @@ impl Rows {
             file,
             reader: LinearReader::new_with_options(options),
             topics: BTreeMap::new(),
-            is_whole: false,
+            ending: Ending::CutOff,
             is_over: false,
         })
+    }
+
+    /// How the log ends, once its rows are.
+    pub fn ending(&self) -> &Ending {
+        &self.ending
     }
 
     fn broken(&self, reason: impl Into<String>) -> LogError {
@@ -203,17 +220,17 @@ impl Rows {
         loop {
             let row = match self.reader.next_event() {
                 None => {
-                    self.is_whole = true;
+                    self.ending = Ending::Whole;
                     return Ok(None);
                 }
                 Some(Err(McapError::UnexpectedEof)) => return self.end_early(),
                 Some(Err(error)) => {
-                    // A chunk half written: what comes before it is good.
-                    return if self.topics.is_empty() {
-                        Err(self.broken(error.to_string()))
-                    } else {
-                        Ok(None)
-                    };
+                    if self.topics.is_empty() {
+                        return Err(self.broken(error.to_string()));
+                    }
+                    // What comes before it is good.
+                    self.ending = Ending::Damaged(error.to_string());
+                    return Ok(None);
                 }
                 Some(Ok(LinearReadEvent::ReadRequest(n))) => {
                     let read = self.file.read(self.reader.insert(n));

@@ -78,6 +78,16 @@ pub struct ForceDifference {
 
 /// Runs a log again with a tissue as it was when the log began; the law is made from the log.
 pub fn replay<T: Tissue>(log: &Log, tissue: T, params: &ReplayParams) -> ReplayReport {
+    replay_watched(log, tissue, params, |_| true)
+}
+
+/// The same; `goes_on` is told before each tick how many were run, and says whether to go on.
+pub fn replay_watched<T: Tissue>(
+    log: &Log,
+    tissue: T,
+    params: &ReplayParams,
+    goes_on: impl FnMut(usize) -> bool,
+) -> ReplayReport {
     let mut run = Run {
         tissue,
         servo: Box::new(Servo::new(&log.servo, &log.specs)),
@@ -103,7 +113,7 @@ pub fn replay<T: Tissue>(log: &Log, tissue: T, params: &ReplayParams) -> ReplayR
         },
     };
     run.tissue.prepare();
-    let result = run.all(&log.ticks);
+    let result = run.all(&log.ticks, goes_on);
     let mut report = run.report;
     report.stopped = result.err();
     let differs = report.first_force.is_some() || report.first_patch.is_some();
@@ -131,8 +141,15 @@ struct Run<'a, T: Tissue> {
 }
 
 impl<T: Tissue> Run<'_, T> {
-    fn all(&mut self, ticks: &[TickEntry]) -> Result<(), String> {
+    fn all(
+        &mut self,
+        ticks: &[TickEntry],
+        mut goes_on: impl FnMut(usize) -> bool,
+    ) -> Result<(), String> {
         for (k, entry) in ticks.iter().enumerate() {
+            if !goes_on(k) {
+                return Err("it was asked to".to_owned());
+            }
             let wanted = k as u64 + 1;
             if entry.tick.tick != wanted {
                 return Err(format!("tick {wanted} is not in the log"));

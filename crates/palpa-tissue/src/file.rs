@@ -291,7 +291,7 @@ pub(crate) struct MeshTable {
     /// Whether the body is refined near the tool and lumps; else it is taken as it was grown. Default: true.
     pub(crate) refine: bool,
     /// The wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the
-    /// radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm; nothing under a node.
+    /// radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm, and 4/3 of that in real time; nothing under a node.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
     /// The wanted length of edges and height of levels in and round lumps, 0.1 mm to 100 mm. Default: half of a lump's

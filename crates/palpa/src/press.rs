@@ -9,7 +9,7 @@ mod programme;
 pub mod reference;
 pub mod tissue;
 
-pub use place::Place;
+pub use place::{Place, column_length};
 pub use programme::{Phase, Waypoint, n_steps, waypoints};
 pub(crate) use reference::nodes_under_disc;
 

@@ -6,8 +6,8 @@ use crate::{
 };
 use palpa_device::{DeviceModel, Grip, HapticDevice, Path as Path3, SimulatedDevice};
 use palpa_rt::{
-    Clock, Engine, EngineParams, Log, RealClock, RecorderParams, ReplayParams, Report, StartError,
-    StepRecord, Verdict, replay,
+    Clock, Ending, Engine, EngineParams, Log, RealClock, RecorderParams, ReplayParams, Report,
+    StartError, StepRecord, Verdict, replay,
 };
 use palpa_servo::Vec3;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(crate) fn run(path: &Path, bed: Bed, act: impl FnOnce(&mut Engine, &Hand)) -
 
 /// What holds in every run: nothing is lost or out of order, and each force is finite and within limits.
 pub(crate) fn check_records(report: &Report, log: &Log) {
-    assert!(log.is_whole);
+    assert_eq!(log.ending, Ending::Whole);
     assert_eq!(report.lost_records, [0, 0]);
     assert!(!report.has_log_failed);
     assert_eq!(log.ticks.len() as u64, report.ticks);
@@ -173,7 +173,7 @@ fn a_simulated_device_in_a_simulated_hand_is_replayed_to_the_bit() {
     wait(1.5);
     let report = engine.stop();
     let log = Log::open(&path).unwrap();
-    assert!(log.is_whole && log.ticks.len() as u64 == report.ticks);
+    assert!(log.ending == Ending::Whole && log.ticks.len() as u64 == report.ticks);
     // The hand is held up by the bed, with a force that the device can exert.
     let force = report.forces[0];
     assert!(

@@ -4,7 +4,7 @@ use crate::{
     engine::{run, wait},
     toy::Bed,
 };
-use palpa_rt::{Log, ReplayParams, Table, Verdict, export, replay};
+use palpa_rt::{Ending, Log, ReplayParams, Table, Verdict, export, replay};
 use std::fs;
 
 #[test]
@@ -18,7 +18,7 @@ fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
     for share in [0.3, 0.5, 0.7, 0.9, 0.999] {
         fs::write(&cut, &bytes[..(bytes.len() as f64 * share) as usize]).unwrap();
         let part = Log::open(&cut).unwrap();
-        assert!(!part.is_whole);
+        assert_ne!(part.ending, Ending::Whole);
         assert_eq!(part.header, log.header);
         let n = part.ticks.len();
         assert_eq!(part.ticks[..], log.ticks[..n]);
@@ -45,8 +45,32 @@ fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
         Log::open(&cut)
             .unwrap_err()
             .to_string()
-            .contains("not a readable log")
+            .contains("no log that can be read")
     );
+}
+
+#[test]
+fn a_damaged_log_says_so_and_reads_up_to_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |_, _| wait(1.6));
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    for byte in &mut bytes[middle..middle + 40] {
+        *byte ^= 0x5a;
+    }
+    fs::write(&path, &bytes).unwrap();
+    let part = Log::open(&path).unwrap();
+    assert!(
+        matches!(part.ending, Ending::Damaged(_)),
+        "{:?}",
+        part.ending
+    );
+    let n = part.ticks.len();
+    assert!(n > 0 && n < log.ticks.len(), "{n}");
+    assert_eq!(part.ticks[..], log.ticks[..n]);
+    let tables = export(&path, folder.path().join("csv"), Table::Csv).unwrap();
+    assert_eq!(tables.ending, part.ending);
 }
 
 #[test]
@@ -59,7 +83,7 @@ fn what_was_flushed_is_there_while_the_engine_runs() {
         let now = engine.now();
         let log = Log::open(&path).unwrap();
         let last = log.ticks.last().unwrap().tick.now;
-        assert!(!log.is_whole);
+        assert_ne!(log.ending, Ending::Whole);
         // Half a second is promised on a machine that lets the recorder run; a shared one may not.
         assert!(now - last < 1.0, "{} s are not on disk", now - last);
     });
@@ -70,7 +94,9 @@ fn tables_hold_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (_, log) = run(&path, Bed::new(), |_, _| wait(0.4));
-    let files = export(&path, folder.path().join("csv"), Table::Csv).unwrap();
+    let files = export(&path, folder.path().join("csv"), Table::Csv)
+        .unwrap()
+        .files;
     let names: Vec<_> = files
         .iter()
         .map(|f| f.file_name().unwrap().to_str().unwrap())
@@ -106,7 +132,9 @@ fn parquet_holds_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (_, log) = run(&path, Bed::new(), |_, _| wait(0.4));
-    let files = export(&path, folder.path().join("parquet"), Table::Parquet).unwrap();
+    let files = export(&path, folder.path().join("parquet"), Table::Parquet)
+        .unwrap()
+        .files;
     let steps = SerializedFileReader::new(fs::File::open(&files[1]).unwrap()).unwrap();
     let schema = steps.metadata().file_metadata().schema().clone();
     let column = |name: &str| {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use palpa_rt::{Log, ReplayParams, Table, Verdict, replay};
+use palpa_rt::{Ending, Log, ReplayParams, Table, Verdict, replay_watched};
 use palpa_tissue::Scene;
 use serde::Serialize;
 
@@ -50,7 +50,18 @@ struct Found {
     first_tick_differing: Option<u64>,
     max_force_difference_n: f64,
     stopped: Option<String>,
+    /// Whether the log was closed properly, and what is damaged in it.
+    is_whole: bool,
+    damage: Option<String>,
     changed_files: Vec<String>,
+}
+
+/// What is printed with `--export` and `--json`.
+#[derive(Debug, Serialize)]
+struct Tables {
+    files: Vec<PathBuf>,
+    is_whole: bool,
+    damage: Option<String>,
 }
 
 /// Runs the command.
@@ -62,9 +73,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         return export(args, format, context);
     }
     let log = Log::open(&args.log)?;
-    if !log.is_whole {
-        context.note("the log ends early, as after a crash; what is there is run");
-    }
+    note_ending(&log.ending, context);
     let scene = match &args.scene {
         Some(path) => Scene::load(path)?,
         None => scene_of(&log.header)?,
@@ -77,7 +86,16 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         context.note(format!("{}: {}", file.path.display(), file.problem));
     }
     let live = LiveScene::build(&scene).context("the body of the log")?;
-    let report = replay(&log, live.tissue()?, &ReplayParams::default());
+    context.begin_recording();
+    let bar = context.progress(log.ticks.len(), "ticks run again");
+    let report = replay_watched(&log, live.tissue()?, &ReplayParams::default(), |tick| {
+        if tick.is_multiple_of(100) {
+            bar.set_position(tick as u64);
+        }
+        !context.is_interrupted()
+    });
+    bar.finish_and_clear();
+    let damage = damage(&log.ending);
     let found = Found {
         verdict: match report.verdict {
             Verdict::Same => "same",
@@ -94,6 +112,8 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         first_tick_differing: report.first_force.map(|f| f.tick),
         max_force_difference_n: report.max_force_difference,
         stopped: report.stopped.clone(),
+        is_whole: log.ending == Ending::Whole,
+        damage: damage.clone(),
         changed_files: changed
             .iter()
             .map(|f| f.path.display().to_string())
@@ -104,7 +124,12 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         report.ticks, report.steps, report.jobs
     ))?;
     context.say(match report.verdict {
-        Verdict::Same => "every force and every patch is the same to the bit".to_owned(),
+        Verdict::Same if log.ending == Ending::Whole => {
+            "every force and every patch is the same to the bit".to_owned()
+        }
+        Verdict::Same => {
+            "every force and every patch that could be read is the same to the bit".to_owned()
+        }
         Verdict::WithinTolerance => format!(
             "made on another kind of processor; forces differ by {:.2e} N at most, which is within the tolerance",
             report.max_force_difference
@@ -126,9 +151,29 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     }
     context.json(&found)?;
     Ok(match report.verdict {
+        _ if context.is_interrupted() => Outcome::Interrupted,
+        _ if damage.is_some() => Outcome::NotGood,
         Verdict::Same | Verdict::WithinTolerance => Outcome::Done,
         Verdict::Different | Verdict::Incomplete => Outcome::NotGood,
     })
+}
+
+/// Says that a log is not whole.
+fn note_ending(ending: &Ending, context: &Context) {
+    match ending {
+        Ending::Whole => {}
+        Ending::CutOff => context.note("the log ends early, as after a crash; what is there is used"),
+        Ending::Damaged(why) => context.note(format!(
+            "the log is damaged, or was still being written when it was copied ({why}); what comes before that is used"
+        )),
+    }
+}
+
+fn damage(ending: &Ending) -> Option<String> {
+    match ending {
+        Ending::Damaged(why) => Some(why.clone()),
+        Ending::Whole | Ending::CutOff => None,
+    }
 }
 
 fn export(args: &Args, format: Format, context: &Context) -> anyhow::Result<Outcome> {
@@ -137,10 +182,21 @@ fn export(args: &Args, format: Format, context: &Context) -> anyhow::Result<Outc
         Format::Parquet => Table::Parquet,
     };
     let out = context.out_dir()?;
-    let files = palpa_rt::export(&args.log, out.path(), table)?;
-    for file in &files {
+    let tables = palpa_rt::export(&args.log, out.path(), table)?;
+    note_ending(&tables.ending, context);
+    for file in &tables.files {
         context.say(file.display())?;
     }
-    context.json(&files)?;
-    Ok(Outcome::Done)
+    let damage = damage(&tables.ending);
+    let is_damaged = damage.is_some();
+    context.json(&Tables {
+        files: tables.files,
+        is_whole: tables.ending == Ending::Whole,
+        damage,
+    })?;
+    Ok(if is_damaged {
+        Outcome::NotGood
+    } else {
+        Outcome::Done
+    })
 }

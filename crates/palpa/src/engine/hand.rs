@@ -6,6 +6,8 @@ use palpa_tissue::{DevicePreset, Motion, MotionKind, Scene};
 
 /// Rest over the skin between two motions, s.
 const PAUSE: f64 = 0.3;
+/// Rest at the beginning, s, while the force is let in.
+const BEGIN: f64 = 0.7;
 /// The hand ends pressed and still for so long, s, so that a force that does not come to rest shows.
 const STILL: f64 = 3.5;
 /// Circles of a palpation: radius, m, and per second.
@@ -38,7 +40,7 @@ pub fn grip(grip: palpa_tissue::Grip) -> Grip {
 pub fn path(scene: &Scene, scene_from_device: &Pose, seconds: f64) -> Path {
     let motion = &scene.motion;
     let across = across(motion, scene_from_device);
-    let mut path = Path::from(start(motion, &across));
+    let mut path = Path::from(start(motion, &across)).hold(BEGIN);
     let press_time = 1.875 * (motion.above + motion.depth) / motion.speed;
     let until = seconds - STILL - press_time;
     let mut length = 0.0;

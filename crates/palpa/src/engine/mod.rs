@@ -26,11 +26,13 @@ use anyhow::bail;
 use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
-use palpa_mesh::Vec3;
+use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_servo::Pose;
 use palpa_tissue::{Scene, Tool};
 
-use crate::build::build;
+use crate::build::{BuiltBody, build, in_mm, nearest};
+use crate::press::column_length;
+use crate::press::mesh::along_skin;
 use crate::press::tissue::Indentation;
 
 /// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
@@ -75,12 +77,14 @@ impl LiveScene {
                 scene.tool
             );
         }
+        let scene = &coarser(scene);
         let built = build(scene)?;
         let moves = scene.mesh.moves && scene.mesh.refine;
         let way = if moves { Vec::new() } else { way(scene) };
         let indentation = Indentation::build_along(scene, &built, &way)?;
         let mut notes = built.notes.clone();
         notes.extend(indentation.notes.iter().cloned());
+        check_way(scene, &built, &indentation, &mut notes)?;
         if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
             notes.push(
                 "tension of layers is not at rest when the loop starts: the first steps of the tissue relax it".into(),
@@ -143,6 +147,16 @@ impl LiveScene {
     }
 }
 
+/// Where nothing is said of the mesh near the tool: a third of the radius that presses, where a press by script that may take its
+/// time has a quarter.
+fn coarser(scene: &Scene) -> Scene {
+    const COARSER: f64 = 4.0 / 3.0;
+    let mut scene = scene.clone();
+    let usual = scene.mesh.near_tool_of(&scene.tool);
+    scene.mesh.near_tool = scene.mesh.near_tool.or(usual.map(|h| COARSER * h));
+    scene
+}
+
 /// A radius that holds the contact at the depth of the hand.
 fn zone_radius(scene: &Scene) -> f64 {
     let radius = scene.tool.contact_radius();
@@ -160,4 +174,42 @@ fn way(scene: &Scene) -> Vec<f64> {
     (-n..=n)
         .map(|i| half * f64::from(i) / f64::from(n))
         .collect()
+}
+
+/// Whether the hand's way lies on the body, and is not deeper than it.
+fn check_way(
+    scene: &Scene,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<()> {
+    let (body, place) = (&built.growth.body, &indentation.place);
+    let along = along_skin(scene, &place.direction);
+    let index = SurfaceIndex::build(&body.skin);
+    let depth = scene.motion.depth;
+    for far in way(scene) {
+        let over = built.press_at + along * far;
+        let Some(closest) = index.closest(over) else {
+            continue;
+        };
+        if (closest.point - over).norm() > depth {
+            notes.push(format!(
+                "{:.0} mm along its way the tool is off the skin, where nothing is felt; shorten [motion] length = \"{:.0} mm\"",
+                far * 1e3,
+                scene.motion.length * 1e3
+            ));
+            break;
+        }
+        let thickness = column_length(body, nearest(&body.skin, closest.point));
+        if depth >= thickness {
+            bail!(
+                "[motion] depth = \"{:.1} mm\" reaches beyond the body: at ({}) mm the tissue is {:.1} mm deep; press less deep, or \
+                 at another place",
+                depth * 1e3,
+                in_mm(closest.point),
+                thickness * 1e3
+            );
+        }
+    }
+    Ok(())
 }

@@ -232,17 +232,13 @@ impl Chart {
             width: 912.0,
             height: 564.0,
         };
-        self.draw_in(&mut canvas, frame, TITLE);
+        self.draw_in(&mut canvas, frame, TITLE, [0.0; 2]);
         canvas.finish()
     }
 
-    fn draw_in(&self, canvas: &mut Canvas, frame: Frame, title: Font) {
-        let header = self.draw_header(canvas, frame, title);
-        let n_y = (frame.height / 75.0).max(3.0);
-        let n_x = (frame.width / 100.0).max(3.0);
-        let x = self.x.fit(self.values(0), n_x, false);
-        let y = self.y.fit(self.values(1), n_y, true);
-
+    /// Margins left and right of the plot that its labels need.
+    fn margins(&self, frame: Frame) -> [f64; 2] {
+        let y = self.y.fit(self.values(1), n_y_ticks(frame), true);
         let tick_width = widest(TICK, y.ticks.iter().map(|(_, label)| label.as_str()));
         let names = widest(NAME, self.series.iter().map(|s| s.name.as_str()));
         let right = if names > 0.0 {
@@ -250,7 +246,17 @@ impl Chart {
         } else {
             12.0
         };
-        let left = 22.0 + tick_width + 8.0;
+        [22.0 + tick_width + 8.0, right]
+    }
+
+    /// Draws with margins of at least so much.
+    fn draw_in(&self, canvas: &mut Canvas, frame: Frame, title: Font, least: [f64; 2]) {
+        let header = self.draw_header(canvas, frame, title);
+        let n_x = (frame.width / 100.0).max(3.0);
+        let x = self.x.fit(self.values(0), n_x, false);
+        let y = self.y.fit(self.values(1), n_y_ticks(frame), true);
+        let own = self.margins(frame);
+        let [left, right] = [0, 1].map(|side: usize| own[side].max(least[side]));
         let plot = Frame {
             x: frame.x + left,
             y: frame.y + header,
@@ -545,6 +551,19 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
     for (i, line) in lines.iter().enumerate() {
         canvas.text([MARGIN, MARGIN + 10.0 + i as f64 * LINE], line, font);
     }
+    // One above the other they share their axis of x.
+    let least = match n_columns {
+        1 => charts.iter().fold([0.0_f64; 2], |least, chart| {
+            let own = chart.margins(Frame {
+                x: 0.0,
+                y: 0.0,
+                width: WIDTH - MARGIN,
+                height: HEIGHT - MARGIN,
+            });
+            [0, 1].map(|side| least[side].max(own[side]))
+        }),
+        _ => [0.0; 2],
+    };
     for (i, chart) in charts.iter().enumerate() {
         let frame = Frame {
             x: MARGIN + (i % n_columns) as f64 * WIDTH,
@@ -552,9 +571,13 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
             width: WIDTH - MARGIN,
             height: HEIGHT - MARGIN,
         };
-        chart.draw_in(&mut canvas, frame, PANEL_TITLE);
+        chart.draw_in(&mut canvas, frame, PANEL_TITLE, least);
     }
     canvas.finish()
+}
+
+fn n_y_ticks(frame: Frame) -> f64 {
+    (frame.height / 75.0).max(3.0)
 }
 
 /// Words in lines no wider than `width`, where no single word is.

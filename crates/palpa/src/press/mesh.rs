@@ -277,7 +277,7 @@ fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64
 }
 
 /// The unit vector along which the scene's hand goes across the skin that is pressed in this direction.
-fn along_skin(scene: &Scene, direction: &Unit<Vec3>) -> Vec3 {
+pub fn along_skin(scene: &Scene, direction: &Unit<Vec3>) -> Vec3 {
     let first = scene.tool.contact().map_or(Vec3::x(), |tool| {
         Vec3::from(tool.axes(direction.into_inner().into())[0])
     });

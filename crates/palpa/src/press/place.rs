@@ -85,7 +85,8 @@ impl Place {
     }
 }
 
-fn column_length(body: &LayeredBody, v: usize) -> f64 {
+/// How much tissue there is under a skin vertex, m.
+pub fn column_length(body: &LayeredBody, v: usize) -> f64 {
     let p = |l: usize| body.positions[body.node(v, l)];
     (1..body.n_levels).map(|l| (p(l) - p(l - 1)).norm()).sum()
 }

@@ -264,7 +264,9 @@ impl Indentation {
     /// # Errors
     /// When the place, the depth, the tissues or the lumps do not fit the body, or it finds no rest.
     pub fn build(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
-        Self::build_along(scene, built, &[])
+        let mut indentation = Self::build_along(scene, built, &[])?;
+        note_friction(scene, &mut indentation.notes);
+        Ok(indentation)
     }
 
     /// As [`Self::build`], with the body made fine also where the tool goes across the skin: so far from the place along the
@@ -293,7 +295,6 @@ impl Indentation {
         let model = Model::build(body, &materials, &supports, params)?;
         note_mesh(&model, &mesh, scene, &mut notes);
         note_tension(body, scene, &mut notes);
-        note_friction(scene, &mut notes);
         let grip = grip(scene, &mesh, &place, &model)?;
         let params = SolveParams {
             tolerance: scene.model.tolerance,

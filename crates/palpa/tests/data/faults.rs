@@ -155,7 +155,7 @@ fn faults_while_real_tissue_is_pressed() {
     let report = engine.stop();
     let log = Log::open(&path).unwrap();
 
-    assert!(log.is_whole && !report.has_log_failed);
+    assert!(log.ending == palpa_rt::Ending::Whole && !report.has_log_failed);
     assert_eq!(report.lost_records, [0, 0]);
     assert_eq!(log.ticks.len() as u64, report.ticks);
     check_limits(&log, &spec);

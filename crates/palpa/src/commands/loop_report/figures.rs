@@ -1,7 +1,7 @@
 //! The figures of a run.
 
 use palpa_fem::realtime::LiveParams;
-use palpa_rt::{ForceReport, Log, Quantiles, Report};
+use palpa_rt::{ForceReport, Log, Quantiles, Report, StepStatus};
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
@@ -14,6 +14,12 @@ use crate::table::Table;
 const MOST_TICK: f64 = 200e-6;
 const MOST_ARRIVAL: f64 = 0.02;
 const MOST_RMS: f64 = 0.02;
+/// Share of the steps with contact in which the tissue may be behind the tool.
+const MOST_BEHIND: f64 = 0.01;
+/// Ticks without a force because the tissue was late: as many as one hiccup of the machine makes.
+const MOST_STALE: f64 = 1e-3;
+/// The hand is still where the tool goes no farther than this in the last seconds, m and s.
+const STILL: [f64; 2] = [0.5e-3, 2.0];
 
 /// What is written to loop.json.
 #[derive(Debug, Serialize)]
@@ -74,13 +80,21 @@ struct TissueFigures {
     steps_per_s: f64,
     /// Up to which speed of the tool the force keeps its accuracy: steps are short enough, and zones are there in time.
     fastest_tool_mm_per_s: f64,
+    /// How fast the hand goes.
+    motion_mm_per_s: f64,
     step_cpu_us: Times,
     step_wall_us: Times,
     held_back: u64,
     unfinished: u64,
-    backed_off: u64,
+    /// Steps that did not come as far as the tool, and their share of those with contact.
+    behind: u64,
+    behind_share: f64,
+    /// Largest share of ticks without a force because the tissue was late.
+    stale_share: f64,
     jobs: u64,
     job_cpu_us: Times,
+    /// From where a job is asked for to where it is taken over, ms: 90 of 100 are shorter.
+    job_wall_p90_ms: Option<f64>,
     background_cpu_share: f64,
     zones: u64,
 }
@@ -88,8 +102,8 @@ struct TissueFigures {
 #[derive(Debug, Serialize)]
 struct ForceFigures {
     max_force_n: f64,
-    /// 20 to 400 Hz, last 2 s, the hand's target still.
-    rms_still_n: f64,
+    /// 20 to 400 Hz, last 2 s; none where the tool was not still then.
+    rms_still_n: Option<f64>,
     rms_worst_n: f64,
     arrival_max_n: f64,
     arrival_p999_n: f64,
@@ -112,6 +126,7 @@ impl Figures {
         forces: &[ForceReport],
         log: &Log,
         live: &LiveScene,
+        motion_speed: f64,
         seconds: f64,
     ) -> Self {
         let ticks = || log.ticks.iter().filter(|t| t.tick.now <= seconds);
@@ -128,7 +143,8 @@ impl Figures {
             let last = records().next_back();
             ForceFigures {
                 max_force_n: force.max_force,
-                rms_still_n: force.rms_band,
+                rms_still_n: is_still(log, k, seconds.min(report.duration))
+                    .then_some(force.rms_band),
                 rms_worst_n: force.rms_band_worst,
                 arrival_max_n: force.arrival_max,
                 arrival_p999_n: force.arrival_p999,
@@ -144,7 +160,17 @@ impl Figures {
                 softening_max: records().map(|d| d.softening).fold(0.0, f64::max),
             }
         });
-        let status = |wanted: u8| log.steps.iter().filter(|s| s.status == wanted).count() as u64;
+        let status = |wanted: StepStatus| {
+            let steps = log.steps.iter();
+            steps.filter(|s| s.status == wanted as u8).count() as u64
+        };
+        let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
+        let behind = status(StepStatus::BackedOff);
+        let stale = ticks().filter(|t| {
+            let bits = u16::try_from(t.tick.faults).unwrap_or(0);
+            Faults::from_bits(bits).contains(Faults::STALE_PATCH)
+        });
+        let job_wall = job_wall(log);
         Self {
             seconds: report.duration,
             nodes: live.model.n_nodes(),
@@ -159,14 +185,18 @@ impl Figures {
             tissue: TissueFigures {
                 steps: report.steps,
                 steps_per_s: report.step_rate,
-                fastest_tool_mm_per_s: 1e3 * fastest_tool(report, &live.params),
+                fastest_tool_mm_per_s: 1e3 * fastest_tool(report, &live.params, job_wall),
+                motion_mm_per_s: 1e3 * motion_speed,
                 step_cpu_us: report.step_cpu.into(),
                 step_wall_us: report.step_wall.into(),
                 held_back: report.held_back,
-                unfinished: status(palpa_rt::StepStatus::Unfinished as u8),
-                backed_off: status(palpa_rt::StepStatus::BackedOff as u8),
+                unfinished: status(StepStatus::Unfinished),
+                behind,
+                behind_share: behind as f64 / touching.max(1) as f64,
+                stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
                 jobs: report.jobs.count,
                 job_cpu_us: report.jobs.into(),
+                job_wall_p90_ms: job_wall.map(|s| s * 1e3),
                 background_cpu_share: report.background_cpu_share,
                 zones: log.steps.iter().map(|s| s.zone).max().unwrap_or(0),
             },
@@ -200,7 +230,35 @@ impl Figures {
                 MOST_TICK * 1e6
             ));
         }
+        let t = &self.tissue;
+        if t.behind_share > MOST_BEHIND {
+            failures.push(format!(
+                "in {:.1} % of the steps with contact the tissue was behind the tool, since zones came too late: forces there are \
+                 too small; run less beside it, move more slowly, or make the mesh coarser with [mesh] near_tool",
+                100.0 * t.behind_share
+            ));
+        }
+        if t.stale_share > MOST_STALE {
+            failures.push(format!(
+                "{:.1} % of the ticks had no force, since the tissue was late; make the mesh coarser with [mesh] near_tool \
+                 (steps/s fall as nodes grow: {} now)",
+                100.0 * t.stale_share, self.nodes
+            ));
+        }
+        if t.motion_mm_per_s > t.fastest_tool_mm_per_s {
+            failures.push(format!(
+                "the hand goes at {:.0} mm/s, and forces keep their accuracy up to {:.0} mm/s here: move more slowly, or make the \
+                 mesh coarser with [mesh] near_tool",
+                t.motion_mm_per_s, t.fastest_tool_mm_per_s
+            ));
+        }
         for d in &self.devices {
+            if d.max_force_n == 0.0 {
+                failures.push(
+                    "nothing was felt: the tool never touched the skin, or the run ended before"
+                        .to_owned(),
+                );
+            }
             // A device that goes by 45 µm from tick to tick changes the force by 0.02 N wherever it is.
             if d.arrival_alone_max_n > MOST_ARRIVAL {
                 failures.push(format!(
@@ -215,10 +273,11 @@ impl Figures {
                     d.arrival_max_n, d.other_p999_n
                 ));
             }
-            if d.rms_still_n > MOST_RMS {
+            if let Some(rms) = d.rms_still_n
+                && rms > MOST_RMS
+            {
                 failures.push(format!(
-                    "force between 20 and 400 Hz is {:.4} N, more than {MOST_RMS}",
-                    d.rms_still_n
+                    "force between 20 and 400 Hz is {rms:.4} N with the hand still, more than {MOST_RMS}"
                 ));
             }
             if d.energy_deficit_mj > d.energy_budget_mj {
@@ -255,32 +314,19 @@ impl Figures {
         context.say(table)?;
         let t = &self.tissue;
         context.say(format!(
-            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} backed off, {} held back, {} zones), \
+            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones), \
              {} background jobs, {:.1} % of a core",
-            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.backed_off, t.held_back, t.zones,
+            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones,
             t.jobs, 100.0 * t.background_cpu_share
         ))?;
         context.say(format!(
-            "forces keep their accuracy up to a tool speed of {:.0} mm/s: {:.2} mm a step",
-            t.fastest_tool_mm_per_s,
-            GOOD_TRAVEL * 1e3
+            "the hand goes at {:.0} mm/s; steps ({:.2} mm each) and zones come in time for up to {:.0} mm/s",
+            t.motion_mm_per_s,
+            GOOD_TRAVEL * 1e3,
+            t.fastest_tool_mm_per_s
         ))?;
         for d in &self.devices {
-            context.say(format!(
-                "force: at most {:.2} N; 20-400 Hz {:.4} N with the hand still; changes where a patch arrives {:.4} N at most, \
-                 {:.4} of it not by the device's own displacement (p99.9 {:.4}), else {:.4} (p99.9)",
-                d.max_force_n,
-                d.rms_still_n,
-                d.arrival_max_n,
-                d.arrival_alone_max_n,
-                d.arrival_p999_n,
-                d.other_p999_n
-            ))?;
-            context.say(format!(
-                "energy: {:.2} mJ taken in, {:.2} given out, never more than {:.3} beyond (budget {:.1}); softened by at most \
-                 {:.1} %",
-                d.energy_in_mj, d.energy_out_mj, d.energy_deficit_mj, d.energy_budget_mj, 100.0 * d.softening_max
-            ))?;
+            context.say(d.table())?;
         }
         let list = |counts: &[(String, u64)]| {
             let all: Vec<String> = counts
@@ -309,13 +355,86 @@ impl Figures {
     }
 }
 
-/// Speed at which a tool goes [`GOOD_TRAVEL`] in a step, or leaves the middle of a zone while the next is being made, m/s.
-fn fastest_tool(report: &Report, params: &LiveParams) -> f64 {
-    let by_steps = GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50);
-    if report.jobs.count == 0 {
-        return by_steps;
+impl ForceFigures {
+    fn table(&self) -> Table<3> {
+        let mut table = Table::new(["force", "found", "allowed"]).with_left_names();
+        let mut row = |name: &str, found: String, allowed: String| {
+            table.push([name.to_owned(), found, allowed]);
+        };
+        let newtons = |x: f64| format!("{x:.4} N");
+        row("largest", newtons(self.max_force_n), String::new());
+        row(
+            "20 to 400 Hz, the hand still at the end",
+            self.rms_still_n
+                .map_or_else(|| "not still".to_owned(), newtons),
+            newtons(MOST_RMS),
+        );
+        row(
+            "largest change where a patch arrives",
+            newtons(self.arrival_max_n),
+            newtons(2.0 * self.other_p999_n),
+        );
+        row(
+            "the same without the device's displacement",
+            newtons(self.arrival_alone_max_n),
+            newtons(MOST_ARRIVAL),
+        );
+        let joules = |x: f64| format!("{x:.2} mJ");
+        row("energy taken in", joules(self.energy_in_mj), String::new());
+        row(
+            "energy given out",
+            joules(self.energy_out_mj),
+            String::new(),
+        );
+        row(
+            "the most given out beyond that",
+            joules(self.energy_deficit_mj),
+            joules(self.energy_budget_mj),
+        );
+        let softened = format!("{:.1} %", 100.0 * self.softening_max);
+        row("tissue softened for the device", softened, String::new());
+        table
     }
-    by_steps.min(params.longest_way() / report.jobs.p50)
+}
+
+/// Whether the tool was still in the last seconds.
+fn is_still(log: &Log, device: usize, end: f64) -> bool {
+    let [most, time] = STILL;
+    let last = log
+        .ticks
+        .iter()
+        .filter(|t| (end - time..=end).contains(&t.tick.now));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for place in last.map(|t| t.devices[device].position) {
+        for c in 0..3 {
+            low[c] = low[c].min(place[c]);
+            high[c] = high[c].max(place[c]);
+        }
+    }
+    (0..3).all(|c| high[c] - low[c] < most) && end > time
+}
+
+/// From the end of the step that asks for a job to the step that takes it over, s: 90 of 100 are shorter.
+fn job_wall(log: &Log) -> Option<f64> {
+    let (mut asked, mut times) = (None, Vec::new());
+    for step in &log.steps {
+        if step.installed
+            && let Some(asked) = asked.take()
+        {
+            times.push(step.now - asked);
+        }
+        if step.job_taken {
+            asked = Some(step.now + step.wall);
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() * 9 / 10).copied()
+}
+
+/// Speed at which a tool goes [`GOOD_TRAVEL`] in a step, or leaves the middle of a zone while the next is being made, m/s.
+fn fastest_tool(report: &Report, params: &LiveParams, job_wall: Option<f64>) -> f64 {
+    let by_steps = GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50);
+    job_wall.map_or(by_steps, |time| by_steps.min(params.longest_way() / time))
 }
 
 fn count(counts: &mut Vec<(String, u64)>, name: &str) {

@@ -33,12 +33,25 @@ const MOST_SECONDS: f64 = 3600.0;
 pub struct Args {
     /// Scene file (TOML); a forearm with a lump if none is given
     scene: Option<PathBuf>,
-    /// How long
-    #[arg(long, default_value_t = 60.0, value_name = "S")]
+    /// How long, in seconds: 5 to 3600
+    #[arg(
+        long,
+        default_value_t = 60.0,
+        value_name = "S",
+        allow_negative_numbers = true
+    )]
     seconds: f64,
-    /// Spin so long before each tick instead of sleeping: less lateness for more CPU
-    #[arg(long, default_value_t = 0.0, value_name = "µS")]
+    /// Spin so many µs before each tick instead of sleeping, 0 to 1000: less lateness for more CPU
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "µS",
+        allow_negative_numbers = true
+    )]
     spin_us: f64,
+    /// Print the scene, to be changed and run, and run nothing
+    #[arg(long)]
+    print_scene: bool,
 }
 
 /// Runs the command.
@@ -60,6 +73,14 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         Some(path) => Scene::load(path)?,
         None => Scene::parse(EMBEDDED, std::path::Path::new("")).context("the embedded scene")?,
     };
+    if args.print_scene {
+        let text = match &args.scene {
+            Some(_) => scene.to_toml(),
+            None => EMBEDDED.to_owned(),
+        };
+        context.say(text.trim_end())?;
+        return Ok(Outcome::Done);
+    }
     let out = context.out_dir()?;
     let live = LiveScene::build(&scene)?;
     for note in &live.notes {
@@ -76,8 +97,16 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let log = out.path().join("log.mcap");
     let (forces, report) = run_engine(args, context, &scene, &live, tissue, log)?;
     let log = Log::open(out.path().join("log.mcap"))?;
-    let figures = Figures::new(&report, &forces, &log, &live, args.seconds);
-    write(&figures, &log, out)?;
+    let speed = scene.motion.speed;
+    let figures = Figures::new(&report, &forces, &log, &live, speed, args.seconds);
+    let subtitle = format!(
+        "{} at up to {:.0} mm/s; {} in a {} hand",
+        scene.motion.kind.name(),
+        1e3 * scene.motion.speed,
+        scene.device.preset.name(),
+        scene.device.grip.name()
+    );
+    write(&figures, &log, &scene, &subtitle, out)?;
     figures.say(context)?;
     context.say(format!("written to {}", out.path().display()))?;
     context.json(&figures)?;
@@ -129,10 +158,16 @@ fn run_engine(
     Ok((forces, engine.stop()))
 }
 
-fn write(figures: &Figures, log: &Log, out: &OutDir) -> anyhow::Result<()> {
+fn write(
+    figures: &Figures,
+    log: &Log,
+    scene: &Scene,
+    subtitle: &str,
+    out: &OutDir,
+) -> anyhow::Result<()> {
     out.write_json("loop.json", figures)?;
     picture::times(figures).save(out, "loop_times")?;
-    picture::forces(log).save(out, "force_time")?;
-    picture::depth(log).save(out, "force_depth")?;
+    picture::forces(log, subtitle).save(out, "force_time")?;
+    picture::depth(log, scene.motion.above, subtitle).save(out, "force_depth")?;
     Ok(())
 }
