@@ -292,6 +292,8 @@ record! {
         factor: u64,
         /// Which zone.
         zone: u64,
+        /// Which mesh, counted from 1.
+        mesh: u64,
         /// Stored energy of the tissue, J.
         energy: f64,
         /// Candidates in its patch.

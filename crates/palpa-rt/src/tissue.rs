@@ -73,6 +73,8 @@ pub struct TissueStep {
     pub factor: u64,
     /// Which zone.
     pub zone: u64,
+    /// Which mesh, counted from 1.
+    pub mesh: u64,
     /// Stored energy, J.
     pub energy: f64,
 }

@@ -305,6 +305,7 @@ pub(crate) fn step_record(
         residual: result.residual,
         factor: result.factor,
         zone: result.zone,
+        mesh: result.mesh,
         energy: result.energy,
         n_contacts: patch.n_contacts as u32,
         hash: patch_hash(patch),

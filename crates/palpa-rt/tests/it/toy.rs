@@ -123,6 +123,7 @@ impl Tissue for Bed {
             residual: 0.0,
             factor: self.factor,
             zone: 0,
+            mesh: 1,
             energy,
         }
     }

@@ -10,7 +10,7 @@ pub fn draw(report: &BenchReport, of_growth: impl Fn(&BenchRow) -> bool) -> Pict
     let mut rates = Chart::new(Axis::log("nodes"), Axis::log("steps per second"))
         .title("Rate of the moving step")
         .subtitle("4 levels, one core, median of steps in contact; dashed: asked for")
-        .guide(Guide::y(1000.0, ""));
+        .guide(Guide::y(1000.0, "1 kHz"));
     for (mode, color) in modes.into_iter().zip(PALETTE) {
         let own: Vec<[f64; 2]> = (rows.iter().filter(|row| row.mode == mode))
             .map(|row| [row.nodes as f64, row.steps_per_s])
@@ -26,14 +26,15 @@ pub fn draw(report: &BenchReport, of_growth: impl Fn(&BenchRow) -> bool) -> Pict
             };
             rates = rates.series(Series::new(name, own).with_markers().with_color(color));
         }
-        if asked.len() > 1 {
+        if !asked.is_empty() {
             let name = format!("{}, asked for", mode.name());
-            rates = rates.series(Series::new(name, asked).dashed().with_color(color));
+            let asked = Series::new(name, asked).dashed().with_markers();
+            rates = rates.series(asked.with_color(color));
         }
     }
     let mut errors = Chart::new(
         Axis::log("nodes"),
-        Axis::log("largest error of the force, %"),
+        Axis::log("largest error of the force [%]"),
     )
     .title("What the rate is worth")
     .subtitle("past 2 mm; step: against the same mesh, converged");

@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
     /// Small bodies only, for a look that takes seconds
-    #[arg(long)]
+    #[arg(long, conflicts_with = "cases")]
     quick: bool,
     /// List the cases, and run none
     #[arg(long)]
@@ -55,6 +55,8 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         for case in &chosen {
             context.say(case.name)?;
         }
+        let names: Vec<&str> = chosen.iter().map(|case| case.name).collect();
+        context.json(&names)?;
         return Ok(Outcome::Done);
     }
     if args.refined {

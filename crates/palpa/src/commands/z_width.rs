@@ -5,9 +5,11 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use crate::plot::{Axis, Chart, Picture, Series, panels};
+use crate::plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 use crate::table::Table;
 
+/// Names of the devices.
+const DEVICES: [&str; 4] = ["falcon", "touch", "inverse3", "ideal"];
 /// The hands that hold the devices.
 const GRIPS: [(&str, Grip); 3] = [
     ("soft", Grip::SOFT),
@@ -30,7 +32,22 @@ const DAMPING_SHARES: [f64; 9] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0]
 /// For each damping the largest stiffness is given up to which all that were tried are stable, without and with the energy
 /// observer. Writes a table, the figures and the picture (CSV, JSON, SVG and PNG).
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Only this device; may be repeated [default: all]
+    #[arg(long = "device", value_name = "NAME", value_parser = DEVICES)]
+    devices: Vec<String>,
+    /// Only in this hand; may be repeated [default: all]
+    #[arg(long = "grip", value_name = "NAME", value_parser = ["soft", "medium", "stiff"])]
+    grips: Vec<String>,
+}
+
+/// What is written to z_width.json.
+#[derive(Debug, Serialize)]
+struct Found {
+    /// Whether it was not interrupted.
+    is_complete: bool,
+    rows: Vec<Row>,
+}
 
 /// The largest stable stiffness at one damping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -51,14 +68,23 @@ struct Row {
 ///
 /// # Errors
 /// When a result cannot be written.
-pub fn run(_args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let out = context.out_dir()?;
     context.begin_recording();
-    let n_rows = DeviceModel::ALL.len() * GRIPS.len() * 2 * DAMPING_SHARES.len();
+    let is_asked =
+        |asked: &[String], name: &str| asked.is_empty() || asked.iter().any(|a| a == name);
+    let devices = DeviceModel::ALL
+        .into_iter()
+        .filter(|d| is_asked(&args.devices, d.0));
+    let grips: Vec<(&'static str, Grip)> = GRIPS
+        .into_iter()
+        .filter(|g| is_asked(&args.grips, g.0))
+        .collect();
+    let n_rows = devices.clone().count() * grips.len() * 2 * DAMPING_SHARES.len();
     let bar = context.progress(n_rows, "walls");
     let mut rows = Vec::with_capacity(n_rows);
-    'all: for (device, model) in DeviceModel::ALL {
-        for (grip_name, grip) in GRIPS {
+    'all: for (device, model) in devices {
+        for &(grip_name, grip) in &grips {
             for has_observer in [false, true] {
                 for share in DAMPING_SHARES {
                     if context.is_interrupted() {
@@ -85,11 +111,17 @@ pub fn run(_args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         csv.push(row)?;
     }
     csv.finish()?;
-    out.write_json("z_width.json", &rows)?;
-    picture(&rows).save(out, "z_width")?;
+    if !rows.is_empty() {
+        picture(&rows).save(out, "z_width")?;
+    }
     say(&rows, context)?;
+    let found = Found {
+        is_complete: rows.len() == n_rows,
+        rows,
+    };
+    out.write_json("z_width.json", &found)?;
     context.say(format_args!("written to {}", out.path().display()))?;
-    context.json(&rows)?;
+    context.json(&found)?;
     Ok(if context.is_interrupted() {
         Outcome::Interrupted
     } else {
@@ -137,6 +169,9 @@ fn say(rows: &[Row], context: &Context) -> anyhow::Result<()> {
     ])
     .with_left_names();
     for (device, model) in DeviceModel::ALL {
+        if !rows.iter().any(|row| row.device == device) {
+            continue;
+        }
         let cell = |grip: usize, has_observer: bool| {
             let row = rows.iter().find(|row| {
                 row.device == device
@@ -165,15 +200,22 @@ fn say(rows: &[Row], context: &Context) -> anyhow::Result<()> {
 
 /// A chart for each device: below its line a hand is safe.
 fn picture(rows: &[Row]) -> Picture {
+    let stable = rows.iter().map(|row| row.stiffness.max(SOFTEST));
+    let (low, high) = stable.fold((STIFFEST, SOFTEST), |(low, high), k| {
+        (low.min(k), high.max(k))
+    });
+    let limits = DeviceModel::ALL.map(|(_, model)| model.spec.max_stiffness);
+    let low = limits.into_iter().fold(low, f64::min);
     let charts: Vec<Chart> = (DeviceModel::ALL.iter())
+        .filter(|(device, _)| rows.iter().any(|row| row.device == *device))
         .map(|(device, model)| {
             let mut chart = Chart::new(
                 Axis::linear("damping of the wall [N s/m]").with_zero(),
-                Axis::log("largest stable stiffness [N/m]").with_range(SOFTEST, STIFFEST),
+                Axis::log("largest stable stiffness [N/m]").with_range(0.8 * low, 1.25 * high),
             )
-            .title(*device);
+            .title(title(device));
             for has_observer in [false, true] {
-                for (grip, _) in GRIPS {
+                for ((grip, _), color) in GRIPS.into_iter().zip(PALETTE) {
                     let points: Vec<[f64; 2]> = rows
                         .iter()
                         .filter(|r| {
@@ -181,15 +223,21 @@ fn picture(rows: &[Row]) -> Picture {
                         })
                         .map(|r| [r.damping, r.stiffness.max(SOFTEST)])
                         .collect();
-                    chart = chart.series(if has_observer {
+                    if points.is_empty() {
+                        continue;
+                    }
+                    let series = if has_observer {
                         Series::new(format!("{grip}, observer"), points).dashed()
                     } else {
                         Series::new(grip, points)
-                    });
+                    };
+                    chart = chart.series(series.with_color(color));
                 }
             }
             let spec = model.spec;
-            chart.note([spec.max_damping, spec.max_stiffness], "limit of the law")
+            chart
+                .guide(Guide::y(spec.max_stiffness, "relied on"))
+                .guide(Guide::x(spec.max_damping, ""))
         })
         .collect();
     panels(
@@ -197,4 +245,14 @@ fn picture(rows: &[Row]) -> Picture {
         &charts,
         2,
     )
+}
+
+/// The name that a person knows a device by.
+fn title(device: &str) -> &'static str {
+    match device {
+        "falcon" => "Novint Falcon",
+        "touch" => "3D Systems Touch",
+        "inverse3" => "Haply Inverse3",
+        _ => "ideal device",
+    }
 }

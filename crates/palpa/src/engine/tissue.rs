@@ -163,6 +163,7 @@ impl Tissue for LiveTissue {
             residual: report.residual,
             factor: report.factor,
             zone: report.zone,
+            mesh: self.body.n_meshes()[0],
             // The moving step works with forces alone.
             energy: 0.0,
         }

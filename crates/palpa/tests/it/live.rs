@@ -130,6 +130,109 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
     assert!(found["max_force_difference_n"].as_f64().unwrap() > 1e-3);
 }
 
+/// The fine part of the mesh follows the tool: meshes come from the background, and a replay goes through the same.
+#[test]
+fn a_mesh_that_moves_is_the_same_again() {
+    let folder = bench();
+    let scene = SCENE
+        .replace("spacing = \"8 mm\"", "spacing = \"10 mm\"")
+        .replace("size = [\"60 mm\"", "size = [\"140 mm\"")
+        .replace("near_tool = \"4 mm\"", "near_tool = \"4 mm\"\nmoves = true")
+        .replace(
+            "kind = \"tap\"",
+            "kind = \"drag\"\nlength = \"80 mm\"\ntimes = 2",
+        );
+    fs::write(folder.path().join("gel.toml"), scene).unwrap();
+    let args = [
+        "loop-report",
+        "gel.toml",
+        "--seconds",
+        "8",
+        "--json",
+        "--out",
+        "live",
+    ];
+    let (code, report, stderr) = seen(&mut palpa(folder.path(), &args));
+    assert!(code == 0 || code == 1, "{code}: {stderr}");
+    assert!(report["tissue"]["meshes"].as_u64().unwrap() > 1, "{report}");
+    assert!(
+        report["devices"][0]["max_force_n"].as_f64().unwrap() > 0.02,
+        "{report}"
+    );
+    same_again(&folder);
+}
+
+#[test]
+fn what_cannot_be_felt_in_time_is_told() {
+    let folder = bench();
+    let args = |scene: &'static str| ["loop-report", scene, "--seconds", "5", "--out", "live"];
+    // Deeper than the gel, and far off it.
+    fs::write(
+        folder.path().join("deep.toml"),
+        SCENE.replace("depth = \"3 mm\"\nspeed", "depth = \"30 mm\"\nspeed"),
+    )
+    .unwrap();
+    let (code, _, stderr) = seen(&mut palpa(folder.path(), &args("deep.toml")));
+    assert!(
+        code == 2 && stderr.contains("[motion] depth"),
+        "{code} {stderr}"
+    );
+    // So slow that it never touches.
+    fs::write(
+        folder.path().join("slow.toml"),
+        SCENE.replace("30 mm/s", "0.2 mm/s"),
+    )
+    .unwrap();
+    let output = palpa(folder.path(), &args("slow.toml")).output().unwrap();
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{stdout}");
+    assert!(stdout.contains("NOT GOOD: nothing was felt"), "{stdout}");
+}
+
+#[test]
+fn a_scene_is_printed_to_be_changed() {
+    let folder = bench();
+    let output = palpa(folder.path(), &["loop-report", "--print-scene"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let scene = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        scene.contains("[motion]") && scene.contains("[device]"),
+        "{scene}"
+    );
+    fs::write(folder.path().join("printed.toml"), scene).unwrap();
+    assert_eq!(
+        seen(&mut palpa(folder.path(), &["check", "printed.toml"])).0,
+        0
+    );
+}
+
+#[test]
+fn a_stable_range_is_found() {
+    let folder = bench();
+    let args = ["z-width", "--device", "ideal", "--grip", "soft", "--json"];
+    let (code, found, stderr) = seen(&mut palpa(folder.path(), &args));
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(found["is_complete"], true);
+    let stable = |observer: bool| -> Vec<f64> {
+        let rows = found["rows"].as_array().unwrap().iter();
+        rows.filter(|row| row["has_observer"] == observer)
+            .map(|row| row["stiffness"].as_f64().unwrap())
+            .collect()
+    };
+    let (without, with) = (stable(false), stable(true));
+    assert_eq!((without.len(), with.len()), (9, 9));
+    // What the law relies on is stable, and the observer takes nothing away.
+    assert!(
+        without[0] > 3000.0 && with[0] >= 0.98 * without[0],
+        "{found}"
+    );
+    // Too much damping rattles as too much stiffness does.
+    assert!(without[8] < without[1], "{found}");
+    assert!(folder.path().join("out/z-width/z_width.png").is_file());
+}
+
 #[test]
 fn a_log_that_is_cut_off_or_none_is_told() {
     let folder = bench();

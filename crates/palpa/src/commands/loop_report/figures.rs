@@ -97,6 +97,8 @@ struct TissueFigures {
     job_wall_p90_ms: Option<f64>,
     background_cpu_share: f64,
     zones: u64,
+    /// Meshes that the body was on.
+    meshes: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -199,6 +201,7 @@ impl Figures {
                 job_wall_p90_ms: job_wall.map(|s| s * 1e3),
                 background_cpu_share: report.background_cpu_share,
                 zones: log.steps.iter().map(|s| s.zone).max().unwrap_or(0),
+                meshes: log.steps.iter().map(|s| s.mesh).max().unwrap_or(0),
             },
             devices: devices.collect(),
             faults,
@@ -314,9 +317,9 @@ impl Figures {
         context.say(table)?;
         let t = &self.tissue;
         context.say(format!(
-            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones), \
+            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones, {} meshes), \
              {} background jobs, {:.1} % of a core",
-            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones,
+            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones, t.meshes,
             t.jobs, 100.0 * t.background_cpu_share
         ))?;
         context.say(format!(
