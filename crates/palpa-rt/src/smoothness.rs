@@ -22,6 +22,8 @@ pub struct ForceStats {
     others: Histogram,
     max_force: f64,
     work: f64,
+    /// Since the last ramp.
+    ledger: f64,
     max_work: f64,
 }
 
@@ -32,7 +34,7 @@ pub struct ForceReport {
     pub rms_band: f64,
     /// The largest such RMS over any 2 s, N.
     pub rms_band_worst: f64,
-    /// Largest change of force from one tick to the next where a patch arrived, N.
+    /// Largest change of force from one tick to the next where a patch arrived, N; as all changes here, without those of ramps.
     pub arrival_max: f64,
     /// The change that 999 of 1000 such ticks stay below, N.
     pub arrival_p999: f64,
@@ -46,7 +48,7 @@ pub struct ForceReport {
     pub max_force: f64,
     /// Work done on the hand in all, J: positive if the device gave more than it took.
     pub work: f64,
-    /// The most that this work ever was, J.
+    /// The most that this work ever was since the last fault, J: a ramp takes energy and gives it on purpose.
     pub max_work: f64,
 }
 
@@ -71,6 +73,7 @@ impl ForceStats {
             others: Histogram::new(),
             max_force: 0.0,
             work: 0.0,
+            ledger: 0.0,
             max_work: 0.0,
         }
     }
@@ -93,6 +96,8 @@ impl ForceStats {
             self.worst_sum = self.worst_sum.max(self.squares.iter().sum());
         }
         self.max_force = self.max_force.max(norm(force));
+        // A ramp changes the force on purpose, within its own limits.
+        let is_ramping = entry.tick.gain < 1.0;
         if let Some(last) = self.last {
             let step = std::array::from_fn(|i| force[i] - last.force[i]);
             let changes = if entry.tick.taken {
@@ -100,8 +105,10 @@ impl ForceStats {
             } else {
                 &self.others
             };
-            changes.add(norm(step));
-            if entry.tick.taken {
+            if !is_ramping {
+                changes.add(norm(step));
+            }
+            if entry.tick.taken && !is_ramping {
                 let way = norm(std::array::from_fn(|i| {
                     device.position[i] - last.position[i]
                 }));
@@ -115,7 +122,8 @@ impl ForceStats {
                     .sum();
                 if work.is_finite() {
                     self.work += work;
-                    self.max_work = self.max_work.max(self.work);
+                    self.ledger = if is_ramping { 0.0 } else { self.ledger + work };
+                    self.max_work = self.max_work.max(self.ledger);
                 }
             }
         }
@@ -197,12 +205,23 @@ mod tests {
         taken: impl Fn(u64) -> bool,
         at: impl Fn(f64) -> (f64, f64),
     ) {
+        feed_ramping(stats, n, taken, at, |_| 1.0);
+    }
+
+    fn feed_ramping(
+        stats: &mut ForceStats,
+        n: u64,
+        taken: impl Fn(u64) -> bool,
+        at: impl Fn(f64) -> (f64, f64),
+        gain: impl Fn(u64) -> f64,
+    ) {
         for tick in 1..=n {
             let (position, force) = at(tick as f64 * 1e-3);
             let mut entry = TickEntry {
                 tick: TickRecord {
                     tick,
                     taken: taken(tick),
+                    gain: gain(tick),
                     ..TickRecord::default()
                 },
                 ..TickEntry::default()
@@ -250,6 +269,25 @@ mod tests {
         assert!((r.arrival_max - 1.001).abs() < 1e-6);
         assert!((r.other_max - 0.001).abs() < 1e-6);
         assert!((r.max_force - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_ramp_does_is_no_jump_and_begins_the_count_of_energy_anew() {
+        let mut stats = ForceStats::new(1e-3);
+        // Pushed away by 1 mm with 1 N, then let go and taken back within a ramp, then pushed again.
+        let place = |t: f64| if (0.1..0.3).contains(&t) { 1e-3 } else { 0.0 };
+        let force = |t: f64| if (0.2..0.4).contains(&t) { 0.0 } else { 1.0 };
+        let gain = |tick: u64| {
+            if (150..=450).contains(&tick) {
+                0.5
+            } else {
+                1.0
+            }
+        };
+        feed_ramping(&mut stats, 500, |_| true, |t| (place(t), force(t)), gain);
+        let r = stats.report();
+        assert!((r.max_work - 1e-3).abs() < 1e-12, "{}", r.max_work);
+        assert!(r.arrival_max < 1e-12, "{}", r.arrival_max);
     }
 
     #[test]

@@ -496,20 +496,27 @@ impl Outside {
             .add_forces(model, memory, displacements, &mut follower.forces)?;
         self.at.copy_from_slice(displacements);
         self.right[plan.tree.first_zone_dof()..].fill(0.0);
-        let (mut square, mut turned) = (0.0, 0.0);
-        for &[node, _] in &plan.exterior {
-            let free = |force: &Vec3| model.supports[node as usize].free_part(force);
-            let force = free(&follower.forces[node as usize]);
-            square += force.norm_squared();
-            turned += force.dot(&free(&follower.before[node as usize]));
-        }
-        follower.relax(turned);
-        let relaxed = plan.exterior.iter().map(|n| (n, follower.share));
-        for (&[node, dof], share) in relaxed.chain(plan.ring.iter().map(|n| (n, 1.0))) {
+        let mut put = |node: u32, dof: u32| {
             let force = model.supports[node as usize].free_part(&follower.forces[node as usize]);
             for c in 0..3 {
-                self.right[dof as usize + c] = -(share * force[c]) as f32;
+                self.right[dof as usize + c] = -force[c] as f32;
             }
+            force
+        };
+        let (mut square, mut turned) = (0.0, 0.0);
+        for &[node, dof] in &plan.exterior {
+            let force = put(node, dof);
+            square += force.norm_squared();
+            turned += force.dot(&follower.before[node as usize]);
+        }
+        for &[node, dof] in &plan.ring {
+            put(node, dof);
+        }
+        follower.relax(turned);
+        if follower.share < 1.0 {
+            let share = follower.share as f32;
+            let n = plan.tree.first_zone_dof();
+            self.right[..n].iter_mut().for_each(|x| *x *= share);
         }
         let right = &mut self.right;
         substitute(

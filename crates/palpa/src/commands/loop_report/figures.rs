@@ -116,7 +116,7 @@ struct ForceFigures {
     /// By the law's own count.
     energy_in_mj: f64,
     energy_out_mj: f64,
-    /// The most that was ever given out beyond what was taken in.
+    /// The most that was ever given out beyond what was taken in, since the last fault.
     energy_deficit_mj: f64,
     energy_budget_mj: f64,
     softening_max: f64,
