@@ -10,6 +10,7 @@ mod ccx;
 mod faults;
 mod lump_stroke;
 mod manifest;
+mod mesh_moves;
 mod moving;
 mod real;
 mod stable;
