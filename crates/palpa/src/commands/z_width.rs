@@ -41,7 +41,7 @@ pub struct Args {
     grips: Vec<String>,
 }
 
-/// What is written to z_width.json.
+/// What is written to `z_width.json`.
 #[derive(Debug, Serialize)]
 struct Found {
     /// Whether it was not interrupted.

@@ -65,7 +65,7 @@ pub struct RoamJob {
 
 #[derive(Debug)]
 enum Kind {
-    Zone(Rebuild),
+    Zone(Box<Rebuild>),
     Mesh(Arc<dyn FineBodies>, Vec3),
     Move(Box<Move>),
 }
@@ -261,7 +261,7 @@ impl Roaming {
             return None;
         }
         let kind = match self.live.take_job() {
-            Some(job) => Kind::Zone(job),
+            Some(job) => Kind::Zone(Box::new(job)),
             None => self.ask()?,
         };
         self.is_job_out = true;
@@ -297,18 +297,14 @@ impl Roaming {
     /// Where the skin is pressed, or would be, and how far ahead of that the next mesh is to be fine; at rest, m.
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
-        match live.pressed() {
-            Some(Pressed { middle, along }) => {
-                let drift = live.drift - along * along.dot(&live.drift);
-                let ahead = drift.try_normalize(1e-6).unwrap_or_default();
-                (middle, ahead * (LEAD * radius))
-            }
-            None => {
-                let displacements = &live.state.displacements;
-                let (_, point) = nearest_point(&live.model, displacements, &live.tools, None);
-                (point, Vec3::zeros())
-            }
+        if let Some(Pressed { middle, along }) = live.pressed() {
+            let drift = live.drift - along * along.dot(&live.drift);
+            let ahead = drift.try_normalize(1e-6).unwrap_or_default();
+            return (middle, ahead * (LEAD * radius));
         }
+        let displacements = &live.state.displacements;
+        let (_, point) = nearest_point(&live.model, displacements, &live.tools, None);
+        (point, Vec3::zeros())
     }
 
     /// Takes over what came of a job.
