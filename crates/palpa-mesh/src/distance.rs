@@ -21,6 +21,8 @@ pub struct Closest {
     pub point: Vec3,
     /// The triangle that it lies on.
     pub triangle: u32,
+    /// Shares of its corners in the point.
+    pub weights: [f64; 3],
     /// Distance, negative on the inner side (where the surface is closed and oriented outward). m
     pub signed_distance: f64,
 }
@@ -81,6 +83,7 @@ impl SurfaceIndex {
         Some(Closest {
             point,
             triangle: triangle.id,
+            weights,
             signed_distance,
         })
     }

@@ -34,8 +34,8 @@ pub enum StepStatus {
     Converged = 0,
     /// Not within its tolerance, but usable: the next steps go on from here.
     Unfinished = 1,
-    /// It backed off to the last good state and made the patch from there.
-    BackedOff = 2,
+    /// It did not come as far as the tools: the patch is of the place that it reached.
+    Behind = 2,
     /// Not fit to be felt yet, as after a change of zone: the patch is not published.
     Settling = 3,
     /// There is no usable state: the patch is not published.
@@ -45,7 +45,7 @@ pub enum StepStatus {
 impl StepStatus {
     /// Whether the patch of such a step is given to the 1 kHz loop.
     pub fn is_published(self) -> bool {
-        matches!(self, Self::Converged | Self::Unfinished | Self::BackedOff)
+        matches!(self, Self::Converged | Self::Unfinished | Self::Behind)
     }
 
     /// In a word.
@@ -53,7 +53,7 @@ impl StepStatus {
         match self {
             Self::Converged => "converged",
             Self::Unfinished => "unfinished",
-            Self::BackedOff => "backed off to the last good state",
+            Self::Behind => "behind the tool",
             Self::Settling => "settling, patch held back",
             Self::Failed => "failed, patch held back",
         }

@@ -155,7 +155,7 @@ impl Tissue for LiveTissue {
             status: match report.outcome {
                 StepOutcome::Arrived if report.residual <= self.tolerance => StepStatus::Converged,
                 StepOutcome::Arrived => StepStatus::Unfinished,
-                StepOutcome::Behind => StepStatus::BackedOff,
+                StepOutcome::Behind => StepStatus::Behind,
                 StepOutcome::BackedOff => StepStatus::Settling,
                 StepOutcome::Failed => StepStatus::Failed,
             },

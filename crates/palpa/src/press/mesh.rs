@@ -354,12 +354,8 @@ impl<'a> Shadows<'a> {
             };
         };
         let t = closest.triangle as usize;
-        let [a, b, c] = level.corners(t);
-        let part = |p: Vec3, q: Vec3| (p - closest.point).cross(&(q - closest.point)).norm();
-        let weights = [part(b, c), part(c, a), part(a, b)];
-        let sum: f64 = weights.iter().sum();
-        let on_skin = (self.body.skin.corners(t).iter().zip(weights))
-            .map(|(p, w)| p * (w / sum))
+        let on_skin = (self.body.skin.corners(t).iter().zip(closest.weights))
+            .map(|(p, weight)| p * weight)
             .sum();
         let areas = [&self.body.skin, level].map(|s| s.area_vector(t).norm());
         Shadow {

@@ -254,7 +254,7 @@ fn the_loop_on_finite_elements_is_quiet_and_makes_no_energy() {
 }
 
 #[test]
-#[ignore = "a quarter of an hour"]
+#[ignore = "some minutes"]
 fn every_hand_on_every_tissue() {
     let mut failures = Vec::new();
     for case in &CASES {

@@ -62,7 +62,7 @@ impl Come {
 impl Carry {
     /// Cost: a search for each vertex and each triangle.
     pub(super) fn new(old: &Model, new: &Model) -> Self {
-        /// Of an edge: vertices of two meshes that are nearer than this are the same.
+        /// Vertices of two meshes are the same where all but this share is one's.
         const SAME: f64 = 1e-6;
         let skin = &old.body.skin;
         let index = SurfaceIndex::build(skin);
@@ -71,15 +71,9 @@ impl Carry {
             let Some(closest) = index.closest(*point) else {
                 continue;
             };
-            let corners = skin.corners(closest.triangle as usize);
-            let part = |p: Vec3, q: Vec3| (p - closest.point).cross(&(q - closest.point)).norm();
-            let [a, b, c] = corners;
-            let weights = [part(b, c), part(c, a), part(a, b)];
-            let sum: f64 = weights.iter().sum();
-            let vertices = skin.triangles[closest.triangle as usize];
-            parts.push([0, 1, 2].map(|k| (vertices[k], weights[k] / sum)));
-            let size = (b - a).norm();
-            let at = (0..3).find(|&k| (corners[k] - point).norm() < SAME * size);
+            let (weights, vertices) = (closest.weights, skin.triangles[closest.triangle as usize]);
+            parts.push([0, 1, 2].map(|k| (vertices[k], weights[k])));
+            let at = (0..3).find(|&k| weights[k] > 1.0 - SAME);
             same.push(at.map(|k| vertices[k]));
         }
         let mut place = vec![(0, 0); skin.triangles.len()];

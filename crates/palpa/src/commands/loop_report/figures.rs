@@ -89,7 +89,7 @@ struct TissueFigures {
     /// Steps that did not come as far as the tool, and their share of those with contact.
     behind: u64,
     behind_share: f64,
-    /// Largest share of ticks without a force because the tissue was late.
+    /// Share of the ticks without a force because the tissue was late.
     stale_share: f64,
     jobs: u64,
     job_cpu_us: Times,
@@ -167,7 +167,7 @@ impl Figures {
             steps.filter(|s| s.status == wanted as u8).count() as u64
         };
         let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
-        let behind = status(StepStatus::BackedOff);
+        let behind = status(StepStatus::Behind);
         let stale = ticks().filter(|t| {
             let bits = u16::try_from(t.tick.faults).unwrap_or(0);
             Faults::from_bits(bits).contains(Faults::STALE_PATCH)
