@@ -229,7 +229,7 @@ fn a_followed_exterior_does_not_swing() {
     }
 }
 
-/// A block with edges of 4 mm within 18 mm of a place, and of 10 mm elsewhere.
+/// A block with edges of 4 mm within 24 mm of a place, and of 10 mm elsewhere.
 #[derive(Debug)]
 struct Meshes {
     coarse: LayeredBody,
@@ -244,7 +244,7 @@ impl FineBodies for Meshes {
     }
 
     fn radius(&self) -> f64 {
-        18e-3
+        24e-3
     }
 
     fn model(&self, place: Vec3) -> Result<Arc<Model>, FemError> {
@@ -312,12 +312,16 @@ fn a_fine_mesh_moves_with_the_tool() {
             before = force.norm();
         }
         assert!(
-            meshes > 4 && roaming.n_meshes()[1] == 0,
+            meshes > 2 && roaming.n_meshes()[1] == 0,
             "{:?}",
             roaming.n_meshes()
         );
         // The memory of a linear exterior lags by a job, and a mesh takes two.
         let bound = if prony.is_some() { 0.05 } else { 0.01 };
+        println!(
+            "{friction} {}: {meshes} meshes, {worst:.4}, {jump:.4}",
+            prony.is_some()
+        );
         assert!(worst < bound, "{friction}: {worst}");
         assert!(jump < 0.01, "{friction}: {jump}");
     }

@@ -98,6 +98,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let damage = damage(&log.ending);
     let found = Found {
         verdict: match report.verdict {
+            Verdict::Same if log.ending != Ending::Whole => "same_as_far_as_read",
             Verdict::Same => "same",
             Verdict::WithinTolerance => "within_tolerance",
             Verdict::Different => "different",

@@ -15,7 +15,7 @@ use crate::continuum;
 use crate::press::mesh::CoarseBody;
 
 /// The fine part holds a zone, and so much round it, m.
-const MARGIN: f64 = 10e-3;
+const MARGIN: f64 = 15e-3;
 /// Meshes that are kept to be used again.
 const MOST_KEPT: usize = 24;
 

@@ -76,6 +76,11 @@ fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
         .unwrap_or_else(Vec3::x)
 }
 
+/// Where the hand begins, in the device's frame, m.
+pub(super) fn beginning(scene: &Scene, scene_from_device: &Pose) -> Vec3 {
+    start(&scene.motion, &across(&scene.motion, scene_from_device))
+}
+
 fn start(motion: &Motion, across: &Vec3) -> Vec3 {
     if motion.kind.goes_across() {
         across * (-0.5 * motion.length)

@@ -42,6 +42,8 @@ const LEAST_ZONE: f64 = 12e-3;
 /// How far a tool may go in a step of the tissue with the force at the device within about 2 % of the converged one, m: see
 /// "Force while moving" in docs/realtime.md.
 pub const GOOD_TRAVEL: f64 = 0.2e-3;
+/// A body of more nodes takes gigabytes, and a step of it longer than a patch may be old.
+const MOST_NODES: usize = 80_000;
 /// Distance of the points along the hand's way at which the body is made fine, m.
 const WAY_STEP: f64 = 4e-3;
 
@@ -56,6 +58,8 @@ pub struct LiveScene {
     pub scene_from_device: Pose,
     /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
     pub meshes: Option<Arc<FineScene>>,
+    /// Where the hand begins, in the device's frame, m.
+    pub start: Vec3,
     /// How the moving step goes about its work.
     pub params: LiveParams,
     /// Mean length of the skin's edges near the tool, m.
@@ -80,6 +84,11 @@ impl LiveScene {
         let scene = &coarser(scene);
         let built = build(scene)?;
         let moves = scene.mesh.moves && scene.mesh.refine;
+        if scene.mesh.moves && !moves {
+            bail!(
+                "[mesh] moves = true needs refine = true: with refine = false nothing is fine that could move"
+            );
+        }
         let way = if moves { Vec::new() } else { way(scene) };
         let indentation = Indentation::build_along(scene, &built, &way)?;
         let mut notes = built.notes.clone();
@@ -99,10 +108,23 @@ impl LiveScene {
             None
         };
         let model = match &meshes {
-            Some(meshes) => meshes.model(meshes.place(built.press_at))?,
+            Some(meshes) => {
+                let start =
+                    posed.pose * nalgebra::Point3::from(hand::beginning(scene, &posed.pose));
+                meshes.model(meshes.place(start.coords))?
+            }
             None => Arc::new(indentation.model),
         };
+        if model.n_nodes() > MOST_NODES {
+            bail!(
+                "{} nodes are more than can be pressed in real time, {MOST_NODES}; make the mesh coarser: [mesh] near_tool is \
+                 {:.1} mm under the tool now",
+                model.n_nodes(),
+                1e3 * indentation.mesh.mesh_size
+            );
+        }
         Ok(Self {
+            start: hand::beginning(scene, &posed.pose),
             meshes,
             mesh_size: indentation.mesh.mesh_size,
             params: LiveParams {
@@ -122,7 +144,7 @@ impl LiveScene {
     /// # Errors
     /// When the body cannot be factored.
     pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
-        let tools = [self.posed(Vec3::zeros())];
+        let tools = [self.posed(self.start)];
         let body = match &self.meshes {
             Some(meshes) => {
                 let at = tools[0].pose.translation.vector;

@@ -365,6 +365,8 @@ pub struct Live {
     /// How far the tools go in a step, smoothed, m.
     drift: Vec3,
     depth_at_factor: f64,
+    /// Whether the exterior's last state is none to go on from.
+    is_outside_lost: bool,
     /// Time that a linear exterior's memory is behind, and may be, s.
     lag: f64,
     longest_lag: f64,
@@ -475,6 +477,7 @@ impl Live {
             latency: 0,
             drift: Vec3::zeros(),
             depth_at_factor: 0.0,
+            is_outside_lost: false,
             lag: 0.0,
             longest_lag: longest_lag(&model),
             model,
@@ -651,6 +654,7 @@ impl Live {
         self.is_fresh = false;
         self.is_outside_fresh = false;
         self.depth_at_factor = f64::INFINITY;
+        self.is_outside_lost = true;
         let body = &self.model.body;
         let (_, vertex) = nearest_vertex(&self.model, &self.state.displacements, &self.tools, None);
         let outward = body.positions[body.node(vertex, 0)] - body.positions[body.node(vertex, 1)];
@@ -1138,7 +1142,8 @@ impl Live {
             PlanOrCentre::Same(Arc::clone(&self.plan))
         };
         let is_followed = self.params.exterior == ExteriorMode::Followed;
-        let old = (!is_followed).then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside)));
+        let follows_old = !is_followed && !self.is_outside_lost;
+        let old = follows_old.then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside)));
         let history = (self.model.has_memory && (is_leaving || reaches_ring || is_followed))
             .then(|| self.history());
         let lag = std::mem::take(&mut self.lag);
@@ -1248,6 +1253,15 @@ impl Live {
         );
     }
 
+    /// Takes back work that was asked for and not given out.
+    fn take_back_job(&mut self) {
+        if let Some(job) = self.job.take() {
+            self.shop = job.shop;
+            self.retired = job.retired;
+            self.lag += job.lag;
+        }
+    }
+
     /// Work for another thread, if any is due; its result is to be given to [`Self::install`].
     pub fn take_job(&mut self) -> Option<Rebuild> {
         let job = self.job.take();
@@ -1261,7 +1275,8 @@ impl Live {
         self.latency = self.job_age;
         self.shop = Some(done.shop);
         let Some(outside) = done.outside else { return };
-        if done.inside.is_some() && self.follower.is_none() {
+        let was_lost = std::mem::take(&mut self.is_outside_lost);
+        if done.inside.is_some() && self.follower.is_none() && !was_lost {
             // What was in no zone until now is where the old exterior puts it.
             let entering = done.plan.vertices.iter().copied();
             let entering: Vec<u32> = entering

@@ -15,8 +15,8 @@ use crate::model::Model;
 const MOST_SETTLING: usize = 8;
 /// How far from the middle of what is fine the tools may be before it moves, as a share of its radius, and how far ahead of them it
 /// is then put.
-const LEAVE: f64 = 0.4;
-const LEAD: f64 = 0.3;
+const LEAVE: f64 = 0.25;
+const LEAD: f64 = 0.5;
 
 /// Meshes of one body, each fine round another place. All have the same levels, and the same skin at rest.
 pub trait FineBodies: Debug + Send + Sync {
@@ -47,6 +47,8 @@ pub struct Roaming {
     /// The mesh that is to be taken up, and its place.
     next: Option<(Vec3, Arc<Model>)>,
     is_job_out: bool,
+    /// Whether the last job was a zone: then a mesh that is wanted comes first.
+    was_zone: bool,
     /// Counts meshes.
     n_meshes: u64,
     n_failed: u64,
@@ -129,8 +131,7 @@ impl Move {
         let live = Live::at(model, &self.tools, params, self.centre, come, n).ok()?;
         let mut live = Box::new(live);
         live.lag = self.lag;
-        let mut is_there = false;
-        for _ in 0..MOST_SETTLING {
+        for round in 0..MOST_SETTLING {
             // All of the body takes part: each step asks for a stiffness of the exterior.
             live.depth_at_factor = f64::INFINITY;
             let report = live.step(&self.tools, 0.0);
@@ -140,7 +141,8 @@ impl Move {
             let is_good = report.outcome == StepOutcome::Arrived
                 && report.residual <= params.tolerance
                 && report.iterations == 1;
-            if is_there && is_good {
+            // Once with an exterior of this state at least.
+            if round > 0 && is_good {
                 return Some(Box::new(Moved {
                     place: self.place,
                     live,
@@ -149,7 +151,6 @@ impl Move {
                     lag: self.lag,
                 }));
             }
-            is_there = is_good;
         }
         None
     }
@@ -158,6 +159,7 @@ impl Move {
 impl Moved {
     /// Goes on where the old mesh is by now.
     fn take_over(self, old: &mut Live) -> Box<Live> {
+        old.take_back_job();
         old.settle();
         let mut live = self.live;
         let (now, then) = (&old.state.displacements, &self.then.state.displacements);
@@ -185,7 +187,7 @@ impl Moved {
                 follower.batches.load(&history);
             }
         }
-        live.lag += old.lag - self.lag;
+        live.lag = (live.lag + old.lag - self.lag).max(0.0);
         live.tools.copy_from_slice(&old.tools);
         live.drift = old.drift;
         live.latency = old.latency;
@@ -209,6 +211,7 @@ impl Roaming {
             live: Box::new(live),
             next: None,
             is_job_out: false,
+            was_zone: false,
             n_meshes: 1,
             n_failed: 0,
             refused: None,
@@ -250,28 +253,45 @@ impl Roaming {
         [self.n_meshes, self.n_failed]
     }
 
-    /// See [`Live::step`].
+    /// See [`Live::step`]. Where the tools press beyond what is fine, the body counts as behind.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
-        self.live.step(tools, dt)
+        let mut report = self.live.step(tools, dt);
+        if report.outcome == StepOutcome::Arrived && self.is_beyond() {
+            report.outcome = StepOutcome::Behind;
+        }
+        report
     }
 
-    /// Work for another thread, if any is due; its result is to be given to [`Self::install`]. Zones go before meshes.
+    fn is_beyond(&self) -> bool {
+        let (Some(bodies), Some(pressed)) = (&self.bodies, self.live.pressed()) else {
+            return false;
+        };
+        let reach = self.live.contact_radius(pressed.middle);
+        (pressed.middle - self.place).norm() + reach > bodies.radius()
+    }
+
+    /// Work for another thread, if any is due; its result is to be given to [`Self::install`]. Zones and
+    /// meshes take turns; a mesh that is made is taken up first.
     pub fn take_job(&mut self) -> Option<RoamJob> {
         if self.is_job_out {
             return None;
         }
-        let kind = match self.live.take_job() {
-            Some(job) => Kind::Zone(Box::new(job)),
-            None => self.ask()?,
-        };
+        let is_mesh_first = self.next.is_some() || self.was_zone;
+        let mesh = if is_mesh_first { self.ask() } else { None };
+        let zone = |live: &mut Live| Some(Kind::Zone(Box::new(live.take_job()?)));
+        let kind = mesh
+            .or_else(|| zone(&mut self.live))
+            .or_else(|| self.ask())?;
+        self.was_zone = matches!(kind, Kind::Zone(_));
         self.is_job_out = true;
         let retired = self.retired.take();
         Some(RoamJob { kind, retired })
     }
 
     fn ask(&mut self) -> Option<Kind> {
-        let bodies = self.bodies.as_ref()?;
+        let bodies = Arc::clone(self.bodies.as_ref()?);
         if let Some((place, new)) = self.next.take() {
+            self.live.take_back_job();
             return Some(Kind::Move(Box::new(Move {
                 place,
                 old: Arc::clone(&self.live.model),
@@ -291,7 +311,7 @@ impl Roaming {
         let place = bodies.place(middle + ahead);
         let is_nearer = (place - middle).norm() < (self.place - middle).norm();
         let is_new = place != self.place && self.refused != Some(place);
-        (is_nearer && is_new).then(|| Kind::Mesh(Arc::clone(bodies), place))
+        (is_nearer && is_new).then(|| Kind::Mesh(bodies, place))
     }
 
     /// Where the skin is pressed, or would be, and how far ahead of that the next mesh is to be fine; at rest, m.

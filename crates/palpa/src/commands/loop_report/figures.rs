@@ -241,16 +241,21 @@ impl Figures {
         let t = &self.tissue;
         if t.behind_share > MOST_BEHIND {
             failures.push(format!(
-                "in {:.1} % of the steps with contact the tissue was behind the tool, since zones came too late: forces there are \
-                 too small; run less beside it, move more slowly, or make the mesh coarser with [mesh] near_tool",
+                "in {:.1} % of the steps with contact the tissue was behind the tool, since zones or meshes came too late: forces there \
+                 are wrong; run less beside it, move more slowly, or make the mesh coarser with [mesh] near_tool",
                 100.0 * t.behind_share
             ));
         }
         if t.stale_share > MOST_STALE {
             failures.push(format!(
-                "{:.1} % of the ticks had no force, since the tissue was late; make the mesh coarser with [mesh] near_tool \
-                 (steps/s fall as nodes grow: {} now)",
-                100.0 * t.stale_share, self.nodes
+                "{:.1} % of the ticks had no force, since no fresh patch came ({} steps failed, {:.0} steps/s on {} nodes)",
+                100.0 * t.stale_share, t.held_back, t.steps_per_s, self.nodes
+            ));
+        }
+        if t.held_back as f64 > MOST_BEHIND * t.steps as f64 {
+            failures.push(format!(
+                "{} of {} steps of the tissue failed and were not felt; press less deep, or make the mesh finer there",
+                t.held_back, t.steps
             ));
         }
         // Zones that come too late are seen above.
