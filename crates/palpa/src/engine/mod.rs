@@ -83,8 +83,8 @@ impl LiveScene {
         }
         let scene = &coarser(scene);
         let built = build(scene)?;
-        let moves = scene.mesh.moves && scene.mesh.refine;
-        if scene.mesh.moves && !moves {
+        let moves = scene.mesh.moves;
+        if moves && !scene.mesh.refine {
             bail!(
                 "[mesh] moves = true needs refine = true: with refine = false nothing is fine that could move"
             );
@@ -102,6 +102,7 @@ impl LiveScene {
         let Some(posed) = indentation.tool_at(-scene.motion.above) else {
             bail!("the tool is bonded to the skin");
         };
+        let start = hand::beginning(scene, &posed.pose);
         let meshes = if moves {
             Some(Arc::new(FineScene::new(scene, &built)?))
         } else {
@@ -109,9 +110,8 @@ impl LiveScene {
         };
         let model = match &meshes {
             Some(meshes) => {
-                let start =
-                    posed.pose * nalgebra::Point3::from(hand::beginning(scene, &posed.pose));
-                meshes.model(meshes.place(start.coords))?
+                let at = posed.pose * nalgebra::Point3::from(start);
+                meshes.model(meshes.place(at.coords))?
             }
             None => Arc::new(indentation.model),
         };
@@ -124,7 +124,7 @@ impl LiveScene {
             );
         }
         Ok(Self {
-            start: hand::beginning(scene, &posed.pose),
+            start,
             meshes,
             mesh_size: indentation.mesh.mesh_size,
             params: LiveParams {

@@ -277,11 +277,13 @@ impl Roaming {
             return None;
         }
         let is_mesh_first = self.next.is_some() || self.was_zone;
-        let mesh = if is_mesh_first { self.ask() } else { None };
         let zone = |live: &mut Live| Some(Kind::Zone(Box::new(live.take_job()?)));
-        let kind = mesh
-            .or_else(|| zone(&mut self.live))
-            .or_else(|| self.ask())?;
+        // Where nothing presses, to ask is a search over the skin: once a step.
+        let kind = if is_mesh_first {
+            self.ask().or_else(|| zone(&mut self.live))
+        } else {
+            zone(&mut self.live).or_else(|| self.ask())
+        }?;
         self.was_zone = matches!(kind, Kind::Zone(_));
         self.is_job_out = true;
         let retired = self.retired.take();
