@@ -1,0 +1,238 @@
+//! Snapshots: what a page draws, as bytes. These types are the only definition of the wire; the page's reader is made of them.
+//!
+//! A snapshot is a message of its own: version (u32), kind (u32), then the fields in order, little-endian, each at a multiple of
+//! its own size (of its items' size, and at least 4, for lists), so that a page can look at lists in place. A list is its
+//! length (u32), then its items.
+
+use std::fmt::Write as _;
+
+/// Raised with every change of a field.
+pub const SNAPSHOT_VERSION: u32 = 1;
+
+/// A type that a snapshot can hold.
+trait Wire {
+    /// What a page calls it, and how it reads it.
+    const TYPE: &'static str;
+    const READ: &'static str;
+    fn put(&self, out: &mut Vec<u8>);
+}
+
+fn align(out: &mut Vec<u8>, to: usize) {
+    out.resize(out.len().next_multiple_of(to), 0);
+}
+
+macro_rules! number {
+    ($($type:ty, $read:literal, $array:literal;)*) => {$(
+        impl Wire for $type {
+            const TYPE: &'static str = "number";
+            const READ: &'static str = concat!("r.", $read, "()");
+            fn put(&self, out: &mut Vec<u8>) {
+                align(out, size_of::<$type>());
+                out.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+        impl Wire for Vec<$type> {
+            const TYPE: &'static str = $array;
+            const READ: &'static str = concat!("r.", $read, "s()");
+            fn put(&self, out: &mut Vec<u8>) {
+                (self.len() as u32).put(out);
+                align(out, size_of::<$type>());
+                out.extend(self.iter().flat_map(|v| v.to_le_bytes()));
+            }
+        }
+    )*};
+}
+number! {
+    u8, "u8", "Uint8Array";
+    u16, "u16", "Uint16Array";
+    i16, "i16", "Int16Array";
+    u32, "u32", "Uint32Array";
+    f32, "f32", "Float32Array";
+    f64, "f64", "Float64Array";
+}
+
+macro_rules! fixed {
+    ($($n:literal, $type:literal, $read:literal;)*) => {$(
+        impl Wire for [f64; $n] {
+            const TYPE: &'static str = $type;
+            const READ: &'static str = $read;
+            fn put(&self, out: &mut Vec<u8>) {
+                for v in self {
+                    v.put(out);
+                }
+            }
+        }
+    )*};
+}
+fixed! {
+    3, "[number, number, number]", "[r.f64(), r.f64(), r.f64()]";
+    4, "[number, number, number, number]", "[r.f64(), r.f64(), r.f64(), r.f64()]";
+}
+
+/// Makes a struct, its bytes, and its part of the page's reader.
+macro_rules! snapshot {
+    ($(#[doc = $doc:literal])* $name:ident = $kind:literal { $($(#[doc = $field_doc:literal])* $field:ident: $type:ty,)* }) => {
+        $(#[doc = $doc])*
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct $name { $($(#[doc = $field_doc])* pub $field: $type,)* }
+
+        impl $name {
+            /// As bytes.
+            pub fn encode(&self) -> Vec<u8> {
+                let mut out = Vec::new();
+                SNAPSHOT_VERSION.put(&mut out);
+                ($kind as u32).put(&mut out);
+                $(self.$field.put(&mut out);)*
+                out
+            }
+
+            fn typescript(out: &mut String) {
+                let docs = [$($doc),*].concat();
+                let _ = write!(out, "\n/**{docs} */\nexport interface {} {{\n  kind: {};\n", stringify!($name), $kind);
+                $(
+                    let docs = [$($field_doc),*].concat();
+                    let _ = write!(out, "  /**{docs} */\n  {}: {};\n", stringify!($field), <$type as Wire>::TYPE);
+                )*
+                let _ = write!(out, "}}\n\nfunction read{}(r: Reader): {} {{\n  return {{\n    kind: {},\n", stringify!($name), stringify!($name), $kind);
+                $(let _ = write!(out, "    {}: {},\n", stringify!($field), <$type as Wire>::READ);)*
+                out.push_str("  };\n}\n");
+            }
+        }
+    };
+}
+
+snapshot! {
+    /// A body at rest: sent to each page once, and again when the mesh changes.
+    MeshSnapshot = 1 {
+        /// Its number; frames say to which they belong.
+        mesh: u32,
+        /// Nodes in a column. Node (v, l) of skin vertex v has the index v * n_levels + l; level 0 is the skin, the last is held by bone or base.
+        n_levels: u32,
+        /// Nodes at rest, m: x, y, z one after the other.
+        positions: Vec<f32>,
+        /// Triangles of the skin, outward: three vertices each. Under each stands a prism per interval between levels.
+        triangles: Vec<u32>,
+        /// The layer of each interval.
+        interval_layer: Vec<u8>,
+        /// Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at t * (n_levels - 1) + i.
+        stiffness: Vec<f32>,
+        /// Vertices of the bones' surfaces, m; they do not move.
+        bone_positions: Vec<f32>,
+        /// Their triangles.
+        bone_triangles: Vec<u32>,
+    }
+}
+
+snapshot! {
+    /// A moment of a body that is pressed, and of who presses.
+    FrameSnapshot = 2 {
+        /// The mesh that it belongs to.
+        mesh: u32,
+        /// Counts frames.
+        sequence: u32,
+        /// Whether it is of a recording (1) or of now (0).
+        is_replay: u32,
+        /// The tick of the 1 kHz loop.
+        tick: f64,
+        /// When that was, s since the engine's start; in a recording, since its beginning.
+        time: f64,
+        /// Where the device is: the tip of the tool as the hand holds it, m.
+        device: [f64; 3],
+        /// Where the tip of the tool is, m: stands off the device where the tissue is stiffer than the device can render.
+        tool: [f64; 3],
+        /// How the tool is turned: quaternion i, j, k, w.
+        orientation: [f64; 4],
+        /// Force on the hand, N, as commanded at this tick.
+        force: [f64; 3],
+        /// How far the tip is under the skin at rest, m.
+        depth: f64,
+        /// Share of the force that is let through; below 1 after a fault.
+        gain: f64,
+        /// Vertices that touch.
+        n_active: u32,
+        /// How the tissue's last step went: 0 converged, 1 unfinished, 2 behind the tool, 3 settling, 4 failed.
+        step_status: u32,
+        /// What was wrong at this tick, as bits.
+        faults: u32,
+        /// Limits that the force met, as bits.
+        limits: u32,
+        /// Length of one unit of `displacements`, m.
+        displacement_unit: f64,
+        /// Displacements of the nodes: x, y, z one after the other.
+        displacements: Vec<i16>,
+        /// Which field follows: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch.
+        field: u32,
+        /// The field's value at 0.
+        field_min: f64,
+        /// The field's value at 65535.
+        field_max: f64,
+        /// The field at the nodes; empty without one.
+        field_values: Vec<u16>,
+    }
+}
+
+/// The page's reader of snapshots, as a TypeScript module.
+pub fn typescript() -> String {
+    let mut out = format!(
+        "// Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.\n\n\
+         export const SNAPSHOT_VERSION = {SNAPSHOT_VERSION};\n{READER}"
+    );
+    MeshSnapshot::typescript(&mut out);
+    FrameSnapshot::typescript(&mut out);
+    out.push_str(
+        "\nexport type Snapshot = MeshSnapshot | FrameSnapshot;\n\n\
+         /** Reads a snapshot; its lists look into `buffer`. Throws when it is of another version or cut off. */\n\
+         export function readSnapshot(buffer: ArrayBuffer): Snapshot {\n\
+         \x20 const r = new Reader(buffer);\n\
+         \x20 const version = r.u32();\n\
+         \x20 if (version !== SNAPSHOT_VERSION) throw new Error(`snapshot of version ${version}, expected ${SNAPSHOT_VERSION}`);\n\
+         \x20 const kind = r.u32();\n\
+         \x20 if (kind === 1) return readMeshSnapshot(r);\n\
+         \x20 if (kind === 2) return readFrameSnapshot(r);\n\
+         \x20 throw new Error(`snapshot of unknown kind ${kind}`);\n\
+         }\n",
+    );
+    out
+}
+
+const READER: &str = r"
+class Reader {
+  private at = 0;
+  private readonly view: DataView;
+  constructor(private readonly buffer: ArrayBuffer) {
+    this.view = new DataView(buffer);
+  }
+  private take(size: number, n = 1): number {
+    const from = Math.ceil(this.at / size) * size;
+    this.at = from + size * n;
+    if (this.at > this.buffer.byteLength) throw new Error('snapshot is cut off');
+    return from;
+  }
+  u32(): number {
+    return this.view.getUint32(this.take(4), true);
+  }
+  f64(): number {
+    return this.view.getFloat64(this.take(8), true);
+  }
+  u8s(): Uint8Array {
+    const n = this.u32();
+    return new Uint8Array(this.buffer, this.take(1, n), n);
+  }
+  u16s(): Uint16Array {
+    const n = this.u32();
+    return new Uint16Array(this.buffer, this.take(2, n), n);
+  }
+  i16s(): Int16Array {
+    const n = this.u32();
+    return new Int16Array(this.buffer, this.take(2, n), n);
+  }
+  u32s(): Uint32Array {
+    const n = this.u32();
+    return new Uint32Array(this.buffer, this.take(4, n), n);
+  }
+  f32s(): Float32Array {
+    const n = this.u32();
+    return new Float32Array(this.buffer, this.take(4, n), n);
+  }
+}
+";

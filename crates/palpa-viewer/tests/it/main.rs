@@ -1,0 +1,3 @@
+//! The viewer's wire and server.
+
+mod generated;

@@ -1,0 +1,116 @@
+// The connection to the engine: snapshots and messages in, requests out. It comes back by itself when it is lost.
+
+import type { Envelope, Message } from './generated/api';
+import { readSnapshot, type Snapshot } from './generated/wire';
+
+/** What may be asked; an envelope without its number. */
+export type Request = DistributiveOmit<Envelope, 'id'>;
+type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
+
+export type ConnectionStatus = 'connecting' | 'open' | 'lost';
+
+export interface ConnectionListener {
+  onStatus(status: ConnectionStatus): void;
+  onMessage(message: Message): void;
+  onSnapshot(snapshot: Snapshot): void;
+}
+
+const FIRST_WAIT = 500;
+const LONGEST_WAIT = 5000;
+/** A connection that says nothing for so long is lost: the engine speaks twice a second. */
+const SILENCE = 6000;
+const REPLY_WAIT = 10_000;
+
+export class Connection {
+  private socket: WebSocket | null = null;
+  private wait = FIRST_WAIT;
+  private timer = 0;
+  private silence = 0;
+  private nextId = 1;
+  private readonly waiting = new Map<number, (error: string | null) => void>();
+  private closed = false;
+
+  constructor(private readonly listener: ConnectionListener) {
+    this.open();
+  }
+
+  /** Asks, and resolves to why it was refused, or null. */
+  request(request: Request): Promise<string | null> {
+    const id = this.nextId++;
+    return new Promise((resolve) => {
+      if (!this.send({ id, ...request } as Envelope)) {
+        resolve('not connected');
+        return;
+      }
+      const timer = window.setTimeout(() => this.answer(id, 'no answer'), REPLY_WAIT);
+      this.waiting.set(id, (error) => {
+        window.clearTimeout(timer);
+        resolve(error);
+      });
+    });
+  }
+
+  /** Asks without waiting for the answer, as for every move of the hand. Says whether it was sent. */
+  send(envelope: Envelope | Request): boolean {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(envelope));
+    return true;
+  }
+
+  close(): void {
+    this.closed = true;
+    window.clearTimeout(this.timer);
+    window.clearTimeout(this.silence);
+    this.socket?.close();
+  }
+
+  private open(): void {
+    this.listener.onStatus('connecting');
+    const url = new URL('ws', location.href);
+    url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
+    url.search = '';
+    const token = new URLSearchParams(location.search).get('token');
+    if (token !== null) url.searchParams.set('token', token);
+    const socket = new WebSocket(url);
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => {
+      this.wait = FIRST_WAIT;
+      this.listener.onStatus('open');
+      this.hear();
+    };
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      this.hear();
+      if (typeof event.data === 'string') this.read(JSON.parse(event.data) as Message);
+      else this.listener.onSnapshot(readSnapshot(event.data));
+    };
+    socket.onclose = () => this.lose(socket);
+    this.socket = socket;
+  }
+
+  private read(message: Message): void {
+    if (message.type === 'reply' && message.id != null) this.answer(message.id, message.error ?? null);
+    else this.listener.onMessage(message);
+  }
+
+  private answer(id: number, error: string | null): void {
+    this.waiting.get(id)?.(error);
+    this.waiting.delete(id);
+  }
+
+  private hear(): void {
+    window.clearTimeout(this.silence);
+    this.silence = window.setTimeout(() => this.lose(this.socket), SILENCE);
+  }
+
+  private lose(socket: WebSocket | null): void {
+    if (this.closed || socket === null || socket !== this.socket) return;
+    this.socket = null;
+    socket.onclose = null;
+    socket.close();
+    window.clearTimeout(this.silence);
+    for (const id of [...this.waiting.keys()]) this.answer(id, 'the connection was lost');
+    this.listener.onStatus('lost');
+    this.timer = window.setTimeout(() => this.open(), this.wait);
+    this.wait = Math.min(2 * this.wait, LONGEST_WAIT);
+  }
+}

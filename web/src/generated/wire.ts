@@ -1,0 +1,165 @@
+// Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.
+
+export const SNAPSHOT_VERSION = 1;
+
+class Reader {
+  private at = 0;
+  private readonly view: DataView;
+  constructor(private readonly buffer: ArrayBuffer) {
+    this.view = new DataView(buffer);
+  }
+  private take(size: number, n = 1): number {
+    const from = Math.ceil(this.at / size) * size;
+    this.at = from + size * n;
+    if (this.at > this.buffer.byteLength) throw new Error('snapshot is cut off');
+    return from;
+  }
+  u32(): number {
+    return this.view.getUint32(this.take(4), true);
+  }
+  f64(): number {
+    return this.view.getFloat64(this.take(8), true);
+  }
+  u8s(): Uint8Array {
+    const n = this.u32();
+    return new Uint8Array(this.buffer, this.take(1, n), n);
+  }
+  u16s(): Uint16Array {
+    const n = this.u32();
+    return new Uint16Array(this.buffer, this.take(2, n), n);
+  }
+  i16s(): Int16Array {
+    const n = this.u32();
+    return new Int16Array(this.buffer, this.take(2, n), n);
+  }
+  u32s(): Uint32Array {
+    const n = this.u32();
+    return new Uint32Array(this.buffer, this.take(4, n), n);
+  }
+  f32s(): Float32Array {
+    const n = this.u32();
+    return new Float32Array(this.buffer, this.take(4, n), n);
+  }
+}
+
+/** A body at rest: sent to each page once, and again when the mesh changes. */
+export interface MeshSnapshot {
+  kind: 1;
+  /** Its number; frames say to which they belong. */
+  mesh: number;
+  /** Nodes in a column. Node (v, l) of skin vertex v has the index v * n_levels + l; level 0 is the skin, the last is held by bone or base. */
+  n_levels: number;
+  /** Nodes at rest, m: x, y, z one after the other. */
+  positions: Float32Array;
+  /** Triangles of the skin, outward: three vertices each. Under each stands a prism per interval between levels. */
+  triangles: Uint32Array;
+  /** The layer of each interval. */
+  interval_layer: Uint8Array;
+  /** Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at t * (n_levels - 1) + i. */
+  stiffness: Float32Array;
+  /** Vertices of the bones' surfaces, m; they do not move. */
+  bone_positions: Float32Array;
+  /** Their triangles. */
+  bone_triangles: Uint32Array;
+}
+
+function readMeshSnapshot(r: Reader): MeshSnapshot {
+  return {
+    kind: 1,
+    mesh: r.u32(),
+    n_levels: r.u32(),
+    positions: r.f32s(),
+    triangles: r.u32s(),
+    interval_layer: r.u8s(),
+    stiffness: r.f32s(),
+    bone_positions: r.f32s(),
+    bone_triangles: r.u32s(),
+  };
+}
+
+/** A moment of a body that is pressed, and of who presses. */
+export interface FrameSnapshot {
+  kind: 2;
+  /** The mesh that it belongs to. */
+  mesh: number;
+  /** Counts frames. */
+  sequence: number;
+  /** Whether it is of a recording (1) or of now (0). */
+  is_replay: number;
+  /** The tick of the 1 kHz loop. */
+  tick: number;
+  /** When that was, s since the engine's start; in a recording, since its beginning. */
+  time: number;
+  /** Where the device is: the tip of the tool as the hand holds it, m. */
+  device: [number, number, number];
+  /** Where the tip of the tool is, m: stands off the device where the tissue is stiffer than the device can render. */
+  tool: [number, number, number];
+  /** How the tool is turned: quaternion i, j, k, w. */
+  orientation: [number, number, number, number];
+  /** Force on the hand, N, as commanded at this tick. */
+  force: [number, number, number];
+  /** How far the tip is under the skin at rest, m. */
+  depth: number;
+  /** Share of the force that is let through; below 1 after a fault. */
+  gain: number;
+  /** Vertices that touch. */
+  n_active: number;
+  /** How the tissue's last step went: 0 converged, 1 unfinished, 2 behind the tool, 3 settling, 4 failed. */
+  step_status: number;
+  /** What was wrong at this tick, as bits. */
+  faults: number;
+  /** Limits that the force met, as bits. */
+  limits: number;
+  /** Length of one unit of `displacements`, m. */
+  displacement_unit: number;
+  /** Displacements of the nodes: x, y, z one after the other. */
+  displacements: Int16Array;
+  /** Which field follows: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch. */
+  field: number;
+  /** The field's value at 0. */
+  field_min: number;
+  /** The field's value at 65535. */
+  field_max: number;
+  /** The field at the nodes; empty without one. */
+  field_values: Uint16Array;
+}
+
+function readFrameSnapshot(r: Reader): FrameSnapshot {
+  return {
+    kind: 2,
+    mesh: r.u32(),
+    sequence: r.u32(),
+    is_replay: r.u32(),
+    tick: r.f64(),
+    time: r.f64(),
+    device: [r.f64(), r.f64(), r.f64()],
+    tool: [r.f64(), r.f64(), r.f64()],
+    orientation: [r.f64(), r.f64(), r.f64(), r.f64()],
+    force: [r.f64(), r.f64(), r.f64()],
+    depth: r.f64(),
+    gain: r.f64(),
+    n_active: r.u32(),
+    step_status: r.u32(),
+    faults: r.u32(),
+    limits: r.u32(),
+    displacement_unit: r.f64(),
+    displacements: r.i16s(),
+    field: r.u32(),
+    field_min: r.f64(),
+    field_max: r.f64(),
+    field_values: r.u16s(),
+  };
+}
+
+export type Snapshot = MeshSnapshot | FrameSnapshot;
+
+/** Reads a snapshot; its lists look into `buffer`. Throws when it is of another version or cut off. */
+export function readSnapshot(buffer: ArrayBuffer): Snapshot {
+  const r = new Reader(buffer);
+  const version = r.u32();
+  if (version !== SNAPSHOT_VERSION) throw new Error(`snapshot of version ${version}, expected ${SNAPSHOT_VERSION}`);
+  const kind = r.u32();
+  if (kind === 1) return readMeshSnapshot(r);
+  if (kind === 2) return readFrameSnapshot(r);
+  throw new Error(`snapshot of unknown kind ${kind}`);
+}
