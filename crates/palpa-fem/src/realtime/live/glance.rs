@@ -11,7 +11,7 @@ use crate::model::Model;
 
 /// The displacements of a [`Live`] body at one moment.
 ///
-/// Where the exterior answers linearly, those outside the zone are left for [`Self::settle`], which is to be called where nobody
+/// Where the exterior answers linearly, those outside the zone are left for [`Self::settled`], to be called where nobody
 /// waits.
 #[derive(Debug)]
 pub struct Glance {
@@ -27,27 +27,16 @@ impl Glance {
         &self.model
     }
 
-    /// Brings the displacements outside the zone up to date. Cost: a substitution through the exterior.
-    pub fn settle(&mut self) {
-        let Some((plan, outside)) = self.exterior.take() else {
-            return;
-        };
-        let mut scratch = SolveScratch::new(&plan.tree);
-        let mut x = vec![0.0; self.model.structure.n_dofs()];
-        let displacements = &mut self.displacements;
-        outside.settle(
-            &self.model,
-            &plan,
-            None,
-            displacements,
-            &mut x,
-            &mut scratch,
-        );
-    }
-
-    /// Displacements of all nodes, m. `[n_nodes]`
-    pub fn displacements(&self) -> &[Vec3] {
-        &self.displacements
+    /// Displacements of all nodes, m. `[n_nodes]` Cost: a substitution through the exterior.
+    pub fn settled(&self) -> Vec<Vec3> {
+        let mut displacements = self.displacements.clone();
+        if let Some((plan, outside)) = &self.exterior {
+            let mut scratch = SolveScratch::new(&plan.tree);
+            let mut x = vec![0.0; self.model.structure.n_dofs()];
+            let into = &mut displacements;
+            outside.settle(&self.model, plan, None, into, &mut x, &mut scratch);
+        }
+        displacements
     }
 }
 
