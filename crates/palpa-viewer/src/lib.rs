@@ -6,6 +6,21 @@
 //! ```
 //! A page that is slow misses snapshots; it never holds the session, and the session never waits for a page.
 
+mod api_page;
+mod board;
+mod client;
 pub mod control;
+mod guard;
+mod host;
+mod hub;
+mod limits;
+mod metrics;
 pub mod openapi;
+mod page;
+mod routes;
+mod server;
 pub mod wire;
+
+pub use board::Publisher;
+pub use host::{Answer, Clients, Host, HostFile};
+pub use server::{Server, ServerError, ServerParams};
