@@ -21,8 +21,16 @@ use crate::units::{Length, Pressure, Rate, Time, Velocity};
 pub(crate) fn to_toml(scene: &Scene, names: Names) -> String {
     let file = SceneFile {
         body: body(scene, &scene.body),
-        layer: scene.layers.iter().map(|l| layer(scene, l, names)).collect(),
-        lump: scene.lumps.iter().map(|l| tool::lump(scene, l, names)).collect(),
+        layer: scene
+            .layers
+            .iter()
+            .map(|l| layer(scene, l, names))
+            .collect(),
+        lump: scene
+            .lumps
+            .iter()
+            .map(|l| tool::lump(scene, l, names))
+            .collect(),
         tool: tool::tool(&scene.tool),
         press: press(&scene.press),
         device: motion::device(scene.device),

@@ -83,7 +83,9 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     if !args.no_open
         && let Err(error) = open::that_detached(&url)
     {
-        context.note(format!("no browser could be opened ({error}); open {url} in one"));
+        context.note(format!(
+            "no browser could be opened ({error}); open {url} in one"
+        ));
     }
     context.begin_recording();
     while !context.is_interrupted() {
@@ -96,7 +98,10 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
 
 fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {
     let Some(path) = &args.scene else {
-        return Ok((gallery::scene(gallery::FIRST)?, Some(gallery::FIRST.to_owned())));
+        return Ok((
+            gallery::scene(gallery::FIRST)?,
+            Some(gallery::FIRST.to_owned()),
+        ));
     };
     let key = path.to_string_lossy();
     let is_key = !path.exists() && gallery::entries().iter().any(|entry| entry.key == key);

@@ -21,8 +21,8 @@ pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
 pub use springs::{SpringScene, SpringTissue};
 pub use tissue::LiveTissue;
-pub use watch::{Look, Seen, Watch};
 pub use trace::{TraceRow, converged_forces, force_while_moving, trace_picture};
+pub use watch::{Look, Seen, Watch};
 
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! The moving step as the engine's tissue.
 
+use super::Watch;
 use palpa_fem::PosedTool;
 use palpa_fem::realtime::{Live, LiveReport, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
-use super::Watch;
 use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
@@ -162,7 +162,7 @@ impl Tissue for LiveTissue {
         self.fill(patch);
         self.last = Some(report);
         if let Some(watch) = &mut self.watch {
-            watch.look(input.step, input.now, self.body.n_meshes()[0], self.body.live());
+            watch.look(input.step, input.now, &self.body);
         }
         TissueStep {
             status: match report.outcome {

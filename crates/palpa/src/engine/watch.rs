@@ -1,6 +1,6 @@
 //! What a viewer sees of the tissue: the latest displacements, left where nobody has to wait for anybody.
 
-use palpa_fem::realtime::{Glance, Live};
+use palpa_fem::realtime::{Glance, Roaming};
 use palpa_mesh::Vec3;
 use palpa_rt::{Reader, Writer, mailbox};
 
@@ -11,6 +11,8 @@ pub struct Look {
     pub step: u64,
     /// Which mesh it was, counted from 1.
     pub mesh: u64,
+    /// Round which place (at rest, m) it was fine, and up to which distance, m; none where what is fine does not move.
+    pub fine: Option<(Vec3, f64)>,
     /// What it was.
     pub body: Option<Seen>,
 }
@@ -46,13 +48,14 @@ impl Watch {
     }
 
     /// Leaves a look at a body of finite elements, if one is due. Cost: a copy of the displacements.
-    pub(super) fn look(&mut self, step: u64, now: f64, mesh: u64, live: &Live) {
-        self.leave(step, now, mesh, |old| {
+    pub(super) fn look(&mut self, step: u64, now: f64, body: &Roaming) {
+        let [mesh, _] = body.n_meshes();
+        self.leave(step, now, mesh, body.fine(), |old| {
             let old = match old {
                 Some(Seen::Tissue(glance)) => Some(glance),
                 _ => None,
             };
-            Seen::Tissue(live.glance(old))
+            Seen::Tissue(body.live().glance(old))
         });
     }
 
@@ -63,7 +66,9 @@ impl Watch {
         now: f64,
         displacements: impl Iterator<Item = Vec3>,
     ) {
-        self.leave(step, now, 1, |_| Seen::Springs(displacements.collect()));
+        self.leave(step, now, 1, None, |_| {
+            Seen::Springs(displacements.collect())
+        });
     }
 
     fn leave(
@@ -71,6 +76,7 @@ impl Watch {
         step: u64,
         now: f64,
         mesh: u64,
+        fine: Option<(Vec3, f64)>,
         make: impl FnOnce(Option<Seen>) -> Seen,
     ) {
         if now < self.due {
@@ -79,7 +85,12 @@ impl Watch {
         self.due = now + self.period;
         let slot = self.writer.slot();
         let body = Some(make(slot.body.take()));
-        *slot = Look { step, mesh, body };
+        *slot = Look {
+            step,
+            mesh,
+            fine,
+            body,
+        };
         self.writer.publish();
     }
 }

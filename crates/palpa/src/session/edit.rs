@@ -145,7 +145,11 @@ mod tests {
         let lump = json!({ "name": "a", "shape": "sphere", "radius": "5 mm", "below": ["120 mm", "0 mm", "40 mm"],
             "depth": "12 mm", "tissue": "fibrous lump" });
         let one = edited(&scene, &[edit("/lump/-", lump.clone())]).unwrap();
-        let two = edited(&one, &[edit("/lump/-", lump), edit("/lump/1/name", json!("b"))]).unwrap();
+        let two = edited(
+            &one,
+            &[edit("/lump/-", lump), edit("/lump/1/name", json!("b"))],
+        )
+        .unwrap();
         assert_eq!(two.lumps.len(), 2);
         let left = edited(&two, &[edit("/lump/0", Value::Null)]).unwrap();
         assert_eq!(left.lumps[0].name, "b");

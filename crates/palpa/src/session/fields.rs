@@ -10,13 +10,13 @@ use palpa_viewer::control::Field;
 
 /// A field over the nodes of a mesh.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NodeField {
+pub(super) struct NodeField {
     /// The mesh.
-    pub mesh: u64,
+    pub(super) mesh: u64,
     /// Which field.
-    pub field: Field,
+    pub(super) field: Field,
     /// Means of the prisms round each node. `[n_nodes]`
-    pub values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -29,7 +29,7 @@ struct Job {
 
 /// The worker, and the last field that it made.
 #[derive(Debug)]
-pub struct Fields {
+pub(super) struct Fields {
     jobs: SyncSender<Job>,
     done: Receiver<NodeField>,
     latest: Option<NodeField>,
@@ -40,7 +40,7 @@ impl Fields {
     ///
     /// # Errors
     /// When the system gives no thread.
-    pub fn start() -> std::io::Result<Self> {
+    pub(super) fn start() -> std::io::Result<Self> {
         let (jobs, inbox) = sync_channel::<Job>(1);
         let (outbox, done) = sync_channel(1);
         thread::Builder::new()
@@ -72,7 +72,7 @@ impl Fields {
     }
 
     /// The latest field of this kind on this mesh; asks for the one of these displacements if the worker is free.
-    pub fn of(
+    pub(super) fn of(
         &mut self,
         mesh: u64,
         field: Field,

@@ -11,7 +11,7 @@ const LATEST: usize = 30;
 
 /// Counts of the figures before.
 #[derive(Debug)]
-pub struct Figures {
+pub(super) struct Figures {
     at: Instant,
     steps: u64,
     ticks: u64,
@@ -23,7 +23,7 @@ pub struct Figures {
 
 impl Figures {
     /// Of an engine that begins.
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             at: Instant::now(),
             steps: 0,
@@ -36,13 +36,13 @@ impl Figures {
     }
 
     /// What a tick met.
-    pub fn note(&mut self, entry: &TickEntry) {
+    pub(super) fn note(&mut self, entry: &TickEntry) {
         self.limits |= Limits::from_bits(entry.tick.limits as u16);
         self.faults |= Faults::from_bits(entry.tick.faults as u16);
     }
 
     /// The figures of now, and notices of what was wrong since.
-    pub fn make(
+    pub(super) fn make(
         &mut self,
         report: &Report,
         entry: &TickEntry,
@@ -56,10 +56,15 @@ impl Figures {
         let rate = |n: u64, before: u64| n.saturating_sub(before) as f64 / seconds;
         let device = &entry.devices[0];
         let mut limits = Vec::new();
-        self.limits.for_each_name(|name| limits.push(name.to_owned()));
+        self.limits
+            .for_each_name(|name| limits.push(name.to_owned()));
         let mut faults = Vec::new();
-        self.faults.for_each_name(|name| faults.push(name.to_owned()));
-        let events = report.events.iter().skip(report.events.len().saturating_sub(LATEST));
+        self.faults
+            .for_each_name(|name| faults.push(name.to_owned()));
+        let events = report
+            .events
+            .iter()
+            .skip(report.events.len().saturating_sub(LATEST));
         let figures = EngineFigures {
             seconds: report.duration,
             tissue_rate: rate(report.steps, self.steps),
@@ -134,5 +139,6 @@ fn status_name(status: u8) -> &'static str {
         StepStatus::Settling,
         StepStatus::Failed,
     ];
-    all.get(usize::from(status)).map_or("", |status| status.name())
+    all.get(usize::from(status))
+        .map_or("", |status| status.name())
 }

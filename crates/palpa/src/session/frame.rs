@@ -13,7 +13,12 @@ use super::fields::NodeField;
 const LEAST_UNIT: f64 = 1e-8;
 
 /// A body at rest.
-pub fn mesh(number: u32, body: &LayeredBody, stiffness: Vec<f32>, bones: &[Surface]) -> MeshSnapshot {
+pub(super) fn mesh(
+    number: u32,
+    body: &LayeredBody,
+    stiffness: Vec<f32>,
+    bones: &[Surface],
+) -> MeshSnapshot {
     let mut bone_positions = Vec::new();
     let mut bone_triangles = Vec::new();
     for bone in bones {
@@ -34,11 +39,14 @@ pub fn mesh(number: u32, body: &LayeredBody, stiffness: Vec<f32>, bones: &[Surfa
 }
 
 fn flat(points: &[Vec3]) -> impl Iterator<Item = f32> + '_ {
-    points.iter().flat_map(|p| [p.x, p.y, p.z]).map(|x| x as f32)
+    points
+        .iter()
+        .flat_map(|p| [p.x, p.y, p.z])
+        .map(|x| x as f32)
 }
 
 /// Puts displacements (m) into a frame, in the finest unit that holds the largest.
-pub fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3]) {
+pub(super) fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3]) {
     let largest = displacements.iter().map(Vec3::amax).fold(0.0, f64::max);
     let unit = (largest / f64::from(i16::MAX)).max(LEAST_UNIT);
     frame.displacement_unit = unit;
@@ -50,7 +58,12 @@ pub fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3]) {
 }
 
 /// Puts what a tick of the loop says into a frame. `over` is the place of the skin (point, outward normal) from which depth counts.
-pub fn put_tick(frame: &mut FrameSnapshot, entry: &TickEntry, scene_from_device: &Pose, over: &(Vec3, Vec3)) {
+pub(super) fn put_tick(
+    frame: &mut FrameSnapshot,
+    entry: &TickEntry,
+    scene_from_device: &Pose,
+    over: &(Vec3, Vec3),
+) {
     let (tick, device) = (&entry.tick, &entry.devices[0]);
     let at = Vec3::from(device.position);
     // The coupling is the same all round: the tool stands off the way that the tissue pushes it.
@@ -78,7 +91,7 @@ pub fn put_tick(frame: &mut FrameSnapshot, entry: &TickEntry, scene_from_device:
 }
 
 /// Puts a field over the nodes into a frame.
-pub fn put_field(frame: &mut FrameSnapshot, field: Option<&NodeField>) {
+pub(super) fn put_field(frame: &mut FrameSnapshot, field: Option<&NodeField>) {
     let Some(field) = field else {
         frame.field = 0;
         frame.field_values.clear();
@@ -93,8 +106,12 @@ pub fn put_field(frame: &mut FrameSnapshot, field: Option<&NodeField>) {
     let (least, most) = field
         .values
         .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)));
-    let span = (most - least).max(1e-12 * most.abs()).max(f64::MIN_POSITIVE);
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+            (a.min(x), b.max(x))
+        });
+    let span = (most - least)
+        .max(1e-12 * most.abs())
+        .max(f64::MIN_POSITIVE);
     frame.field_min = least;
     frame.field_max = least + span;
     frame.field_values.clear();
@@ -134,7 +151,10 @@ mod tests {
         };
         let mut frame = FrameSnapshot::default();
         put_field(&mut frame, Some(&field));
-        assert_eq!((frame.field, frame.field_min, frame.field_max), (2, -300.0, 1200.0));
+        assert_eq!(
+            (frame.field, frame.field_min, frame.field_max),
+            (2, -300.0, 1200.0)
+        );
         assert_eq!(frame.field_values, [0, 13107, 65535]);
         put_field(&mut frame, None);
         assert!(frame.field_values.is_empty());

@@ -63,7 +63,10 @@ pub fn scene(key: &str) -> anyhow::Result<Scene> {
         let keys: Vec<&str> = SCENES.iter().map(|(key, ..)| *key).collect();
         format!("there is no scene \"{key}\"; there are {}", keys.join(", "))
     };
-    let (_, _, text) = SCENES.iter().find(|(k, ..)| *k == key).with_context(known)?;
+    let (_, _, text) = SCENES
+        .iter()
+        .find(|(k, ..)| *k == key)
+        .with_context(known)?;
     Scene::parse(text, Path::new("")).with_context(|| format!("the scene \"{key}\""))
 }
 
@@ -82,6 +85,11 @@ mod tests {
                 assert_eq!(world.n_nodes(), 36, "{}", entry.key);
             }
         }
-        assert!(scene("nonsense").unwrap_err().to_string().contains("forearm"));
+        assert!(
+            scene("nonsense")
+                .unwrap_err()
+                .to_string()
+                .contains("forearm")
+        );
     }
 }

@@ -32,7 +32,7 @@ const MOST_MARKS: usize = 10;
 
 /// A round.
 #[derive(Debug)]
-pub struct Game {
+pub(super) struct Game {
     seed: u64,
     n_lumps: u32,
     marks: Vec<Vec3>,
@@ -45,7 +45,7 @@ pub struct Game {
     contact_time: f64,
     result: Option<(f64, GameResult)>,
     /// The scene that is played on, as it was and will be again.
-    pub before: Scene,
+    pub(super) before: Scene,
 }
 
 impl Game {
@@ -53,12 +53,19 @@ impl Game {
     ///
     /// # Errors
     /// When the body has no room for them.
-    pub fn hide(world: &World, before: &Scene, seed: Option<u64>, n_lumps: u32) -> anyhow::Result<(Self, Scene)> {
+    pub(super) fn hide(
+        world: &World,
+        before: &Scene,
+        seed: Option<u64>,
+        n_lumps: u32,
+    ) -> anyhow::Result<(Self, Scene)> {
         if !(1..=3).contains(&n_lumps) {
             bail!("{n_lumps} lumps cannot be hidden; choose 1 to 3");
         }
         if world.spring_body().is_some() {
-            bail!("bars between nodes have no place for a lump; choose a scene of the continuum model");
+            bail!(
+                "bars between nodes have no place for a lump; choose a scene of the continuum model"
+            );
         }
         let seed = seed.unwrap_or_else(|| fastrand::u64(..1_000_000));
         let mut random = fastrand::Rng::with_seed(seed);
@@ -69,8 +76,11 @@ impl Game {
         scene.lumps.clear();
         let mut places: Vec<Vec3> = Vec::new();
         for k in 0..n_lumps {
-            let Some((place, radius, depth)) = hiding_place(&world.skin, &places, &mut random) else {
-                bail!("the body has no room for {n_lumps} hidden lumps; choose fewer, or a larger body");
+            let Some((place, radius, depth)) = hiding_place(&world.skin, &places, &mut random)
+            else {
+                bail!(
+                    "the body has no room for {n_lumps} hidden lumps; choose fewer, or a larger body"
+                );
             };
             places.push(place);
             scene.lumps.push(Lump {
@@ -101,28 +111,28 @@ impl Game {
     }
 
     /// The body is there: time runs.
-    pub fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.began.get_or_insert_with(Instant::now);
     }
 
     /// Whether the truth may be seen.
-    pub fn is_revealed(&self) -> bool {
+    pub(super) fn is_revealed(&self) -> bool {
         self.result.is_some()
     }
 
     /// The tool was at a place of the skin with a force (N) for `dt` seconds.
-    pub fn feel(&mut self, place: Vec3, force: f64, dt: f64) {
+    pub(super) fn feel(&mut self, place: Vec3, force: f64, dt: f64) {
         if self.is_revealed() || force < TOUCH {
             return;
         }
         self.max_force = self.max_force.max(force);
         self.impulse += force * dt;
         self.contact_time += dt;
-        let near = (self.touches.iter_mut()).find(|(p, _)| (p - place).norm() < GRAIN);
-        match near {
-            Some((_, most)) => *most = most.max(force),
-            None if self.touches.len() < MOST_TOUCHES => self.touches.push((place, force)),
-            None => {}
+        let near = (self.touches.iter()).position(|(p, _)| (p - place).norm() < GRAIN);
+        if let Some(near) = near {
+            self.touches[near].1 = self.touches[near].1.max(force);
+        } else if self.touches.len() < MOST_TOUCHES {
+            self.touches.push((place, force));
         }
     }
 
@@ -130,7 +140,7 @@ impl Game {
     ///
     /// # Errors
     /// When the truth is out, or there are more marks than sense.
-    pub fn mark(&mut self, point: Vec3) -> anyhow::Result<()> {
+    pub(super) fn mark(&mut self, point: Vec3) -> anyhow::Result<()> {
         if self.is_revealed() {
             bail!("the truth is shown already; begin a new round");
         }
@@ -142,14 +152,14 @@ impl Game {
     }
 
     /// The last mark was a mistake.
-    pub fn unmark(&mut self) {
+    pub(super) fn unmark(&mut self) {
         if !self.is_revealed() {
             self.marks.pop();
         }
     }
 
     /// The truth. Each lump gets the mark that is nearest to it, the nearest pair first.
-    pub fn reveal(&mut self, world: &World) {
+    pub(super) fn reveal(&mut self, world: &World) {
         if self.is_revealed() {
             return;
         }
@@ -170,7 +180,11 @@ impl Game {
             mean_force: self.impulse / self.contact_time.max(1e-9),
             contact_seconds: self.contact_time,
             covered: self.covered(&world.skin),
-            coverage: self.touches.iter().map(|(p, f)| [p.x, p.y, p.z, *f]).collect(),
+            coverage: self
+                .touches
+                .iter()
+                .map(|(p, f)| [p.x, p.y, p.z, *f])
+                .collect(),
         };
         self.result = Some((self.seconds(), result));
     }
@@ -191,12 +205,14 @@ impl Game {
     fn seconds(&self) -> f64 {
         match &self.result {
             Some((seconds, _)) => *seconds,
-            None => self.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
+            None => self
+                .began
+                .map_or(0.0, |began| began.elapsed().as_secs_f64()),
         }
     }
 
     /// As pages are told: without the truth until it is shown.
-    pub fn info(&self) -> GameInfo {
+    pub(super) fn info(&self) -> GameInfo {
         GameInfo {
             seed: self.seed,
             n_lumps: self.n_lumps,
@@ -210,7 +226,10 @@ impl Game {
 /// The point of the skin over a lump.
 fn over(world: &World, lump: &LumpInfo) -> Vec3 {
     let centre = Vec3::from(lump.centre);
-    world.skin.nearest(centre).map_or(centre, |place| place.point)
+    world
+        .skin
+        .nearest(centre)
+        .map_or(centre, |place| place.point)
 }
 
 /// For each place its distance from the mark that was meant for it, m.
@@ -234,7 +253,11 @@ fn matched(places: &[Vec3], marks: &[Vec3]) -> Vec<Option<f64>> {
 }
 
 /// A place of the skin with room for a lump: place, radius and depth of its centre, m.
-fn hiding_place(skin: &Skin, others: &[Vec3], random: &mut fastrand::Rng) -> Option<(Vec3, f64, f64)> {
+fn hiding_place(
+    skin: &Skin,
+    others: &[Vec3],
+    random: &mut fastrand::Rng,
+) -> Option<(Vec3, f64, f64)> {
     let mut places: Vec<(Vec3, f64)> = skin
         .away_from_rim(FROM_RIM)
         .map(|(point, _, thickness)| (point, thickness))
@@ -274,11 +297,14 @@ mod tests {
         assert_ne!(hide(5).lumps, hide(6).lumps);
         for seed in 0..20 {
             for lump in hide(seed).lumps {
-                let (LumpShape::Sphere { radius }, LumpPlace::Below { target, depth }) = (lump.shape, lump.place)
+                let (LumpShape::Sphere { radius }, LumpPlace::Below { target, depth }) =
+                    (lump.shape, lump.place)
                 else {
                     panic!("a ball under a place");
                 };
-                let Target::Point(point) = target else { panic!("a point") };
+                let Target::Point(point) = target else {
+                    panic!("a point")
+                };
                 let thickness = world.skin.nearest(point.into()).unwrap().thickness;
                 assert!(depth - radius >= COVER - 1e-9 && depth + radius <= thickness);
             }

@@ -21,8 +21,11 @@ const STROKE_SPEED: f64 = 0.06;
 const AIR_SPEED: f64 = 0.35;
 /// A place further away than this is gone to through the air, m.
 const STRIDE: f64 = 15e-3;
-/// Rest over a new place, s: the mesh becomes fine there meanwhile.
-const SETTLE: f64 = 0.25;
+/// Rest over a new place, s, and the longest: the mesh becomes fine there meanwhile.
+const SETTLE: f64 = 0.1;
+const LONGEST_SETTLE: f64 = 4.0;
+/// Within so much of the radius of what is fine a place is pressed.
+const FINE: f64 = 0.5;
 /// Distance from the skin at which the tool goes round the body, beside its own size, m.
 const CLEARANCE: f64 = 12e-3;
 /// Deepest press, as a share of the tissue there.
@@ -132,7 +135,7 @@ enum Doing {
     There,
     /// On its way through the air: points that are left, the last first.
     Travel(Vec<Vec3>),
-    /// Over a new place, for so long yet, s.
+    /// Over a new place, for so long, s.
     Settling(f64),
 }
 
@@ -185,18 +188,14 @@ impl HandDriver {
         self.tip
     }
 
-    /// Whether the tip is told to be under the skin.
-    pub fn is_pressing(&self) -> bool {
-        self.depth > 0.0
-    }
-
     /// Whether it is at rest over the skin.
     pub fn is_lifted(&self) -> bool {
         self.doing == Doing::There && self.depth <= -HOVER
     }
 
-    /// Goes on for `dt` seconds; where the tool is to be, in the scene's frame.
-    pub fn advance(&mut self, skin: &Skin, dt: f64) -> Pose {
+    /// Goes on for `dt` seconds; where the tool is to be, in the scene's frame. `fine` is where the mesh is fine (place and
+    /// radius, m), if that moves: a new place is not pressed before.
+    pub fn advance(&mut self, skin: &Skin, fine: Option<(Vec3, f64)>, dt: f64) -> Pose {
         match &mut self.doing {
             Doing::Travel(points) => {
                 let mut way = AIR_SPEED * dt;
@@ -211,12 +210,15 @@ impl HandDriver {
                     points.pop();
                 }
                 if points.is_empty() {
-                    self.doing = Doing::Settling(SETTLE);
+                    self.doing = Doing::Settling(0.0);
                 }
             }
-            Doing::Settling(left) => {
-                *left -= dt;
-                if *left <= 0.0 {
+            Doing::Settling(waited) => {
+                *waited += dt;
+                let is_fine = fine.is_none_or(|(middle, radius)| {
+                    (self.place.point - middle).norm() < FINE * radius
+                });
+                if *waited > LONGEST_SETTLE || is_fine && *waited > SETTLE {
                     self.doing = Doing::There;
                 }
             }
@@ -362,18 +364,18 @@ mod tests {
         let mut hand = hand(&skin);
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-        let mut before = hand.advance(&skin, DT);
+        let mut before = hand.advance(&skin, None, DT);
         for _ in 0..60 {
-            let pose = hand.advance(&skin, DT);
+            let pose = hand.advance(&skin, None, DT);
             let way = pose.translation.vector - before.translation.vector;
             assert!(way.norm() <= PRESS_SPEED * DT + 1e-9);
             before = pose;
         }
         let wanted = place.point - place.normal * 5e-3;
         assert!((before.translation.vector - wanted).norm() < 1e-9);
-        assert!(hand.is_pressing());
+        assert!(!hand.is_lifted());
         hand.set_goal(None);
-        (0..60).for_each(|_| before = hand.advance(&skin, DT));
+        (0..60).for_each(|_| before = hand.advance(&skin, None, DT));
         assert!(hand.is_lifted());
         assert!((before.rotation * Vec3::z() - place.normal).norm() < 1e-9);
     }
@@ -385,7 +387,7 @@ mod tests {
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 1.0 }));
         let mut pose = Pose::identity();
-        (0..200).for_each(|_| pose = hand.advance(&skin, DT));
+        (0..200).for_each(|_| pose = hand.advance(&skin, None, DT));
         let depth = place.normal.dot(&(place.point - pose.translation.vector));
         assert!((depth - MOST_OF_TISSUE * 28e-3).abs() < 1e-6, "{depth}");
     }
@@ -399,9 +401,9 @@ mod tests {
         let mut least = f64::INFINITY;
         let mut pose = Pose::identity();
         for _ in 0..300 {
-            pose = hand.advance(&skin, DT);
+            pose = hand.advance(&skin, None, DT);
             let off_axis = pose.translation.vector.yz().norm();
-            if !hand.is_pressing() {
+            if hand.depth <= 0.0 {
                 least = least.min(off_axis);
             }
         }
@@ -417,12 +419,12 @@ mod tests {
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 5e-3 }));
         (0..60).for_each(|_| {
-            hand.advance(&skin, DT);
+            hand.advance(&skin, None, DT);
         });
         for k in 1..=60 {
             let place = at(&skin, 0.08, f64::from(k) * 0.02);
             hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-            let tip = hand.advance(&skin, DT).translation.vector;
+            let tip = hand.advance(&skin, None, DT).translation.vector;
             assert!((tip.yz().norm() - 0.035).abs() < 8e-4, "{tip:?}");
         }
     }

@@ -13,7 +13,7 @@ mod figures;
 mod frame;
 pub mod gallery;
 mod game;
-mod hand;
+pub mod hand;
 mod recording;
 mod remote;
 mod run;

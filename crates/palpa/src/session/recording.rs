@@ -9,14 +9,14 @@ use palpa_viewer::wire::FrameSnapshot;
 /// Frames kept take this much memory at most; then every other one is dropped, so that the whole time is still there.
 const MOST_BYTES: usize = 200 << 20;
 /// Longest recording, s: the log of an hour is some gigabytes.
-pub const LONGEST: f64 = 3600.0;
+pub(super) const LONGEST: f64 = 3600.0;
 
 /// A mesh, as bytes of a snapshot.
-pub type MeshBytes = Arc<Vec<u8>>;
+pub(super) type MeshBytes = Arc<Vec<u8>>;
 
 /// What was recorded, or is being recorded.
 #[derive(Debug)]
-pub struct Recording {
+pub(super) struct Recording {
     log: PathBuf,
     began: f64,
     frames: Vec<FrameSnapshot>,
@@ -27,16 +27,16 @@ pub struct Recording {
     n_seen: usize,
     is_over: bool,
     /// What is shown, s since the beginning.
-    pub at: f64,
+    pub(super) at: f64,
     /// Whether it is shown instead of the body that is pressed.
-    pub is_shown: bool,
+    pub(super) is_shown: bool,
     /// Whether it goes on by itself.
-    pub is_playing: bool,
+    pub(super) is_playing: bool,
 }
 
 impl Recording {
     /// One that begins at `began` on the engine's clock, s, and whose log is written to `log`.
-    pub fn begin(log: PathBuf, began: f64) -> Self {
+    pub(super) fn begin(log: PathBuf, began: f64) -> Self {
         Self {
             log,
             began,
@@ -53,27 +53,27 @@ impl Recording {
     }
 
     /// Whether it is under way.
-    pub fn is_under_way(&self) -> bool {
+    pub(super) fn is_under_way(&self) -> bool {
         !self.is_over
     }
 
     /// Nothing more is added.
-    pub fn end(&mut self) {
+    pub(super) fn end(&mut self) {
         self.is_over = true;
     }
 
     /// The log.
-    pub fn log(&self) -> &Path {
+    pub(super) fn log(&self) -> &Path {
         &self.log
     }
 
     /// How long it is, s.
-    pub fn duration(&self) -> f64 {
+    pub(super) fn duration(&self) -> f64 {
         self.frames.last().map_or(0.0, |frame| frame.time)
     }
 
     /// Adds a frame, and the mesh that it is of.
-    pub fn add(&mut self, frame: &FrameSnapshot, mesh: &MeshBytes) {
+    pub(super) fn add(&mut self, frame: &FrameSnapshot, mesh: &MeshBytes) {
         if self.is_over {
             return;
         }
@@ -105,11 +105,16 @@ impl Recording {
         self.meshes
             .retain(|(id, _)| self.frames.iter().any(|frame| frame.mesh == *id));
         let frames: usize = self.frames.iter().map(bytes_of).sum();
-        self.bytes = frames + self.meshes.iter().map(|(_, mesh)| mesh.len()).sum::<usize>();
+        self.bytes = frames
+            + self
+                .meshes
+                .iter()
+                .map(|(_, mesh)| mesh.len())
+                .sum::<usize>();
     }
 
     /// The frame of the moment that is shown, and its mesh.
-    pub fn shown(&self) -> Option<(&FrameSnapshot, &MeshBytes)> {
+    pub(super) fn shown(&self) -> Option<(&FrameSnapshot, &MeshBytes)> {
         let after = self.frames.partition_point(|frame| frame.time <= self.at);
         let frame = self.frames.get(after.saturating_sub(1))?;
         let mesh = self.meshes.iter().rev().find(|(id, _)| *id == frame.mesh)?;
@@ -117,7 +122,7 @@ impl Recording {
     }
 
     /// Goes on by itself for `dt` seconds; at its end it stands.
-    pub fn advance(&mut self, dt: f64) {
+    pub(super) fn advance(&mut self, dt: f64) {
         if self.is_playing {
             self.at += dt;
             if self.at >= self.duration() {
@@ -128,10 +133,14 @@ impl Recording {
     }
 
     /// As pages are told.
-    pub fn info(&self) -> RecordingInfo {
+    pub(super) fn info(&self) -> RecordingInfo {
         RecordingInfo {
             is_recording: self.is_under_way(),
-            duration: if self.is_under_way() { 0.0 } else { self.duration() },
+            duration: if self.is_under_way() {
+                0.0
+            } else {
+                self.duration()
+            },
             is_replaying: self.is_shown,
             is_playing: self.is_playing,
         }
@@ -161,7 +170,10 @@ mod tests {
         let meshes = [1, 2].map(|i| Arc::new(vec![i]));
         for k in 0..10 {
             let mesh = 1 + u32::from(k >= 5);
-            recording.add(&frame(10.0 + 0.1 * f64::from(k), mesh, 3), &meshes[mesh as usize - 1]);
+            recording.add(
+                &frame(10.0 + 0.1 * f64::from(k), mesh, 3),
+                &meshes[mesh as usize - 1],
+            );
         }
         recording.end();
         assert!((recording.duration() - 0.9).abs() < 1e-12);

@@ -184,7 +184,7 @@ impl Body {
         let state = State {
             gallery: gallery::entries(),
             allows_faults: params.allows_faults,
-            ..State::empty()
+            ..State::default()
         };
         Self {
             params,
@@ -219,7 +219,10 @@ impl Body {
         let mut figures_due = due;
         let mut last = due;
         loop {
-            match self.inbox.recv_timeout(due.saturating_duration_since(Instant::now())) {
+            match self
+                .inbox
+                .recv_timeout(due.saturating_duration_since(Instant::now()))
+            {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => break,
                 Ok(order) => {
                     self.obey(order);
@@ -307,7 +310,9 @@ impl Body {
             Request::Seek { time } => self.seek(time),
             Request::Play { on } => self.play(on),
             Request::ShowField { field } => {
-                if self.game.as_ref().is_some_and(|game| !game.is_revealed()) && field != Field::None {
+                if self.game.as_ref().is_some_and(|game| !game.is_revealed())
+                    && field != Field::None
+                {
                     bail!("while lumps are hidden, only displacement may be shown");
                 }
                 self.state.field = field;
@@ -400,7 +405,12 @@ impl Body {
         let near = self.live.as_ref().map(|live| live.hand.place().point);
         let place = near
             .filter(|_| log.is_none())
-            .and_then(|point| world.skin.nearest(point).filter(|p| (p.point - point).norm() < 0.02))
+            .and_then(|point| {
+                world
+                    .skin
+                    .nearest(point)
+                    .filter(|p| (p.point - point).norm() < 0.02)
+            })
             .unwrap_or(world.home);
         let along = world.scene_from_device.rotation * Vec3::x();
         let hand = HandDriver::over(place, along, world.tool_size());
@@ -451,7 +461,11 @@ impl Body {
         state.scene = edit::to_json(&scene).unwrap_or_default();
         state.gallery_key.clone_from(&self.wanted.key);
         state.layers.clone_from(&world.layers);
-        state.lumps = if hides { Vec::new() } else { world.lumps.clone() };
+        state.lumps = if hides {
+            Vec::new()
+        } else {
+            world.lumps.clone()
+        };
         state.tool = world.tool.clone();
         state.home = world.home_hand();
         state.usual_depth = world.scene.motion.depth.min(world.greatest_depth());
@@ -544,10 +558,12 @@ impl Body {
         }
         let Some(live) = &mut self.live else { return };
         let frame = live.world.scene_from_device;
+        live.running.looks.take();
+        let fine = live.running.looks.current().fine;
         let pose = match &mut self.motion {
-            None => live.hand.advance(&live.world.skin, dt),
+            None => live.hand.advance(&live.world.skin, fine, dt),
             Some(Motion::Homing(began)) => {
-                let pose = live.hand.advance(&live.world.skin, dt);
+                let pose = live.hand.advance(&live.world.skin, fine, dt);
                 let off = (live.hand.place().point - live.world.home.point).norm();
                 if off < 1e-4 && live.hand.is_lifted() || now - *began > HOMING {
                     let at = frame.inverse_transform_point(&Point3::from(live.hand.tip()));
@@ -590,8 +606,9 @@ impl Body {
                 self.show_recording();
             }
         }
-        let is_full = (self.live.as_ref())
-            .is_some_and(|live| self.is_recording() && live.running.engine.now() > recording::LONGEST);
+        let is_full = (self.live.as_ref()).is_some_and(|live| {
+            self.is_recording() && live.running.engine.now() > recording::LONGEST
+        });
         if is_full {
             let _ = self.stop_recording();
             self.notice(
@@ -613,7 +630,12 @@ impl Body {
             Some(Motion::Moving { .. }) => live.world.skin.nearest(tip).unwrap_or(live.world.home),
             _ => *live.hand.place(),
         };
-        frame::put_tick(&mut self.frame, &live.entry, &frame, &(over.point, over.normal));
+        frame::put_tick(
+            &mut self.frame,
+            &live.entry,
+            &frame,
+            &(over.point, over.normal),
+        );
         self.frame.step_status = live.step.status.into();
         if let Some(game) = &mut self.game
             && !game.is_revealed()
@@ -669,7 +691,12 @@ impl Body {
         self.frame.sequence = self.n_frames as u32;
         frame::put_displacements(&mut self.frame, displacements);
         let field = model.and_then(|model| {
-            self.fields.of(u64::from(self.mesh), self.state.field, &model, displacements)
+            self.fields.of(
+                u64::from(self.mesh),
+                self.state.field,
+                &model,
+                displacements,
+            )
         });
         frame::put_field(&mut self.frame, field);
         if is_recording && let Some(recording) = &mut self.recording {
@@ -691,7 +718,9 @@ impl Body {
             bail!("a recording is under way already");
         }
         if self.game.as_ref().is_some_and(|game| !game.is_revealed()) {
-            bail!("a log holds the whole scene, hidden lumps as well: record after the truth is shown");
+            bail!(
+                "a log holds the whole scene, hidden lumps as well: record after the truth is shown"
+            );
         }
         self.close_replay();
         self.motion = None;
@@ -703,7 +732,10 @@ impl Body {
         self.n_recordings += 1;
         std::fs::create_dir_all(&self.params.out)
             .with_context(|| format!("the folder {} cannot be made", self.params.out.display()))?;
-        let log = self.params.out.join(format!("recording-{}.mcap", self.n_recordings));
+        let log = self
+            .params
+            .out
+            .join(format!("recording-{}.mcap", self.n_recordings));
         if let Err(error) = self.start(world, Some(log.clone())) {
             self.build();
             return Err(error);
@@ -792,7 +824,9 @@ impl Body {
     // Find the lump.
 
     fn game(&mut self) -> anyhow::Result<&mut Game> {
-        self.game.as_mut().context("no lumps are hidden; begin a round first")
+        self.game
+            .as_mut()
+            .context("no lumps are hidden; begin a round first")
     }
 
     fn start_game(&mut self, seed: Option<u64>, n_lumps: u32) -> anyhow::Result<()> {
@@ -821,7 +855,10 @@ impl Body {
         let Some(live) = &mut self.live else {
             bail!("there is no body yet");
         };
-        let game = self.game.as_mut().context("no lumps are hidden; begin a round first")?;
+        let game = self
+            .game
+            .as_mut()
+            .context("no lumps are hidden; begin a round first")?;
         if self.is_building {
             bail!("the lumps are still being hidden");
         }
@@ -874,9 +911,10 @@ impl Body {
                 let live = self.live.as_mut()?;
                 live.running.looks.take();
                 match &live.running.looks.current().body {
-                    Some(Seen::Tissue(glance)) => {
-                        Some(Material::Tissue(Arc::clone(glance.model()), glance.settled()))
-                    }
+                    Some(Seen::Tissue(glance)) => Some(Material::Tissue(
+                        Arc::clone(glance.model()),
+                        glance.settled(),
+                    )),
                     Some(Seen::Springs(displacements)) => Some(Material::Springs(
                         Box::new(live.world.spring_body()?.clone()),
                         displacements.clone(),
@@ -918,7 +956,9 @@ impl Body {
         let Some(thread) = ended.first() else { return };
         self.notice(
             NoticeLevel::Error,
-            format!("{thread} ended by a fault; the force went to zero, and the engine is started anew"),
+            format!(
+                "{thread} ended by a fault; the force went to zero, and the engine is started anew"
+            ),
         );
         if let Some(recording) = self.recording.as_mut().filter(|r| r.is_under_way()) {
             recording.end();

@@ -10,9 +10,7 @@ use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_rt::{Engine, EngineParams, Reader, RecorderParams, TissueParams};
 use palpa_servo::{Pose, ServoParams};
 use palpa_tissue::{ContactShape, ContactTool, MaterialStatus, ModelKind, Scene, Tool};
-use palpa_viewer::control::{
-    self, LayerInfo, LumpForm, LumpInfo, Method, ToolForm, ToolInfo,
-};
+use palpa_viewer::control::{self, LayerInfo, LumpForm, LumpInfo, Method, ToolForm, ToolInfo};
 
 use super::hand::{HOVER, Place, Skin};
 use crate::build::{BuiltBody, build};
