@@ -1,0 +1,76 @@
+// What can be chosen about the view, and what it tells.
+
+export type Vec3 = [number, number, number];
+
+export type ColourBy = 'tissue' | 'layer' | 'displacement' | 'von_mises' | 'pressure' | 'stretch' | 'stiffness';
+
+export interface ViewOptions {
+  theme: 'light' | 'dark';
+  colourBy: ColourBy;
+  /** Of the colour map, SI; null = automatic: grows at once, shrinks slowly. */
+  range: [number, number] | null;
+  /** From the skin down; missing = visible, 1. */
+  layers: { visible: boolean; opacity: number }[];
+  bones: boolean;
+  /** Shown where they are seen: in the section, or through transparent layers. */
+  lumps: boolean;
+  /** Edges of prisms. */
+  wireframe: boolean;
+  shadows: boolean;
+  /** `position` runs from 0 to 1 through the body. */
+  cutaway: { on: boolean; axis: 'x' | 'y' | 'z' | 'view'; position: number; flip: boolean };
+  tool: boolean;
+  force: boolean;
+  coverage: boolean;
+  reducedMotion: boolean;
+}
+
+export const DEFAULT_OPTIONS: ViewOptions = {
+  theme: 'light',
+  colourBy: 'tissue',
+  range: null,
+  layers: [],
+  bones: true,
+  lumps: true,
+  wireframe: false,
+  shadows: true,
+  cutaway: { on: false, axis: 'x', position: 0.5, flip: false },
+  tool: true,
+  force: true,
+  coverage: true,
+  reducedMotion: false,
+};
+
+export interface Legend {
+  title: ColourBy;
+  unit: string;
+  min: number;
+  max: number;
+  /** Colours from `min` to `max`, evenly spaced: stops of a CSS gradient. */
+  stops: string[];
+  /** Whether the stops are evenly spaced in the logarithm. */
+  isLog?: boolean;
+  categories?: { name: string; colour: string }[];
+}
+
+/** Areas of the section, m². */
+export interface SectionArea {
+  total: number;
+  layers: number[];
+  lumps: number;
+}
+
+export interface Picked {
+  /** At rest, m. */
+  point: Vec3;
+  normal: Vec3;
+  part: 'skin' | 'section' | 'bone';
+}
+
+/** The browser has no WebGL2. */
+export class NoWebGL2 extends Error {
+  constructor() {
+    super('this browser has no WebGL2');
+    this.name = 'NoWebGL2';
+  }
+}

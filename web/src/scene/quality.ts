@@ -1,0 +1,95 @@
+// How much is drawn at once, so that slow GPUs and software WebGL stay usable: less while the picture moves, all of it when it
+// stands still.
+
+const SLOW = 38;
+const FAST = 14;
+const STILL_MS = 260;
+
+/** From the most to the least: share of the pixel ratio, shadows. */
+const STEPS = [
+  { ratio: 1, shadows: true },
+  { ratio: 1, shadows: false },
+  { ratio: 0.75, shadows: false },
+  { ratio: 0.55, shadows: false },
+];
+
+export class Quality {
+  private step = 0;
+  private slow = 0;
+  private fast = 0;
+  private fence: WebGLSync | null = null;
+  private fencedAt = 0;
+  private lastDrawn = 0;
+  private isFull = false;
+  private timer = 0;
+
+  constructor(private readonly gl: WebGL2RenderingContext, private readonly redraw: () => void) {
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+    if (/swiftshader|llvmpipe|software|basic render/i.test(name)) this.step = 2;
+  }
+
+  /** Whether the GPU is done with the last picture; measures how long it took. */
+  isReady(now: number): boolean {
+    if (!this.fence) return true;
+    const { gl } = this;
+    const took = now - this.fencedAt;
+    if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED && took < 2000 && !gl.isContextLost()) return false;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    if (!this.isFull) this.judge(took);
+    return true;
+  }
+
+  private judge(took: number): void {
+    if (took > SLOW) {
+      this.fast = 0;
+      if (++this.slow >= 4 && this.step < STEPS.length - 1) {
+        this.step++;
+        this.slow = 0;
+      }
+    } else if (took < FAST) {
+      this.slow = 0;
+      if (++this.fast >= 240 && this.step > 0) {
+        this.step--;
+        this.fast = 0;
+      }
+    } else {
+      this.slow = this.fast = 0;
+    }
+  }
+
+  /** What to draw now: less while pictures follow each other. */
+  begin(now: number): { ratio: number; shadows: boolean } {
+    const isMoving = now - this.lastDrawn < STILL_MS && this.lastDrawn > 0;
+    this.isFull = !isMoving || this.step === 0;
+    const most = Math.min(window.devicePixelRatio || 1, 2);
+    const step = STEPS[this.isFull ? 0 : this.step];
+    return { ratio: most * step.ratio, shadows: step.shadows };
+  }
+
+  /** A picture has been handed to the GPU. */
+  end(now: number, isRefinement: boolean): void {
+    this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.gl.flush();
+    this.fencedAt = now;
+    this.lastDrawn = isRefinement ? 0 : now;
+    window.clearTimeout(this.timer);
+    if (!this.isFull) this.timer = window.setTimeout(() => this.refine(), STILL_MS);
+  }
+
+  private refine(): void {
+    this.lastDrawn = 0;
+    this.redraw();
+  }
+
+  forget(): void {
+    this.fence = null;
+  }
+
+  dispose(): void {
+    window.clearTimeout(this.timer);
+    if (this.fence) this.gl.deleteSync(this.fence);
+    this.fence = null;
+  }
+}

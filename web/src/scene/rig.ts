@@ -1,0 +1,143 @@
+// The camera on its sphere about a target: z stays up.
+
+import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
+
+const FIELD_OF_VIEW = 28;
+const TURN_MS = 450;
+
+/** Towards the camera from the target. */
+export const SIDES = {
+  home: new Vector3(-0.42, -1, 0.72).normalize(),
+  top: new Vector3(0, -0.001, 1).normalize(),
+  front: new Vector3(-1, -0.001, 0.0).normalize(),
+  side: new Vector3(0, -1, 0.02).normalize(),
+};
+
+export class CameraRig {
+  readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 10);
+  readonly target = new Vector3();
+  private azimuth = 0;
+  private elevation = 0;
+  private distance = 1;
+  private fitted = 1;
+  private radius = 0.1;
+  private turn: { from: [number, number, number, Vector3]; to: [number, number, number, Vector3]; since: number } | null = null;
+  reducedMotion = false;
+
+  constructor(private readonly onChange: () => void) {
+    this.camera.up.set(0, 0, 1);
+    this.look(SIDES.home);
+  }
+
+  private look(direction: Vector3): void {
+    this.azimuth = Math.atan2(direction.y, direction.x);
+    this.elevation = Math.asin(MathUtils.clamp(direction.z, -1, 1));
+  }
+
+  /** The whole body is seen from a side. */
+  fit(box: Box3, direction: Vector3, animate: boolean): void {
+    const centre = box.getCenter(new Vector3());
+    const azimuth = Math.atan2(direction.y, direction.x);
+    const elevation = Math.asin(MathUtils.clamp(direction.z, -1, 1));
+    const distance = this.distanceFor(box, centre, direction);
+    this.fitted = distance;
+    this.radius = 0.5 * box.getSize(new Vector3()).length();
+    if (animate && !this.reducedMotion) {
+      const near = this.azimuth + MathUtils.euclideanModulo(azimuth - this.azimuth + Math.PI, 2 * Math.PI) - Math.PI;
+      this.turn = {
+        from: [this.azimuth, this.elevation, this.distance, this.target.clone()],
+        to: [near, elevation, distance, centre],
+        since: performance.now(),
+      };
+    } else {
+      this.turn = null;
+      [this.azimuth, this.elevation, this.distance] = [azimuth, elevation, distance];
+      this.target.copy(centre);
+    }
+    this.place();
+  }
+
+  private distanceFor(box: Box3, centre: Vector3, direction: Vector3): number {
+    // The corners of the box as seen: the nearest distance from which all are in the picture, with a margin.
+    const up = new Vector3(0, 0, 1);
+    const right = new Vector3().crossVectors(up, direction).normalize();
+    up.crossVectors(direction, right);
+    const ty = Math.tan(MathUtils.degToRad(FIELD_OF_VIEW / 2)), tx = ty * this.camera.aspect;
+    let distance = 0;
+    for (let i = 0; i < 8; i++) {
+      const p = new Vector3(i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y, i & 4 ? box.max.z : box.min.z).sub(centre);
+      const near = p.dot(direction);
+      distance = Math.max(distance, near + Math.abs(p.dot(right)) / tx, near + Math.abs(p.dot(up)) / ty);
+    }
+    return 1.12 * distance;
+  }
+
+  /** Drags the picture by pixels of a picture `height` high. */
+  orbit(dx: number, dy: number, height: number): void {
+    this.turn = null;
+    this.azimuth -= (dx / height) * Math.PI * 1.1;
+    this.elevation = MathUtils.clamp(this.elevation + (dy / height) * Math.PI * 1.1, -Math.PI / 2 + 0.002, Math.PI / 2 - 0.002);
+    this.place();
+  }
+
+  pan(dx: number, dy: number, height: number): void {
+    this.turn = null;
+    const scale = this.metresPerPixel(height);
+    const { right, up } = this.axes();
+    this.target.addScaledVector(right, -dx * scale).addScaledVector(up, dy * scale);
+    this.place();
+  }
+
+  zoom(factor: number): void {
+    this.turn = null;
+    this.distance = MathUtils.clamp(this.distance * factor, 0.08 * this.fitted, 3 * this.fitted);
+    this.place();
+  }
+
+  /** At the target's distance. */
+  metresPerPixel(height: number): number {
+    return (2 * this.distance * Math.tan(MathUtils.degToRad(FIELD_OF_VIEW / 2))) / height;
+  }
+
+  /** To the right and up in the picture, and into it. */
+  axes(): { right: Vector3; up: Vector3; forward: Vector3 } {
+    const right = new Vector3(), up = new Vector3(), forward = new Vector3();
+    this.camera.matrixWorld.extractBasis(right, up, forward);
+    return { right, up, forward: forward.negate() };
+  }
+
+  resize(aspect: number): void {
+    this.camera.aspect = aspect;
+    this.place();
+  }
+
+  get isTurning(): boolean {
+    return this.turn !== null;
+  }
+
+  /** Goes on with a turn. */
+  step(now: number): void {
+    if (!this.turn) return;
+    const { from, to, since } = this.turn;
+    const t = Math.min(1, (now - since) / TURN_MS);
+    const s = t * t * (3 - 2 * t);
+    this.azimuth = MathUtils.lerp(from[0], to[0], s);
+    this.elevation = MathUtils.lerp(from[1], to[1], s);
+    this.distance = MathUtils.lerp(from[2], to[2], s);
+    this.target.lerpVectors(from[3], to[3], s);
+    if (t === 1) this.turn = null;
+    this.place();
+  }
+
+  private place(): void {
+    const c = Math.cos(this.elevation);
+    const { camera } = this;
+    camera.position.set(c * Math.cos(this.azimuth), c * Math.sin(this.azimuth), Math.sin(this.elevation)).multiplyScalar(this.distance).add(this.target);
+    camera.near = Math.max(this.distance - 4 * this.radius, 0.02 * this.distance);
+    camera.far = this.distance + 6 * this.radius;
+    camera.lookAt(this.target);
+    camera.updateMatrixWorld();
+    camera.updateProjectionMatrix();
+    this.onChange();
+  }
+}

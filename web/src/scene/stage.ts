@@ -1,0 +1,120 @@
+// What stands round the body: light, background, and the body's soft shadow on the ground.
+
+import {
+  CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, SRGBColorSpace, Vector3, type Texture,
+} from 'three';
+import type { Body } from './body';
+import { THEMES, type Theme } from './palette';
+
+/** Towards the key light: over the viewer's left shoulder from home. */
+const LIGHT = new Vector3(-0.5, -0.55, 1.0).normalize();
+const BLOB = 128;
+
+export class Stage {
+  readonly scene = new Scene();
+  readonly light = { value: LIGHT };
+  readonly key = new DirectionalLight(0xffffff, 1);
+  private readonly ground: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly blob = document.createElement('canvas');
+  private background: Texture | null = null;
+  private drawnFor = '';
+
+  constructor() {
+    this.key.castShadow = true;
+    this.key.shadow.mapSize.set(1024, 1024);
+    this.key.shadow.radius = 3.5;
+    this.scene.add(this.key, this.key.target);
+    this.blob.width = this.blob.height = BLOB;
+    this.ground = new Mesh(
+      new PlaneGeometry(1, 1),
+      new MeshBasicMaterial({ map: new CanvasTexture(this.blob), transparent: true, depthWrite: false, toneMapped: false }),
+    );
+    this.ground.renderOrder = -10;
+    this.ground.visible = false;
+    this.scene.add(this.ground);
+  }
+
+  theme(name: 'light' | 'dark'): Theme {
+    const theme = THEMES[name];
+    const canvas = document.createElement('canvas');
+    canvas.width = canvas.height = 256;
+    const g = canvas.getContext('2d')!;
+    const fill = g.createRadialGradient(128, 110, 10, 128, 128, 190);
+    fill.addColorStop(0, theme.background[0]);
+    fill.addColorStop(1, theme.background[1]);
+    g.fillStyle = fill;
+    g.fillRect(0, 0, 256, 256);
+    this.background?.dispose();
+    this.background = new CanvasTexture(canvas);
+    this.background.colorSpace = SRGBColorSpace;
+    this.scene.background = this.background;
+    this.ground.material.color = new Color(theme.shadow);
+    this.ground.material.opacity = theme.shadowOpacity;
+    return theme;
+  }
+
+  /** Light and shadow for a body. The ground's shadow is painted once: what is pressed does not change it visibly. */
+  setBody(body: Body): void {
+    const { centre, radius, box } = body;
+    this.key.position.copy(LIGHT).multiplyScalar(4 * radius).add(centre);
+    this.key.target.position.copy(centre);
+    const camera = this.key.shadow.camera;
+    const r = 1.15 * radius;
+    camera.left = camera.bottom = -r;
+    camera.right = camera.top = r;
+    camera.near = 2 * radius;
+    camera.far = 6 * radius;
+    camera.updateProjectionMatrix();
+    this.key.shadow.bias = -0.0006;
+    this.key.shadow.normalBias = 0.004 * radius;
+
+    // Meshes of one body differ by less than the shadow's softness.
+    const key = [...box.min.toArray(), ...box.max.toArray()].map((x) => Math.round(x * 250)).join();
+    if (key === this.drawnFor) return;
+    this.drawnFor = key;
+    const side = 3.2 * radius;
+    const g = this.blob.getContext('2d')!;
+    g.clearRect(0, 0, BLOB, BLOB);
+    g.fillStyle = '#fff';
+    const shadow = document.createElement('canvas');
+    shadow.width = shadow.height = BLOB;
+    const s = shadow.getContext('2d')!;
+    s.fillStyle = '#fff';
+    s.beginPath();
+    const px = (x: number) => (0.5 + x / side) * BLOB;
+    for (let t = 0; t < body.triangles.length; t += 3) {
+      for (let k = 0; k < 3; k++) {
+        const at = 3 * body.triangles[t + k] * body.nLevels;
+        const x = px(body.rest[at] - centre.x), y = px(-(body.rest[at + 1] - centre.y));
+        if (k === 0) s.moveTo(x, y);
+        else s.lineTo(x, y);
+      }
+      s.closePath();
+    }
+    s.fill('nonzero');
+    g.globalAlpha = 0.75;
+    g.filter = `blur(${BLOB * 0.055}px)`;
+    g.drawImage(shadow, 0, 0);
+    g.globalAlpha = 0.55;
+    g.filter = `blur(${BLOB * 0.018}px)`;
+    g.drawImage(shadow, 0, 0);
+    g.filter = 'none';
+    g.globalAlpha = 1;
+    this.ground.material.map!.needsUpdate = true;
+    this.ground.scale.set(side, side, 1);
+    this.ground.position.set(centre.x, centre.y, box.min.z - 0.03 * radius);
+    this.ground.visible = true;
+  }
+
+  set hasGround(on: boolean) {
+    this.ground.visible = on && this.drawnFor !== '';
+  }
+
+  dispose(): void {
+    this.background?.dispose();
+    this.ground.geometry.dispose();
+    this.ground.material.map?.dispose();
+    this.ground.material.dispose();
+    this.key.dispose();
+  }
+}

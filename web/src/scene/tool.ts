@@ -1,0 +1,164 @@
+// What presses, where it presses, and how it is pressed back: tool, operated point, force.
+
+import {
+  BufferGeometry, CanvasTexture, CapsuleGeometry, ConeGeometry, CylinderGeometry, Group, LatheGeometry, Mesh, MeshBasicMaterial, MeshMatcapMaterial,
+  SphereGeometry, SRGBColorSpace, Vector2, Vector3,
+} from 'three';
+import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js';
+import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js';
+import type { ToolForm } from '../generated/api';
+import type { FrameSnapshot } from '../generated/wire';
+
+/** Colours of the thesis's program. */
+const OPERATED_POINT = 0x00c8d7;
+const FORCE = 0xe5252a;
+/** Forces below this are noise, N. */
+const LEAST_FORCE = 0.01;
+const UP = new Vector3(0, 1, 0);
+
+export class ToolView {
+  readonly group = new Group();
+  private readonly tool: Mesh<BufferGeometry, MeshMatcapMaterial>;
+  private readonly point: Mesh<SphereGeometry, MeshBasicMaterial>;
+  private readonly shaft: Mesh<CylinderGeometry, MeshBasicMaterial>;
+  private readonly head: Mesh<ConeGeometry, MeshBasicMaterial>;
+  private readonly arrow = new Group();
+  private form = '';
+  /** Of the arrow at the device's largest force, m. */
+  private longest = 0.1;
+  private maxForce = 10;
+  private readonly force = new Vector3();
+  private isNode = false;
+
+  constructor() {
+    this.tool = new Mesh(new BufferGeometry(), new MeshMatcapMaterial({ matcap: metal(), transparent: true, opacity: 0.62 }));
+    this.tool.renderOrder = 8;
+    this.tool.castShadow = true;
+    this.tool.frustumCulled = false;
+    const over = (color: number) => new MeshBasicMaterial({ color, depthTest: false, depthWrite: false, transparent: true, toneMapped: false });
+    this.point = new Mesh(new SphereGeometry(1, 24, 16), over(OPERATED_POINT));
+    this.point.renderOrder = 12;
+    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 16).translate(0, 0.5, 0), over(FORCE));
+    this.head = new Mesh(new ConeGeometry(1, 1, 20).translate(0, 0.5, 0), over(FORCE));
+    this.shaft.renderOrder = this.head.renderOrder = 11;
+    this.arrow.add(this.shaft, this.head);
+    this.group.add(this.tool, this.point, this.arrow);
+    this.group.visible = false;
+  }
+
+  /** Of which shape; the scale of forces. */
+  set(form: ToolForm, maxForce: number, bodyRadius: number): void {
+    this.maxForce = maxForce > 0 ? maxForce : 10;
+    this.longest = 0.85 * bodyRadius;
+    this.isNode = form.kind === 'node';
+    const key = JSON.stringify([form, bodyRadius.toFixed(3)]);
+    if (key === this.form) return;
+    this.form = key;
+    this.tool.geometry.dispose();
+    this.tool.geometry = shape(form, 0.55 * bodyRadius);
+  }
+
+  place(frame: FrameSnapshot): void {
+    this.group.visible = true;
+    this.tool.position.fromArray(frame.tool);
+    this.tool.quaternion.fromArray(frame.orientation);
+    this.point.position.fromArray(frame.tool);
+    this.arrow.position.fromArray(frame.tool);
+    this.force.fromArray(frame.force);
+  }
+
+  options(tool: boolean, force: boolean): void {
+    this.tool.visible = tool && !this.isNode;
+    this.arrow.visible = force && this.force.length() > LEAST_FORCE;
+  }
+
+  /** Sizes that are the same on the screen at any distance; `pixel` in metres. */
+  scale(pixel: number): void {
+    this.point.scale.setScalar(pixel * (this.isNode ? 7 : 5));
+    const force = this.force.length();
+    if (force <= LEAST_FORCE) return;
+    const head = pixel * 13;
+    const length = Math.max((force / this.maxForce) * this.longest, 1.25 * head);
+    this.arrow.quaternion.setFromUnitVectors(UP, this.force.clone().divideScalar(force));
+    this.shaft.scale.set(pixel * 1.8, length - 0.8 * head, pixel * 1.8);
+    this.head.position.y = length - head;
+    this.head.scale.set(0.38 * head, head, 0.38 * head);
+  }
+
+  dispose(): void {
+    for (const mesh of [this.tool, this.point, this.shaft, this.head]) {
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+    }
+    this.tool.material.matcap?.dispose();
+  }
+}
+
+/** With its tip at the origin and z out of the tissue; rods are `length` long. */
+function shape(form: ToolForm, length: number): BufferGeometry {
+  switch (form.kind) {
+    case 'sphere':
+      return withStem(new SphereGeometry(form.radius, 48, 32).translate(0, 0, form.radius), form.radius, 2 * form.radius, length);
+    case 'flat_punch': {
+      const { radius: r, edge_radius: e } = form;
+      const profile = [new Vector2(0, 0)];
+      for (let i = 0; i <= 6; i++) {
+        const a = (i / 6) * (Math.PI / 2);
+        profile.push(new Vector2(r - e + e * Math.sin(a), e - e * Math.cos(a)));
+      }
+      const top = Math.max(0.35 * length, 1.2 * r);
+      const bevel = 0.08 * r;
+      profile.push(new Vector2(r, top - bevel), new Vector2(r - bevel, top), new Vector2(0, top));
+      const rod = new LatheGeometry(profile, 64).rotateX(Math.PI / 2);
+      return withStem(rod, r, top, length);
+    }
+    case 'capsule':
+      return withStem(new CapsuleGeometry(form.radius, form.length, 16, 40).rotateZ(Math.PI / 2).translate(0, 0, form.radius), form.radius, 2 * form.radius, length);
+    case 'box': {
+      const [x, y, z] = form.size;
+      const edge = Math.min(Math.max(form.edge_radius, 0.02 * Math.min(x, y, z)), 0.499 * Math.min(x, y, z));
+      return withStem(new RoundedBoxGeometry(x, y, z, 4, edge).translate(0, 0, z / 2), Math.min(x, y) / 2, z, length);
+    }
+    case 'fingertip': {
+      const [x, y, z] = form.radii;
+      return new SphereGeometry(1, 48, 32).scale(x, y, z).translate(0, 0, z);
+    }
+    case 'node':
+      return new SphereGeometry(1e-4, 4, 3);
+  }
+}
+
+/** A thin stem to hold it by. */
+function withStem(geometry: BufferGeometry, radius: number, from: number, length: number): BufferGeometry {
+  const r = Math.min(0.35 * radius, 0.035 * length);
+  const h = Math.max(length - from, 0.4 * length);
+  const stem = new CylinderGeometry(r, r, h, 24).rotateX(Math.PI / 2).translate(0, 0, from + h / 2 - 0.02 * radius);
+  const merged = mergeGeometries([geometry, stem].map((g) => (g.index ? g.toNonIndexed() : g)).map(bare));
+  geometry.dispose();
+  stem.dispose();
+  return merged;
+}
+
+function bare(geometry: BufferGeometry): BufferGeometry {
+  for (const name of Object.keys(geometry.attributes)) if (name !== 'position' && name !== 'normal') geometry.deleteAttribute(name);
+  return geometry;
+}
+
+/** Brushed steel as a ball of it looks: a matcap. */
+function metal(): CanvasTexture {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 128;
+  const g = canvas.getContext('2d')!;
+  const sky = g.createLinearGradient(0, 0, 0, 128);
+  for (const [at, colour] of [[0, '#f7fafc'], [0.3, '#b4bfc8'], [0.48, '#6d7a86'], [0.55, '#4b5864'], [0.75, '#7f8b95'], [1, '#39444e']] as const) sky.addColorStop(at, colour);
+  g.fillStyle = sky;
+  g.fillRect(0, 0, 128, 128);
+  const lamp = g.createRadialGradient(44, 34, 2, 44, 34, 42);
+  lamp.addColorStop(0, 'rgba(255,255,255,0.95)');
+  lamp.addColorStop(1, 'rgba(255,255,255,0)');
+  g.fillStyle = lamp;
+  g.fillRect(0, 0, 128, 128);
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace;
+  return texture;
+}
