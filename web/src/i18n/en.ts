@@ -78,7 +78,7 @@ export const en = {
   'readout.title': 'Force and curves',
   'readout.force': 'Force on the hand',
   'readout.force_replayed': 'Force on the hand (recording)',
-  'readout.depth': 'Depth under the skin',
+  'readout.depth': 'Depth',
   'readout.speak': 'Read out force and depth',
   'readout.spoken': 'Force {force}, depth {depth}',
   'curve.force-depth': 'Force over depth',
@@ -323,6 +323,8 @@ export const en = {
   'replay.time': 'Time in the recording',
 
   'game.title': 'Find the lump',
+  'game.setup': 'Set up',
+  'game.going_on': 'Round under way',
   'game.about': 'Lumps are hidden at random places in this body. Feel for them, mark where they lie, then see the truth.',
   'game.how': 'Press and stroke; where the force rises sooner than around, something is harder. Then choose “Mark” and click the place.',
   'game.n_lumps': 'Hidden lumps',

@@ -80,7 +80,7 @@ export const ja: Dictionary = {
   'readout.title': '力とグラフ',
   'readout.force': '手に感じる力',
   'readout.force_replayed': '手に感じる力（記録）',
-  'readout.depth': '皮膚からの深さ',
+  'readout.depth': '深さ',
   'readout.speak': '力と深さを読み上げる',
   'readout.spoken': '力 {force}、深さ {depth}',
   'curve.force-depth': '深さと力',
@@ -325,6 +325,8 @@ export const ja: Dictionary = {
   'replay.time': '記録の時刻',
 
   'game.title': 'しこりを探す',
+  'game.setup': '準備',
+  'game.going_on': '探しています',
   'game.about': 'このモデルの中にしこりを無作為に隠します。触って探し、場所に印を付け、答えを見ます。',
   'game.how': '押したりなでたりしてください。周りより早く力が増す所には硬いものがあります。見つけたら「印を付ける」を選び、その場所をクリックします。',
   'game.n_lumps': '隠すしこりの数',

@@ -145,14 +145,14 @@ function options(kind: Kind, element: HTMLElement): uPlot.Options {
     mode: isPhase ? 2 : 1,
     legend: { show: false },
     cursor: { show: false },
-    padding: [6, 10, 0, 0],
+    padding: [6, isPhase ? 22 : 14, 0, 0],
     scales: {
       x: { time: false, range: isPhase ? depthRange : () => [-WINDOW, 0] },
       y: { range: isDepth ? depthRange : forceRange },
     },
     axes: [
       { ...axis, size: 20, space: 40, values: isPhase ? labels(' mm') : labels(' s') },
-      { ...axis, size: 42, space: 24, values: labels(isDepth ? ' mm' : ' N') },
+      { ...axis, size: 48, space: 24, values: labels(isDepth ? ' mm' : ' N') },
     ],
     series: [{}, ...lines],
   };

@@ -23,7 +23,7 @@ export function LegendBox() {
 }
 
 function Bar({ shown }: { shown: Legend }) {
-  const middle = (shown.min + shown.max) / 2;
+  const middle = shown.isLog ? Math.sqrt(shown.min * shown.max) : (shown.min + shown.max) / 2;
   return (
     <>
       <div class="legend-bar" style={{ background: `linear-gradient(to right, ${shown.stops.join(', ')})` }} />

@@ -85,7 +85,9 @@ export function Rail() {
       {isPanelOpen.value && (
         <div class="panel" id="panel" role="tabpanel" aria-labelledby={`tab-${tab.value}`} tabIndex={0}>
           <h2>{t(`panel.${tab.value}`)}</h2>
-          <Panel key={tab.value} />
+          <div class="panel-inside">
+            <Panel key={tab.value} />
+          </div>
         </div>
       )}
     </nav>

@@ -35,6 +35,7 @@ export function written(force: number): string {
 function ForceNumber() {
   const number = useRef<HTMLOutputElement>(null);
   const depth = useRef<HTMLSpanElement>(null);
+  const gauge = useRef<HTMLDivElement>(null);
   const bar = useRef<HTMLDivElement>(null);
   const scale = useRef<HTMLSpanElement>(null);
   const [spoken, setSpoken] = useState('');
@@ -53,16 +54,16 @@ function ForceNumber() {
       element.dataset.tick = String(newest.tick);
       depth.current!.textContent = inMillimetres(newest.depth);
       depth.current!.dataset.metres = String(newest.depth);
-      axes.take(force, newest.depth);
-      const full = axes.force;
-      bar.current!.style.transform = `scaleX(${Math.min(1, force / full)})`;
-      bar.current!.parentElement!.setAttribute('aria-valuenow', force.toFixed(2));
-      bar.current!.parentElement!.setAttribute('aria-valuemax', String(full));
-      scale.current!.textContent = `${formatNumber(full)} N`;
+      gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
+      gauge.current!.setAttribute('aria-valuemax', String(axes.force));
+      scale.current!.textContent = `${formatNumber(axes.force)} N`;
       newest = null;
     };
     const stop = onFrame((frame) => {
       newest = frame;
+      const force = magnitude(frame.force);
+      axes.take(force, frame.depth);
+      bar.current!.style.transform = `scaleX(${Math.min(1, force / axes.force)})`;
       if (timer === 0) timer = window.setTimeout(set, PERIOD);
     });
     return () => {
@@ -88,7 +89,7 @@ function ForceNumber() {
         <Button kind="quiet" label={t('readout.speak')} onClick={speak}><Icon name="speak" /></Button>
       </div>
       <output ref={number} class="force-number" aria-live="off" data-testid="force-number" data-newtons="0" data-tick="0">0.00 N</output>
-      <div class="gauge" role="meter" aria-label={t('readout.force')} aria-valuemin={0} aria-valuemax={1} aria-valuenow={0}>
+      <div ref={gauge} class="gauge" role="meter" aria-label={t('readout.force')} aria-valuemin={0} aria-valuemax={1} aria-valuenow={0}>
         <div ref={bar} class="gauge-bar" />
       </div>
       <div class="gauge-scale" aria-hidden="true"><span>0</span><span ref={scale} /></div>

@@ -12,14 +12,14 @@ export type Commit<T> = (value: T) => Promise<string | null>;
 export function Section(props: { title: string; hint?: string; action?: ComponentChildren; children: ComponentChildren }) {
   const id = useId();
   return (
-    <section class="section" aria-labelledby={id}>
+    <div class="section" role="group" aria-labelledby={id}>
       <div class="section-head">
         <h3 id={id}>{props.title}</h3>
         {props.action}
       </div>
       {props.hint !== undefined && <p class="hint">{props.hint}</p>}
       {props.children}
-    </section>
+    </div>
   );
 }
 

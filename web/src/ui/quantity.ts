@@ -71,7 +71,7 @@ export function writtenQuantity(value: unknown): string {
 /** A length in mm, with as many decimals as asked. */
 export function inMillimetres(value: number, decimals = 1): string {
   const shown = (value * 1e3).toFixed(decimals);
-  return `${Number(shown) === 0 ? shown.replace('-', '') : shown} mm`;
+  return `${shown.replace('-', Number(shown) === 0 ? '' : '−')} mm`;
 }
 
 /** A point as a scene file writes it. */

@@ -131,11 +131,16 @@ function Histogram({ now }: { now: EngineFigures }) {
       {decades.map((value) => (
         <g key={value}>
           <line class="axis" x1={across(value)} x2={across(value)} y1={HEIGHT - FOOT} y2={HEIGHT - FOOT + 3} />
-          <text x={across(value)} y={HEIGHT - 3} text-anchor="middle">{withPrefix(value, 's', 1)}</text>
+          <text x={across(value)} y={HEIGHT - 3} text-anchor={anchor(across(value))}>{withPrefix(value, 's', 1)}</text>
         </g>
       ))}
     </svg>
   );
+}
+
+/** Words at the ends stay inside. */
+function anchor(x: number): 'start' | 'middle' | 'end' {
+  return x < 20 ? 'start' : x > WIDTH - 20 ? 'end' : 'middle';
 }
 
 /** Energy taken from the hand and given back: more may not be given than was taken and the budget. */

@@ -28,7 +28,7 @@ export function GamePanel() {
     <Controlled>
       {game === null && <Start />}
       {game !== null && game.result == null && (
-        <Section title={t('game.title')}>
+        <Section title={t('game.going_on')}>
           <p class="hint">{t('game.how')}</p>
           <GameFigures game={game} />
         </Section>
@@ -43,7 +43,7 @@ function Start() {
   const seed = wantedSeed.value.trim();
   const isSeed = seed === '' || /^\d{1,15}$/.test(seed);
   return (
-    <Section title={t('game.title')} hint={t('game.about')}>
+    <Section title={t('game.setup')} hint={t('game.about')}>
       <Segmented
         label={t('game.n_lumps')}
         value={wantedLumps.value}
@@ -102,7 +102,7 @@ function Result({ game, result }: { game: GameInfo; result: GameResult }) {
   const newtons = (value: number): string => `${formatNumber(value)} N`;
   return (
     <>
-      <section class="section" data-testid="game-result" aria-label={t('game.result')}>
+      <div class="section" role="group" data-testid="game-result" aria-label={t('game.result')}>
         <div class="section-head"><h3>{t('game.result')}</h3></div>
         <table class="result">
           <thead>
@@ -139,7 +139,7 @@ function Result({ game, result }: { game: GameInfo; result: GameResult }) {
           <dd>{game.seed}</dd>
         </dl>
         <Toggle label={t('game.coverage')} on={view.value.coverage} onChange={(coverage) => show({ coverage })} testid="show-coverage" />
-      </section>
+      </div>
       <div class="buttons">
         <Button kind="primary" onClick={() => startGame(game.n_lumps, null)} testid="game-again">{t('game.new_round')}</Button>
         <Button onClick={() => startGame(game.n_lumps, game.seed)} testid="game-same-seed">{t('game.same_seed')}</Button>
