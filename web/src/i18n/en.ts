@@ -77,7 +77,7 @@ export const en = {
 
   'readout.title': 'Force and curves',
   'readout.force': 'Force on the hand',
-  'readout.force_replayed': 'Force on the hand (recording)',
+  'readout.force_replayed': 'Force (recording)',
   'readout.depth': 'Depth',
   'readout.speak': 'Read out force and depth',
   'readout.spoken': 'Force {force}, depth {depth}',

@@ -79,7 +79,7 @@ export const ja: Dictionary = {
 
   'readout.title': '力とグラフ',
   'readout.force': '手に感じる力',
-  'readout.force_replayed': '手に感じる力（記録）',
+  'readout.force_replayed': '力（記録）',
   'readout.depth': '深さ',
   'readout.speak': '力と深さを読み上げる',
   'readout.spoken': '力 {force}、深さ {depth}',

@@ -3,7 +3,7 @@
 import { named, t } from '../i18n';
 import type { Legend } from '../scene';
 import { legend } from './body';
-import { formatNumber, formatQuantity } from './quantity';
+import { formatNumber } from './quantity';
 
 export function LegendBox() {
   const shown = legend.value;
@@ -34,9 +34,9 @@ function Bar({ shown }: { shown: Legend }) {
   );
 }
 
-function inUnit(value: number, { title, unit }: Legend): string {
+/** All in the unit that suits the largest. */
+function inUnit(value: number, { title, unit, max }: Legend): string {
   if (unit === '' || title === 'stretch') return value.toFixed(2);
-  if (unit === 'Pa') return formatQuantity(value, 'pressure', 2);
-  if (unit === 'm') return `${formatNumber(value * 1e3, 2)} mm`;
-  return `${formatNumber(value, 2)} ${unit}`;
+  const [factor, name] = unit === 'm' ? [1e-3, 'mm'] : unit !== 'Pa' || max < 1e3 ? [1, unit] : max < 1e6 ? [1e3, 'kPa'] : [1e6, 'MPa'];
+  return `${formatNumber(value / factor, 2)} ${name}`;
 }

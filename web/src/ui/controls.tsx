@@ -319,9 +319,16 @@ export function QuantityField(props: {
           data-testid={props.testid === undefined ? undefined : `${props.testid}-slider`}
         />
       )}
-      {error !== null && <p class="field-error" id={`${id}-error`} role="alert">{error}</p>}
+      {error !== null && <FieldError id={`${id}-error`} text={error} />}
     </div>
   );
+}
+
+function FieldError({ id, text }: { id: string; text: string }) {
+  const place = useRef<HTMLParagraphElement>(null);
+  // It may lie below what of the panel is seen.
+  useEffect(() => place.current!.scrollIntoView({ block: 'nearest' }), [text]);
+  return <p ref={place} class="field-error" id={id} role="alert">{text}</p>;
 }
 
 /** Says what was refused as a notice: for buttons, which have no place of their own for it. */
