@@ -1,5 +1,6 @@
 // The force that a hand would feel: as number, as bar, as curves.
 
+import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { t } from '../i18n';
 import { isReplaying, latestFrame, onFrame, state } from '../store';
@@ -11,6 +12,9 @@ import { magnitude } from './history';
 import { Icon } from './icons';
 import { formatNumber, inMillimetres, withPrefix } from './quantity';
 import { PressDepth } from './panels/DevicePanel';
+
+/** Share of the force that is let through, %. */
+const gain = signal(100);
 
 /** Numbers that change faster than this cannot be read, ms. */
 const PERIOD = 80;
@@ -57,6 +61,7 @@ function ForceNumber() {
       gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
       gauge.current!.setAttribute('aria-valuemax', String(axes.force));
       scale.current!.textContent = `${formatNumber(axes.force)} N`;
+      gain.value = Math.round(newest.gain * 100);
       newest = null;
     };
     const stop = onFrame((frame) => {
@@ -97,6 +102,7 @@ function ForceNumber() {
         <span>{t('readout.depth')}</span>
         <span ref={depth} class="depth-number" data-testid="depth-number">–</span>
       </p>
+      {gain.value < 100 && <p class="held-back" role="status">{t('readout.held_back')}</p>}
       <p class="sr-only" role="status" aria-live="polite">{spoken}</p>
     </section>
   );

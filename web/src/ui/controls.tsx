@@ -3,8 +3,8 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useId, useRef, useState } from 'preact/hooks';
 import { t } from '../i18n';
-import { askAloud, isWatching, notify, status } from '../store';
-import { defaultUnit, formatQuantity, parseQuantity, withUnit, type Dimension } from './quantity';
+import { askAloud, isWatching, notify, state, status } from '../store';
+import { defaultUnit, formatQuantity, parseQuantity, tidied, withUnit, type Dimension } from './quantity';
 
 /** Changes something, and says why it could not. */
 export type Commit<T> = (value: T) => Promise<string | null>;
@@ -190,6 +190,17 @@ export function Slider(props: {
   );
 }
 
+const SLIDE_PERIOD = 100;
+const LONGEST_BUILD = 3000;
+
+/** When the body that was asked for last is there, or takes too long: while one slides, no queue of bodies shall grow. */
+async function settled(): Promise<void> {
+  const begin = performance.now();
+  do {
+    await new Promise((resolve) => window.setTimeout(resolve, SLIDE_PERIOD));
+  } while (state.peek()?.phase === 'building' && performance.now() - begin < LONGEST_BUILD);
+}
+
 /** Sends the newest value only, and the next when the one before is answered. */
 function useLatest(commit: Commit<string>, onError: (error: string | null) => void): (text: string) => void {
   const waiting = useRef<string | null>(null);
@@ -205,7 +216,7 @@ function useLatest(commit: Commit<string>, onError: (error: string | null) => vo
         const next = waiting.current;
         waiting.current = null;
         current.current.onError(await current.current.commit(next));
-        await new Promise((resolve) => window.setTimeout(resolve, 80));
+        await settled();
       }
       isBusy.current = false;
     })();
@@ -259,10 +270,11 @@ export function QuantityField(props: {
   const commitLatest = useLatest(props.onCommit, setError);
   const committed = useRef<string | null>(null);
 
-  const shown = draft ?? props.value;
+  const value = tidied(props.value, props.dimension);
+  const shown = draft ?? value;
   const commit = async (text: string): Promise<void> => {
     const written = withUnit(text, props.dimension);
-    if (written === props.value || written === '') {
+    if (written === value || written === '') {
       setDraft(null);
       setError(null);
       return;

@@ -62,6 +62,13 @@ export function withUnit(text: string, dimension: Dimension): string {
   return `${match[1]} ${defaultUnit(dimension)}`;
 }
 
+/** As written, but for what no person would write: 0.00030000000000000003 m, 0 m among millimetres. */
+export function tidied(text: string, dimension: Dimension): string {
+  const value = parseQuantity(text, dimension);
+  if (value === null || (value !== 0 && text.length <= 9)) return text;
+  return formatQuantity(value, dimension, 5);
+}
+
 /** A quantity that is written as it is, whatever a scene holds there. */
 export function writtenQuantity(value: unknown): string {
   if (typeof value === 'string') return value;

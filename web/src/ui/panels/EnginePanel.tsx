@@ -95,12 +95,28 @@ const WIDTH = 248;
 const HEIGHT = 84;
 const FOOT = 16;
 
+const BARS = 40;
+
+/** The engine's bins are far finer than a bar can be: as many per bar as fall into it. */
+function gathered(counted: EngineFigures['tick_histogram'], first: number, last: number): [number, number, number][] {
+  const ratio = last / first;
+  const bars = Array.from({ length: BARS }, (_, i): [number, number, number] => [
+    first * ratio ** (i / BARS), first * ratio ** ((i + 1) / BARS), 0,
+  ]);
+  for (const [from, to, count] of counted) {
+    const at = Math.floor((BARS * Math.log(Math.sqrt(Math.max(from, first) * to) / first)) / Math.log(ratio));
+    bars[Math.min(BARS - 1, Math.max(0, at))][2] += count;
+  }
+  return bars.filter(([, , count]) => count > 0);
+}
+
 /** Bars over the time that ticks took; their height is logarithmic, for one slow tick in a million must be seen. */
 function Histogram({ now }: { now: EngineFigures }) {
-  const bars = now.tick_histogram.filter(([, , count]) => count > 0);
-  if (bars.length === 0) return null;
-  const first = Math.max(bars[0][0], 1e-8);
-  const last = Math.max(bars[bars.length - 1][1], 2 * first);
+  const counted = now.tick_histogram.filter(([, , count]) => count > 0);
+  if (counted.length === 0) return null;
+  const first = Math.max(counted[0][0], 1e-8);
+  const last = Math.max(counted[counted.length - 1][1], 2 * first);
+  const bars = gathered(counted, first, last);
   const across = (seconds: number): number => (WIDTH * Math.log(Math.max(seconds, first) / first)) / Math.log(last / first);
   const most = Math.log10(1 + Math.max(...bars.map(([, , count]) => count)));
   const decades = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2].filter((value) => value >= first && value <= last);
