@@ -20,12 +20,14 @@ export class LumpsView {
     this.material = new SurfaceMaterial(shared, stage.light, planes);
   }
 
-  set(lumps: LumpInfo[], body: Body, colour: string): void {
-    const key = `${body.id} ${JSON.stringify(lumps)}`;
+  /** The truth of a game is seen through all that lies over it. */
+  set(lumps: LumpInfo[], body: Body, colour: string, isTruth: boolean): void {
+    const key = `${body.id} ${isTruth} ${JSON.stringify(lumps)}`;
     if (key === this.key) return;
     this.key = key;
     this.clear();
-    this.material.look({ colour, opacity: 1, isMapped: false, skin: 0.4, side: FrontSide });
+    this.material.look({ colour, opacity: isTruth ? 0.8 : 1, isMapped: false, skin: 0.4, side: FrontSide });
+    this.material.depthTest = !isTruth;
     for (const lump of lumps) {
       const geometry = shape(lump);
       const rest = (geometry.getAttribute('position').array as Float32Array).slice();
@@ -36,6 +38,7 @@ export class LumpsView {
       geometry.setAttribute('value', new BufferAttribute(new Float32Array(n), 1));
       const mesh = new Mesh(geometry, this.material);
       mesh.frustumCulled = false;
+      mesh.renderOrder = isTruth ? 7 : 0;
       this.group.add(mesh);
       this.shown.push({ mesh, rest, nodes, shares });
     }

@@ -92,7 +92,8 @@ void main() {
   #include <clipping_planes_fragment>
   vec3 V = normalize(vView);
   vec3 N = isFlat > 0.5 ? normalize(cross(dFdx(vView), dFdy(vView))) : normalize(vNormal);
-  if (dot(N, V) < 0.0) N = -N;
+  // By the side that is drawn and not by the angle: at silhouettes the normal may lean away a little, which is no reason to be dark.
+  if (isFlat < 0.5 && !gl_FrontFacing) N = -N;
   vec3 L = normalize((viewMatrix * vec4(light, 0.0)).xyz);
   vec3 up = normalize((viewMatrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz);
 
@@ -120,9 +121,9 @@ void main() {
   } else {
     float wrapped = clamp((ndl + 0.4) / 1.4, 0.0, 1.0);
     wrapped *= mix(wrapped, 1.0, 0.5) * lit;
-    vec3 scatter = vec3(0.24, 0.055, 0.02) * skin * smoothstep(-0.45, 0.1, ndl) * (1.0 - smoothstep(0.1, 0.75, ndl)) * (0.5 + 0.5 * lit);
-    vec3 ambient = mix(vec3(0.30, 0.25, 0.23), vec3(0.46, 0.47, 0.49), sky);
-    shade = base * (ambient + vec3(0.80, 0.765, 0.71) * wrapped + scatter);
+    vec3 scatter = vec3(0.20, 0.05, 0.03) * skin * smoothstep(-0.45, 0.1, ndl) * (1.0 - smoothstep(0.1, 0.75, ndl)) * (0.5 + 0.5 * lit);
+    vec3 ambient = mix(vec3(0.27, 0.235, 0.225), vec3(0.45, 0.465, 0.49), sky);
+    shade = base * (ambient + vec3(0.76, 0.74, 0.70) * wrapped + scatter);
     shade += vec3(0.9, 0.95, 1.0) * base * fresnel * (0.12 + 0.25 * sky);
   }
   vec3 H = normalize(L + V);

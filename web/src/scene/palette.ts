@@ -3,11 +3,15 @@
 import { DataTexture, LinearFilter, RGBAFormat, SRGBColorSpace } from 'three';
 import type { LayerInfo } from '../generated/api';
 
+export const SKIN = '#dba17b';
+/** Skin as a surface is paler than its section. */
+export const SKIN_IN_LIGHT = '#dcae98';
+
 /** Names are those of the tissue catalogue; the first that is part of a layer's name counts. */
 const TISSUES: [string, string][] = [
   ['epidermis', '#e3b08d'],
   ['dermis', '#d9a07c'],
-  ['skin', '#dba17b'],
+  ['skin', SKIN],
   ['subcut', '#f0d68f'],
   ['fat', '#f0d68f'],
   ['adipose', '#f0d68f'],
@@ -28,7 +32,7 @@ const OTHERS = ['#d9a07c', '#8fb8d6', '#e8c66b', '#7fb8a0', '#c98fb0', '#a7a1d1'
 
 export const BONE = '#e9e2cf';
 /** The rigid core between bones. */
-export const CORE = '#d5cec0';
+export const CORE = '#dad2c2';
 export const LUMP = '#7d5ba6';
 
 /** The colour of every layer, from the skin down: the same in the body, its section, and legends. */
@@ -102,7 +106,7 @@ export const THEMES: Record<'light' | 'dark', Theme> = {
     shadowOpacity: 0.34,
     outline: '#2a1c17',
     wire: '#3a2a22',
-    wireOpacity: 0.3,
+    wireOpacity: 0.24,
     plane: '#4c7fa8',
   },
   dark: {
@@ -111,7 +115,7 @@ export const THEMES: Record<'light' | 'dark', Theme> = {
     shadowOpacity: 0.6,
     outline: '#1a100d',
     wire: '#2b1b14',
-    wireOpacity: 0.38,
+    wireOpacity: 0.28,
     plane: '#7fb2d9',
   },
 };

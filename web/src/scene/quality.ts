@@ -4,6 +4,7 @@
 const SLOW = 38;
 const FAST = 14;
 const STILL_MS = 260;
+const STILL_RATIO = 2;
 
 /** From the most to the least: share of the pixel ratio, shadows. */
 const STEPS = [
@@ -12,6 +13,16 @@ const STEPS = [
   { ratio: 0.75, shadows: false },
   { ratio: 0.55, shadows: false },
 ];
+
+/** Whether WebGL is drawn by the CPU; null when there is none. */
+export function isSoftwareWebGL(): boolean | null {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (!gl) return null;
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
 
 export class Quality {
   private step = 0;
@@ -23,10 +34,8 @@ export class Quality {
   private isFull = false;
   private timer = 0;
 
-  constructor(private readonly gl: WebGL2RenderingContext, private readonly redraw: () => void) {
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-    if (/swiftshader|llvmpipe|software|basic render/i.test(name)) this.step = 2;
+  constructor(private readonly gl: WebGL2RenderingContext, private readonly isSoftware: boolean, private readonly redraw: () => void) {
+    if (isSoftware) this.step = 2;
   }
 
   /** Whether the GPU is done with the last picture; measures how long it took. */
@@ -62,8 +71,10 @@ export class Quality {
   /** What to draw now: less while pictures follow each other. */
   begin(now: number): { ratio: number; shadows: boolean } {
     const isMoving = now - this.lastDrawn < STILL_MS && this.lastDrawn > 0;
-    this.isFull = !isMoving || this.step === 0;
-    const most = Math.min(window.devicePixelRatio || 1, 2);
+    this.isFull = !isMoving || (this.step === 0 && !this.isSoftware);
+    // Software WebGL has no multisampling (it costs threefold): a picture that stands still is drawn larger instead.
+    const usual = Math.min(window.devicePixelRatio || 1, 2);
+    const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIO) : usual;
     const step = STEPS[this.isFull ? 0 : this.step];
     return { ratio: most * step.ratio, shadows: step.shadows };
   }

@@ -65,7 +65,8 @@ class Grown<T extends Float32Array | Uint32Array> {
   /** Makes room for `n` more. */
   reserve(n: number): void {
     if (this.length + n <= this.data.length) return;
-    const wider = new (this.data.constructor as new (n: number) => T)(2 * (this.length + n));
+    // Whole corners and segments, so that attributes end with the buffer.
+    const wider = new (this.data.constructor as new (n: number) => T)(12 * Math.ceil((this.length + n) / 6));
     wider.set(this.data.subarray(0, this.length));
     this.data = wider;
   }
@@ -79,15 +80,15 @@ export interface SectionValues {
 
 export class Section {
   /** Corners: place, place at rest, value, layer. */
-  readonly positions = new Grown(new Float32Array(1 << 14));
-  readonly rest = new Grown(new Float32Array(1 << 14));
-  readonly values = new Grown(new Float32Array(1 << 12));
-  readonly layers = new Grown(new Float32Array(1 << 12));
-  readonly indices = new Grown(new Uint32Array(1 << 14));
+  readonly positions = new Grown(new Float32Array(3 * (1 << 14)));
+  readonly rest = new Grown(new Float32Array(3 * (1 << 14)));
+  readonly values = new Grown(new Float32Array(3 * (1 << 12)));
+  readonly layers = new Grown(new Float32Array(3 * (1 << 12)));
+  readonly indices = new Grown(new Uint32Array(3 * (1 << 14)));
   /** Segments between layers and round the body: both ends. */
-  readonly outline = new Grown(new Float32Array(1 << 13));
+  readonly outline = new Grown(new Float32Array(3 * (1 << 13)));
   /** Segments on the faces of all prisms. */
-  readonly wire = new Grown(new Float32Array(1 << 13));
+  readonly wire = new Grown(new Float32Array(3 * (1 << 13)));
   /** m², by layer. */
   area: number[] = [];
   private height = new Float32Array(0);

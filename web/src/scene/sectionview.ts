@@ -1,6 +1,6 @@
 // The section as it is drawn: polygons of tissue, lines between layers, core and bones filled.
 
-import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, type IUniform, type Vector2 } from 'three';
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, Sphere, type IUniform, type Vector2 } from 'three';
 import type { Body } from './body';
 import { contourLoops, fillLoops, type CutPlane } from './contour';
 import { Lines } from './lines';
@@ -14,9 +14,9 @@ export class SectionView {
   private readonly tissue: Mesh<BufferGeometry, SectionMaterial>;
   private readonly core: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly bone: Mesh<BufferGeometry, MeshBasicMaterial>;
-  readonly outline = new Lines(1.6);
+  readonly outline = new Lines(1.3);
   readonly wire = new Lines(1);
-  private readonly boneLine = new Lines(1.2);
+  private readonly boneLine = new Lines(1.1);
   private capacity = 0;
   private filledFor = '';
 
@@ -70,6 +70,7 @@ export class SectionView {
     geometry.index!.addUpdateRange(0, section.indices.length);
     geometry.index!.needsUpdate = true;
     geometry.setDrawRange(0, section.indices.length);
+    geometry.boundingSphere ??= new Sphere(body.centre, body.radius);
     this.outline.show(section.outline.data, section.outline.length);
     this.wire.show(section.wire.data, section.wire.length);
 
@@ -100,7 +101,7 @@ export class SectionView {
   colours(core: string, bone: string, outline: string, wire: string, wireOpacity: number, isWired: boolean): void {
     (this.core.material.color as Color).set(core);
     (this.bone.material.color as Color).set(bone);
-    this.outline.style(outline, 0.85);
+    this.outline.style(outline, outline === '#ffffff' ? 0.6 : 0.8);
     this.boneLine.style(outline, 0.6);
     this.wire.style(wire, isWired ? wireOpacity : 0);
     this.wire.material.visible = isWired;

@@ -1,7 +1,8 @@
-// What stands round the body: light, background, and the body's soft shadow on the ground.
+// What stands round the body: light, and the body's soft shadow on the ground. The background is the page's own, behind a canvas
+// that lets it through: to paint it on the GPU would cost software WebGL a third of its time.
 
 import {
-  CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, SRGBColorSpace, Vector3, type Texture,
+  CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, Vector3,
 } from 'three';
 import type { Body } from './body';
 import { THEMES, type Theme } from './palette';
@@ -16,7 +17,6 @@ export class Stage {
   readonly key = new DirectionalLight(0xffffff, 1);
   private readonly ground: Mesh<PlaneGeometry, MeshBasicMaterial>;
   private readonly blob = document.createElement('canvas');
-  private background: Texture | null = null;
   private drawnFor = '';
 
   constructor() {
@@ -36,18 +36,6 @@ export class Stage {
 
   theme(name: 'light' | 'dark'): Theme {
     const theme = THEMES[name];
-    const canvas = document.createElement('canvas');
-    canvas.width = canvas.height = 256;
-    const g = canvas.getContext('2d')!;
-    const fill = g.createRadialGradient(128, 110, 10, 128, 128, 190);
-    fill.addColorStop(0, theme.background[0]);
-    fill.addColorStop(1, theme.background[1]);
-    g.fillStyle = fill;
-    g.fillRect(0, 0, 256, 256);
-    this.background?.dispose();
-    this.background = new CanvasTexture(canvas);
-    this.background.colorSpace = SRGBColorSpace;
-    this.scene.background = this.background;
     this.ground.material.color = new Color(theme.shadow);
     this.ground.material.opacity = theme.shadowOpacity;
     return theme;
@@ -72,7 +60,7 @@ export class Stage {
     const key = [...box.min.toArray(), ...box.max.toArray()].map((x) => Math.round(x * 250)).join();
     if (key === this.drawnFor) return;
     this.drawnFor = key;
-    const side = 3.2 * radius;
+    const side = 2.9 * radius;
     const g = this.blob.getContext('2d')!;
     g.clearRect(0, 0, BLOB, BLOB);
     g.fillStyle = '#fff';
@@ -83,12 +71,13 @@ export class Stage {
     s.beginPath();
     const px = (x: number) => (0.5 + x / side) * BLOB;
     for (let t = 0; t < body.triangles.length; t += 3) {
-      for (let k = 0; k < 3; k++) {
-        const at = 3 * body.triangles[t + k] * body.nLevels;
-        const x = px(body.rest[at] - centre.x), y = px(-(body.rest[at + 1] - centre.y));
-        if (k === 0) s.moveTo(x, y);
-        else s.lineTo(x, y);
-      }
+      const at = [0, 1, 2].map((k) => 3 * body.triangles[t + k] * body.nLevels);
+      const [x, y] = [at.map((i) => px(body.rest[i] - centre.x)), at.map((i) => px(centre.y - body.rest[i + 1]))];
+      // Those that face upwards are enough; with the others the windings would cancel.
+      if ((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]) >= 0) continue;
+      s.moveTo(x[0], y[0]);
+      s.lineTo(x[1], y[1]);
+      s.lineTo(x[2], y[2]);
       s.closePath();
     }
     s.fill('nonzero');
@@ -111,7 +100,6 @@ export class Stage {
   }
 
   dispose(): void {
-    this.background?.dispose();
     this.ground.geometry.dispose();
     this.ground.material.map?.dispose();
     this.ground.material.dispose();

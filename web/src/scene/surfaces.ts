@@ -1,8 +1,9 @@
 // The surfaces of a body: where each layer begins and ends, the walls at open rims, the core, the bones.
 
-import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, DynamicDrawUsage, Group, LineBasicMaterial, LineSegments, Mesh, type Plane } from 'three';
+import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, DynamicDrawUsage, Group, LineBasicMaterial, LineSegments, Mesh, Sphere, type Plane } from 'three';
 import type { Body } from './body';
 import { SurfaceMaterial, type SharedUniforms, type SurfaceLook } from './materials';
+import { SKIN, SKIN_IN_LIGHT } from './palette';
 import type { Stage } from './stage';
 
 export interface LayerLook {
@@ -64,6 +65,18 @@ export class Surfaces {
     this.core = this.mesh(body.coreTriangles);
     if (body.boneTriangles.length > 0) this.bones = this.boneMesh();
 
+    // What lies deeper is drawn later, so that most of it is hidden before it is shaded.
+    this.walls.forEach((mesh) => (mesh.renderOrder = 0.1));
+    this.core.renderOrder = 0.6;
+    if (this.bones) this.bones.renderOrder = 0.5;
+    // Where bones, core and tissue meet, the outer one is drawn.
+    this.core.material.polygonOffsetFactor = 3;
+    this.core.material.polygonOffsetUnits = 200;
+    if (this.bones) {
+      this.bones.material.polygonOffsetFactor = 2;
+      this.bones.material.polygonOffsetUnits = 80;
+    }
+
     const geometry = this.geometry(edgeNodes(body));
     this.wire = new LineSegments(geometry, new LineBasicMaterial({ transparent: true, depthWrite: false, clippingPlanes: planes }));
     this.wire.frustumCulled = false;
@@ -78,6 +91,7 @@ export class Surfaces {
     geometry.setAttribute('rest', this.rest);
     geometry.setAttribute('value', this.value);
     geometry.setIndex(new BufferAttribute(index, 1));
+    geometry.boundingSphere = new Sphere(this.body.centre, this.body.radius);
     this.geometries.push(geometry);
     return geometry;
   }
@@ -114,7 +128,7 @@ export class Surfaces {
     const levels = new Set<number>();
     for (let k = 0; k < n; k++) {
       const { colour, opacity, visible } = layers[k];
-      const look: SurfaceLook = { colour, opacity, isMapped, skin: isTissue ? (k === 0 ? 1 : 0.55) : 0 };
+      const look: SurfaceLook = { colour: isTissue && colour === SKIN ? SKIN_IN_LIGHT : colour, opacity, isMapped, skin: isTissue ? (k === 0 ? 1 : 0.55) : 0 };
       // Only what can be seen is drawn: a layer's outside when what is over it lets it through, its inside likewise.
       this.outer[k].visible = visible && isThrough(k - 1);
       this.inner[k].visible = visible && opacity === 1 && k < n - 1 && isThrough(k + 1);
@@ -123,13 +137,17 @@ export class Surfaces {
       this.inner[k].material.look({ ...look, side: BackSide });
       this.walls[k].material.look({ ...look, skin: look.skin * 0.5, isFlat: true, side: DoubleSide });
       // Transparent layers from the inside out, after all that is solid.
-      this.outer[k].renderOrder = this.walls[k].renderOrder = opacity < 1 ? 2 + 0.01 * (n - k) : 0;
+      this.outer[k].renderOrder = opacity < 1 ? 2 + 0.01 * (n - k) : 0;
+      this.walls[k].renderOrder = opacity < 1 ? 2 + 0.01 * (n - k) : 0.1;
       this.outer[k].castShadow = this.walls[k].castShadow = opacity > 0.6;
       if (this.outer[k].visible) levels.add(this.body.layerStart[k]);
       if (this.inner[k].visible) levels.add(this.body.layerStart[k + 1]);
     }
     this.core.material.look({ colour: this.bones ? core : bone, opacity: 1, isMapped: false, skin: 0, isFlat: true, side: DoubleSide });
     this.core.visible = bones;
+    // Under solid layers only what closes its open ends is seen of the core.
+    const isHidden = layers.every((layer) => layer.visible && layer.opacity === 1);
+    this.core.geometry.setDrawRange(isHidden ? 3 * this.body.nCoreSides : 0, Infinity);
     if (this.bones) {
       this.bones.material.look({ colour: bone, opacity: 1, isMapped: false, skin: 0 });
       this.bones.visible = bones;

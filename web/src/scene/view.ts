@@ -15,7 +15,7 @@ import { DEFAULT_OPTIONS, NoWebGL2, type Legend, type Picked, type SectionArea, 
 import { Gizmo, PlaneGrip, ScaleBar } from './overlay';
 import { BONE, CORE, LUMP, layerColours, mapTexture, type Theme } from './palette';
 import { nearestOnSkin, pickBone, pickSection, pickSkin } from './picking';
-import { Quality } from './quality';
+import { Quality, isSoftwareWebGL } from './quality';
 import { CameraRig, SIDES } from './rig';
 import { SectionView } from './sectionview';
 import { Stage } from './stage';
@@ -83,14 +83,16 @@ export class BodyView {
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');
     canvas.setAttribute('aria-label', 'Body: press with mouse, finger or keys');
-    const gl = canvas.getContext('webgl2', { antialias: true, alpha: false, powerPreference: 'high-performance' });
+    const isSoftware = isSoftwareWebGL();
+    const gl = isSoftware === null ? null : canvas.getContext('webgl2', { antialias: !isSoftware, alpha: true, powerPreference: 'high-performance' });
     if (!gl) throw new NoWebGL2();
-    this.renderer = new WebGLRenderer({ canvas, context: gl, antialias: true });
+    this.renderer = new WebGLRenderer({ canvas, context: gl, alpha: true });
+    this.renderer.setClearAlpha(0);
     this.renderer.localClippingEnabled = true;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
-    this.quality = new Quality(gl, () => {
+    this.quality = new Quality(gl, Boolean(isSoftware), () => {
       this.isRefining = true;
       this.invalidate('shadow');
     });
@@ -111,7 +113,7 @@ export class BodyView {
     this.stage.scene.add(this.sectionView.group, this.tool.group, this.marks.group, this.lumps.group, this.planeFrame);
     this.sectionView.group.visible = this.planeFrame.visible = false;
     this.theme = this.stage.theme(this.options.theme);
-    root.dataset.theme = this.options.theme;
+    this.paintBackground();
 
     const { signal } = this.stop;
     canvas.addEventListener('webglcontextlost', (event) => {
@@ -163,7 +165,7 @@ export class BodyView {
     this.rig.reducedMotion = this.options.reducedMotion;
     if (before.theme !== this.options.theme) {
       this.theme = this.stage.theme(this.options.theme);
-      this.root.dataset.theme = this.options.theme;
+      this.paintBackground();
     }
     this.invalidate('style');
   }
@@ -179,6 +181,12 @@ export class BodyView {
     out.width = this.canvas.width;
     out.height = this.canvas.height;
     const g = out.getContext('2d')!;
+    const [middle, corner] = this.theme.background;
+    const fill = g.createRadialGradient(out.width / 2, 0.43 * out.height, 0, out.width / 2, out.height / 2, 0.75 * Math.max(out.width, out.height));
+    fill.addColorStop(0, middle);
+    fill.addColorStop(1, corner);
+    g.fillStyle = fill;
+    g.fillRect(0, 0, out.width, out.height);
     g.drawImage(this.canvas, 0, 0);
     const ratio = out.width / this.size.x;
     const ink = this.options.theme === 'dark' ? '#d5dde3' : '#33404a';
@@ -271,6 +279,12 @@ export class BodyView {
     this.renderer.forceContextLoss();
     this.body = null;
     this.root.remove();
+  }
+
+  private paintBackground(): void {
+    const [middle, corner] = this.theme.background;
+    this.root.dataset.theme = this.options.theme;
+    this.root.style.background = `radial-gradient(circle farthest-corner at 50% 43%, ${middle}, ${corner})`;
   }
 
   // Meshes and sizes.
@@ -445,6 +459,9 @@ export class BodyView {
     const { options, state, theme, sectionView } = this;
     const looks = this.layerLooks(this.body!);
     const isMapped = Colouring.isMap(options.colourBy);
+    // Lines have to be seen on the map's colours: those of most begin dark, that of pressure is light in the middle.
+    const isDark = isMapped && mapFor(options.colourBy) !== 'vik';
+    const [outline, wire] = isDark ? ['#ffffff', '#ffffff'] : [theme.outline, theme.wire];
     surfaces.style({
       layers: looks,
       isMapped,
@@ -452,17 +469,17 @@ export class BodyView {
       bones: options.bones,
       core: CORE,
       bone: BONE,
-      wire: { on: options.wireframe, colour: theme.wire, opacity: theme.wireOpacity },
+      wire: { on: options.wireframe, colour: wire, opacity: theme.wireOpacity },
     });
     sectionView.material.layers(looks.map((l) => l.colour), looks.map((l) => (l.opacity < 1 ? Math.min(1, l.opacity + 0.25) : 1)), looks.map((l) => l.name));
     sectionView.material.uniforms.isMapped.value = isMapped ? 1 : 0;
     sectionView.material.uniforms.isPlain.value = options.colourBy === 'layer' ? 1 : 0;
-    sectionView.colours(this.body!.boneTriangles.length > 0 ? CORE : BONE, BONE, theme.outline, theme.wire, theme.wireOpacity, options.wireframe);
+    sectionView.colours(this.body!.boneTriangles.length > 0 ? CORE : BONE, BONE, outline, wire, theme.wireOpacity, options.wireframe);
     this.planeFrame.style(theme.plane, 0.55);
     const lumps = this.lumpInfos();
     sectionView.material.lumps(options.lumps ? lumps : [], LUMP);
     const isSeenThrough = looks.some((l) => !l.visible || l.opacity < 1);
-    this.lumps.set(options.lumps && isSeenThrough ? lumps : [], this.body!, LUMP);
+    this.lumps.set(options.lumps && isSeenThrough ? lumps : [], this.body!, LUMP, Boolean(state?.game?.result));
     this.marks.set(state?.game ?? null, this.body!, options.coverage);
     if (state) this.tool.set(state.tool.shape, state.max_force, this.body!.radius);
   }
@@ -512,7 +529,7 @@ export class BodyView {
       return { x: (0.5 + 0.5 * q.x) * size.x, y: (0.5 - 0.5 * q.y) * size.y };
     };
     const places = cut.middles.map((p) => ({ p, at: toScreen(p) }));
-    const best = places.reduce((a, b) => (b.at.x * 0.35 - b.at.y > a.at.x * 0.35 - a.at.y ? b : a));
+    const best = places.reduce((a, b) => (b.at.x * 0.8 - b.at.y > a.at.x * 0.8 - a.at.y ? b : a));
     const ahead = toScreen(best.p.clone().addScaledVector(cut.way, 0.05));
     const x = Math.min(Math.max(best.at.x, 24), size.x - 24), y = Math.min(Math.max(best.at.y, 24), size.y - 24);
     grip.update(x, y, (ahead.x - best.at.x) / 0.05, (ahead.y - best.at.y) / 0.05, this.options.cutaway.position);
