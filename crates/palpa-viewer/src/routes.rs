@@ -18,7 +18,7 @@ use axum::{
         DefaultBodyLimit, State, WebSocketUpgrade, rejection::BytesRejection,
         ws::rejection::WebSocketUpgradeRejection,
     },
-    http::{HeaderMap, StatusCode, header},
+    http::{HeaderMap, StatusCode, Uri, header},
     middleware::from_fn_with_state,
     response::{Html, IntoResponse, Response},
     routing::{get, post},
@@ -35,7 +35,7 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
         .route("/ws", get(socket))
         .route(
             "/api",
-            get(|| async { Html(api_page::html(&openapi::document())) }),
+            get(|uri: Uri| async move { Html(api_page::html(&openapi::document(), uri.query())) }),
         )
         .route(
             "/api/openapi.json",

@@ -114,15 +114,17 @@ impl Server {
             .build()
             .map_err(at_thread)?;
         let address = SocketAddr::new(params.bind, params.port);
-        let (listener, address) = {
+        let listening = {
             let _within = runtime.enter();
-            listen(address).map_err(|source| match source.kind() {
-                ErrorKind::AddrInUse => ServerError::PortInUse {
-                    bind: params.bind,
-                    port: params.port,
-                },
-                _ => ServerError::Listen { address, source },
-            })?
+            listen(address)
+        };
+        let (listener, address) = match listening {
+            Ok(listening) => listening,
+            Err(source) => {
+                // Dropped, it would wait, which one who calls from another runtime must not.
+                runtime.shutdown_background();
+                return Err(params.refusal(source));
+            }
         };
         let board = Arc::new(Board::new());
         let (closing, is_closing) = watch::channel(false);
@@ -203,6 +205,17 @@ impl ServerParams {
                 is_loopback,
                 token: token.clone(),
             }),
+        }
+    }
+
+    fn refusal(&self, source: io::Error) -> ServerError {
+        let &Self { bind, port, .. } = self;
+        match source.kind() {
+            ErrorKind::AddrInUse => ServerError::PortInUse { bind, port },
+            _ => ServerError::Listen {
+                address: SocketAddr::new(bind, port),
+                source,
+            },
         }
     }
 }
