@@ -17,10 +17,10 @@ a { color: var(--accent) } code { font: .9em ui-monospace, monospace }
 section { border: 1px solid var(--line); border-radius: 8px; padding: .3rem 1rem 1rem; margin: 1rem 0 }
 section h3 { margin-top: .7rem }
 table { border-collapse: collapse; width: 100% } th, td { text-align: left; vertical-align: top; padding: .3rem .8rem .3rem 0; border-top: 1px solid var(--line) }
-th { font-weight: 600; border-top: 0 } td:first-child { white-space: nowrap }
+th { font-weight: 600; border-top: 0 } td:first-child { white-space: nowrap; width: 7rem } td:nth-child(2):not(:last-child) { width: 15rem }
 .method { display: inline-block; min-width: 3.2rem; padding: 0 .4rem; border-radius: 4px; background: var(--soft); color: var(--accent); text-align: center }
 .kinds { columns: 4 10rem; padding: 0; list-style: none }
-pre { background: var(--soft); padding: .8rem 1rem; border-radius: 8px; overflow-x: auto }
+pre { background: var(--soft); padding: .8rem 1rem; border-radius: 8px; white-space: pre-wrap }
 </style>
 ";
 

@@ -12,8 +12,8 @@ use crate::{
     control::{Envelope, Hello, Message, Notice, NoticeLevel, Reply, Request},
     hub::Hub,
     limits::{
-        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, SEND_WAIT,
-        SILENCE, Verdict,
+        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, QUIET,
+        SEND_WAIT, SILENCE, Verdict,
     },
     wire::SNAPSHOT_VERSION,
 };
@@ -280,7 +280,15 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
         // The picture comes last: there is always a newer one.
         let sent = select! {
             biased;
-            _ = ping.tick() => out.send(ws::Message::Ping(Bytes::new())).await,
+            _ = ping.tick() => {
+                // A page does not see pings. While the session says nothing, it hears the state.
+                let is_silent = out.spoke_at.elapsed() > QUIET;
+                let text = is_silent.then(|| state.borrow().clone()).flatten();
+                match out.some(text).await {
+                    Ok(()) => out.send(ws::Message::Ping(Bytes::new())).await,
+                    end => end,
+                }
+            }
             Some(answer) = answers.recv() => out.text(answer).await,
             Ok(()) = state.changed() => {
                 let text = state.borrow_and_update().clone();
@@ -314,6 +322,8 @@ struct Outlet<'a> {
     mesh: u64,
     /// Serial number of the frame that it had last, or of the one before it came.
     frame: u64,
+    /// When something was said last.
+    spoke_at: Instant,
 }
 
 impl<'a> Outlet<'a> {
@@ -329,6 +339,7 @@ impl<'a> Outlet<'a> {
             board,
             mesh: 0,
             frame: before,
+            spoke_at: Instant::now(),
         }
     }
 
@@ -343,6 +354,9 @@ impl<'a> Outlet<'a> {
             Ok(Err(_)) => Err(End::Gone),
             Ok(Ok(())) => {
                 self.board.counts.bytes_sent.add(n_bytes as u64);
+                if n_bytes > 0 {
+                    self.spoke_at = Instant::now();
+                }
                 Ok(())
             }
         }

@@ -9,6 +9,7 @@
 mod api_page;
 mod board;
 mod client;
+mod connections;
 pub mod control;
 mod guard;
 mod host;

@@ -36,7 +36,8 @@ pub fn document() -> Value {
         json!({ "get": { "summary": summary, "responses": {
             "200": { "description": description, "content": { kind: {} } },
             "404": { "description": "There is none yet." },
-            "500": { "description": "It cannot be made; the text says why." } } } })
+            "500": { "description": "It cannot be made; the text says why." },
+            "503": { "description": "Too many files are being made." } } } })
     };
     json!({
         "openapi": "3.1.0",
@@ -56,7 +57,7 @@ pub fn document() -> Value {
             "/api/control": { "post": {
                 "summary": "Asks for something",
                 "description": "As over the WebSocket, but on behalf of a program: refused while a page controls, unless the request is \
-                    take_control; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.",
+                    `take_control`; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.",
                 "requestBody": { "required": true, "content": { "application/json": { "schema": envelope } } },
                 "responses": {
                     "200": reply.clone(),
@@ -78,7 +79,7 @@ pub fn document() -> Value {
                 "summary": "The WebSocket",
                 "description": "Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in \
                     `crates/palpa-viewer/src/wire.rs`. The first who connects controls, the others watch until they take control. A client that \
-                    is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 5 s), asks more than 200 times a \
+                    is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), asks more than 200 times a \
                     second (400 at once) or is not understood 20 times in a row is let go, with the reason.",
                 "parameters": [{ "name": "token", "in": "query", "schema": { "type": "string" } }],
                 "responses": {

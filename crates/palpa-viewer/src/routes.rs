@@ -198,7 +198,17 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),
     };
-    let made = spawn_blocking(move || hub.host.file(file)).await;
+    let Ok(permit) = Arc::clone(&hub.files).try_acquire_owned() else {
+        let why = "other files are being made; ask again when they are there\n";
+        return (StatusCode::SERVICE_UNAVAILABLE, why).into_response();
+    };
+    let host = Arc::clone(&hub.host);
+    let made = spawn_blocking(move || {
+        // Kept though who asked may be gone: the file is made all the same.
+        let _permit = permit;
+        host.file(file)
+    })
+    .await;
     match made {
         Ok(Ok(Some(bytes))) => {
             let disposition = format!("attachment; filename=\"{name}\"");

@@ -3,13 +3,13 @@
 use crate::{
     board::{Board, Publisher},
     client::is_closing,
+    connections::Connections,
     guard::Guard,
     host::Host,
     hub::Hub,
     limits::{CLOSE_WAIT, MAX_CLIENTS, SEND_BUFFER},
     routes,
 };
-use axum::serve::ListenerExt;
 use std::{
     fmt::{self, Write as _},
     io::{self, ErrorKind},
@@ -256,10 +256,7 @@ fn run(runtime: Runtime, listener: TcpListener, hub: &Arc<Hub>) {
 }
 
 async fn serve(listener: TcpListener, hub: &Arc<Hub>) {
-    let listener = listener.tap_io(|connection| {
-        // Small messages go at once; where this is refused they come a little later.
-        let _ = connection.set_nodelay(true);
-    });
+    let listener = Connections::new(listener);
     let closing = hub.closing.clone();
     let serving = axum::serve(listener, routes::router(hub))
         .with_graceful_shutdown(is_closing(closing.clone()));

@@ -40,7 +40,7 @@ async fn what_is_malformed_is_told_and_the_connection_goes_on() {
             Some(8),
             "out of range",
         ),
-        ("[[[[", None, "EOF"),
+        (r#"["x"]"#, None, "expected struct Envelope"),
     ] {
         page.say(text).await;
         let reply = page.reply().await;
@@ -49,8 +49,11 @@ async fn what_is_malformed_is_told_and_the_connection_goes_on() {
         assert!(why.contains("expected a request"), "{why}");
         assert_eq!(reply.id, id, "{text}");
     }
-    let deep = "[".repeat(60_000);
-    page.say(deep).await;
+    let deep = "[".repeat(50_000);
+    page.say(format!(
+        r#"{{"type": "edit", "edits": [{{"path": "/x", "value": {deep}"#
+    ))
+    .await;
     assert!(page.reply().await.error.unwrap().contains("recursion"));
     let name = format!(r#"{{"type": "{}"}}"#, "x".repeat(50_000));
     page.say(name).await;
@@ -189,6 +192,19 @@ async fn thirty_two_pages_and_no_more() {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     panic!("its place was kept");
+}
+
+/// A page takes silence for a lost connection. While the session says nothing, it hears the state again.
+#[tokio::test]
+async fn a_page_hears_something_though_the_session_is_silent_slow() {
+    let (_session, server) = Session::start(None);
+    let mut page = Page::open(&server).await;
+    let first = page.state().await;
+    for _ in 0..2 {
+        let begun = Instant::now();
+        assert_eq!(page.state().await, first);
+        assert!(begun.elapsed() < Duration::from_millis(5500));
+    }
 }
 
 /// A page that answers pings stays though it says nothing; one that does not goes. Takes as long as the patience.
