@@ -26,7 +26,7 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use serde::Deserialize;
-use std::{sync::Arc, time::Instant};
+use std::{error::Error, io, iter::successors, sync::Arc, time::Instant};
 use tokio::{
     select,
     sync::{OwnedSemaphorePermit, broadcast::error::RecvError, mpsc, watch},
@@ -183,11 +183,14 @@ async fn read(stream: &mut SplitStream<WebSocket>, seat: &Seat, answers: &Answer
 const TOO_MANY: &str = "too many requests; at most 200 a second";
 
 fn unreadable(error: &axum::Error) -> End {
-    let error = error.to_string();
-    if error.contains("too long") {
+    let words = error.to_string();
+    let is_io = successors(error.source(), |&e| e.source()).any(<dyn Error>::is::<io::Error>);
+    if is_io || words.contains("without closing handshake") {
+        End::Gone
+    } else if words.contains("too long") {
         End::new(close_code::SIZE, "a message is longer than 1 MiB")
     } else {
-        End::new(close_code::PROTOCOL, &error)
+        End::new(close_code::PROTOCOL, &words)
     }
 }
 

@@ -1,6 +1,9 @@
 //! What can be had over HTTP.
 
-use crate::{page::Page, session::Session};
+use crate::{
+    page::{Page, until},
+    session::Session,
+};
 use palpa_viewer::{
     Server,
     control::{EngineFigures, Reply, Request, State},
@@ -244,10 +247,16 @@ async fn what_is_sent_and_asked_is_counted() {
         ("requests_total", 2.0),
         ("requests_refused_total", 1.0),
         ("malformed_total", 1.0),
+        ("clients_dropped_total", 0.0),
     ] {
         assert_eq!(samples[&format!("palpa_web_{name}")], value, "{name}");
     }
     assert!(samples["palpa_web_sent_bytes_total"] > 500.0);
+    // One that goes without a word was not let go.
+    drop(page);
+    until("it is gone", || server.publisher().n_clients() == 0).await;
+    let samples = parse_metrics(&get(&server, "/metrics").text);
+    assert_eq!(samples["palpa_web_clients_dropped_total"], 0.0);
 }
 
 /// Reads the text format: each sample has a type and words before it, and a number after its name.
