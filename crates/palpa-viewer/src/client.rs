@@ -12,8 +12,8 @@ use crate::{
     control::{Envelope, Hello, Message, Notice, NoticeLevel, Reply, Request},
     hub::Hub,
     limits::{
-        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, SEND_WAIT,
-        SILENCE, Verdict,
+        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, QUIET,
+        SEND_WAIT, SILENCE, Verdict,
     },
     wire::SNAPSHOT_VERSION,
 };
@@ -26,7 +26,7 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use serde::Deserialize;
-use std::{sync::Arc, time::Instant};
+use std::{error::Error, io, iter::successors, sync::Arc, time::Instant};
 use tokio::{
     select,
     sync::{OwnedSemaphorePermit, broadcast::error::RecvError, mpsc, watch},
@@ -183,11 +183,14 @@ async fn read(stream: &mut SplitStream<WebSocket>, seat: &Seat, answers: &Answer
 const TOO_MANY: &str = "too many requests; at most 200 a second";
 
 fn unreadable(error: &axum::Error) -> End {
-    let error = error.to_string();
-    if error.contains("too long") {
+    let words = error.to_string();
+    let is_io = successors(error.source(), |&e| e.source()).any(<dyn Error>::is::<io::Error>);
+    if is_io || words.contains("without closing handshake") {
+        End::Gone
+    } else if words.contains("too long") {
         End::new(close_code::SIZE, "a message is longer than 1 MiB")
     } else {
-        End::new(close_code::PROTOCOL, &error)
+        End::new(close_code::PROTOCOL, &words)
     }
 }
 
@@ -280,7 +283,15 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
         // The picture comes last: there is always a newer one.
         let sent = select! {
             biased;
-            _ = ping.tick() => out.send(ws::Message::Ping(Bytes::new())).await,
+            _ = ping.tick() => {
+                // A page does not see pings. While the session says nothing, it hears the state.
+                let is_silent = out.spoke_at.elapsed() > QUIET;
+                let text = is_silent.then(|| state.borrow().clone()).flatten();
+                match out.some(text).await {
+                    Ok(()) => out.send(ws::Message::Ping(Bytes::new())).await,
+                    end => end,
+                }
+            }
             Some(answer) = answers.recv() => out.text(answer).await,
             Ok(()) = state.changed() => {
                 let text = state.borrow_and_update().clone();
@@ -314,6 +325,8 @@ struct Outlet<'a> {
     mesh: u64,
     /// Serial number of the frame that it had last, or of the one before it came.
     frame: u64,
+    /// When something was said last.
+    spoke_at: Instant,
 }
 
 impl<'a> Outlet<'a> {
@@ -329,6 +342,7 @@ impl<'a> Outlet<'a> {
             board,
             mesh: 0,
             frame: before,
+            spoke_at: Instant::now(),
         }
     }
 
@@ -343,6 +357,9 @@ impl<'a> Outlet<'a> {
             Ok(Err(_)) => Err(End::Gone),
             Ok(Ok(())) => {
                 self.board.counts.bytes_sent.add(n_bytes as u64);
+                if n_bytes > 0 {
+                    self.spoke_at = Instant::now();
+                }
                 Ok(())
             }
         }

@@ -5,7 +5,7 @@ use crate::{
     control::Request,
     guard::Guard,
     host::{Clients, Host},
-    limits::{Gate, MAX_CLIENTS},
+    limits::{Gate, MAX_CLIENTS, MAX_FILES},
 };
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -20,6 +20,8 @@ pub(crate) struct Hub {
     pub(crate) guard: Guard,
     /// A permit per client.
     pub(crate) places: Arc<Semaphore>,
+    /// A permit per file that is being made.
+    pub(crate) files: Arc<Semaphore>,
     /// Whether the server is to end.
     pub(crate) closing: watch::Receiver<bool>,
     /// Counts what programs ask by `/api/control`, all together.
@@ -40,6 +42,7 @@ impl Hub {
             host,
             guard,
             places: Arc::new(Semaphore::new(MAX_CLIENTS)),
+            files: Arc::new(Semaphore::new(MAX_FILES)),
             closing,
             programs: Mutex::new(Gate::new(Instant::now())),
             told: Mutex::default(),

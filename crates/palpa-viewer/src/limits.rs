@@ -4,6 +4,12 @@ use std::time::{Duration, Instant};
 
 /// Pages at once. Each has its own copy of what its socket has not taken yet.
 pub(crate) const MAX_CLIENTS: usize = 32;
+/// Connections at once, of pages, downloads and programs.
+pub(crate) const MAX_CONNECTIONS: usize = 256;
+/// A connection that nothing goes through is ended after so long. A page's is pinged; a file may take a while to make.
+pub(crate) const IDLE: Duration = Duration::from_mins(2);
+/// Files that are being made at once.
+pub(crate) const MAX_FILES: usize = 4;
 /// Longest message of a client, bytes: the text of a scene with its tissues written out has room in it many times.
 pub(crate) const MAX_MESSAGE: usize = 1 << 20;
 /// Longest message that is not the text of a scene, bytes.
@@ -14,9 +20,11 @@ pub(crate) const MAX_MALFORMED: u32 = 20;
 pub(crate) const MAX_ANSWERS: usize = 4096;
 /// How long a client may take for one message.
 pub(crate) const SEND_WAIT: Duration = Duration::from_secs(10);
-/// How often a client is asked for a sign of life.
-pub(crate) const PING_EVERY: Duration = Duration::from_secs(5);
-/// A client that says nothing for so long is gone: two pings were not answered.
+/// How often a client is asked for a sign of life, and given one.
+pub(crate) const PING_EVERY: Duration = Duration::from_secs(4);
+/// A session that says nothing for so long is silent. With the time between pings it is less than the 6 s of the page.
+pub(crate) const QUIET: Duration = Duration::from_secs(1);
+/// A client that says nothing for so long is gone: three pings were not answered.
 pub(crate) const SILENCE: Duration = Duration::from_secs(14);
 /// How long a client may take to say good-bye.
 pub(crate) const CLOSE_WAIT: Duration = Duration::from_millis(500);

@@ -18,7 +18,7 @@ use axum::{
         DefaultBodyLimit, State, WebSocketUpgrade, rejection::BytesRejection,
         ws::rejection::WebSocketUpgradeRejection,
     },
-    http::{HeaderMap, StatusCode, header},
+    http::{HeaderMap, StatusCode, Uri, header},
     middleware::from_fn_with_state,
     response::{Html, IntoResponse, Response},
     routing::{get, post},
@@ -35,7 +35,7 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
         .route("/ws", get(socket))
         .route(
             "/api",
-            get(|| async { Html(api_page::html(&openapi::document())) }),
+            get(|uri: Uri| async move { Html(api_page::html(&openapi::document(), uri.query())) }),
         )
         .route(
             "/api/openapi.json",
@@ -198,7 +198,17 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),
     };
-    let made = spawn_blocking(move || hub.host.file(file)).await;
+    let Ok(permit) = Arc::clone(&hub.files).try_acquire_owned() else {
+        let why = "other files are being made; ask again when they are there\n";
+        return (StatusCode::SERVICE_UNAVAILABLE, why).into_response();
+    };
+    let host = Arc::clone(&hub.host);
+    let made = spawn_blocking(move || {
+        // Kept though who asked may be gone: the file is made all the same.
+        let _permit = permit;
+        host.file(file)
+    })
+    .await;
     match made {
         Ok(Ok(Some(bytes))) => {
             let disposition = format!("attachment; filename=\"{name}\"");

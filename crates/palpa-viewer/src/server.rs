@@ -3,13 +3,13 @@
 use crate::{
     board::{Board, Publisher},
     client::is_closing,
+    connections::Connections,
     guard::Guard,
     host::Host,
     hub::Hub,
     limits::{CLOSE_WAIT, MAX_CLIENTS, SEND_BUFFER},
     routes,
 };
-use axum::serve::ListenerExt;
 use std::{
     fmt::{self, Write as _},
     io::{self, ErrorKind},
@@ -114,15 +114,17 @@ impl Server {
             .build()
             .map_err(at_thread)?;
         let address = SocketAddr::new(params.bind, params.port);
-        let (listener, address) = {
+        let listening = {
             let _within = runtime.enter();
-            listen(address).map_err(|source| match source.kind() {
-                ErrorKind::AddrInUse => ServerError::PortInUse {
-                    bind: params.bind,
-                    port: params.port,
-                },
-                _ => ServerError::Listen { address, source },
-            })?
+            listen(address)
+        };
+        let (listener, address) = match listening {
+            Ok(listening) => listening,
+            Err(source) => {
+                // Dropped, it would wait, which one who calls from another runtime must not.
+                runtime.shutdown_background();
+                return Err(params.refusal(source));
+            }
         };
         let board = Arc::new(Board::new());
         let (closing, is_closing) = watch::channel(false);
@@ -205,6 +207,17 @@ impl ServerParams {
             }),
         }
     }
+
+    fn refusal(&self, source: io::Error) -> ServerError {
+        let &Self { bind, port, .. } = self;
+        match source.kind() {
+            ErrorKind::AddrInUse => ServerError::PortInUse { bind, port },
+            _ => ServerError::Listen {
+                address: SocketAddr::new(bind, port),
+                source,
+            },
+        }
+    }
 }
 
 /// The token is nobody's business.
@@ -243,10 +256,7 @@ fn run(runtime: Runtime, listener: TcpListener, hub: &Arc<Hub>) {
 }
 
 async fn serve(listener: TcpListener, hub: &Arc<Hub>) {
-    let listener = listener.tap_io(|connection| {
-        // Small messages go at once; where this is refused they come a little later.
-        let _ = connection.set_nodelay(true);
-    });
+    let listener = Connections::new(listener);
     let closing = hub.closing.clone();
     let serving = axum::serve(listener, routes::router(hub))
         .with_graceful_shutdown(is_closing(closing.clone()));
