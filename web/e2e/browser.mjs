@@ -1,0 +1,92 @@
+// The browser that the tests drive: one that is installed, Debian's Chromium for one; none is downloaded.
+//
+// `node e2e/browser.mjs` says which it is; with `--install` it asks Debian for one when there is none.
+
+import { execFileSync, spawnSync } from 'node:child_process';
+import { accessSync, constants } from 'node:fs';
+import { delimiter, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
+
+const HINT = `no browser was found. Install Chromium (on Debian: apt-get install chromium), or say where one is:
+  PALPA_CHROMIUM=/path/to/chromium`;
+
+/** Quiet, and drawing in software: the tests run where there is no graphics card. */
+export const ARGS = [
+  '--no-sandbox',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+];
+export const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
+
+/** @param {string} path */
+function canRun(path) {
+  try {
+    accessSync(path, constants.X_OK);
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+/** @param {string} name */
+function inPath(name) {
+  const folders = (process.env.PATH ?? '').split(delimiter);
+  return folders.map((folder) => join(folder, name)).find(canRun);
+}
+
+/** Path of a browser, or none. */
+export function findBrowser() {
+  const told = process.env.PALPA_CHROMIUM;
+  if (told !== undefined && told !== '') {
+    if (!canRun(told)) throw new Error(`PALPA_CHROMIUM=${told} cannot be run`);
+    return told;
+  }
+  return NAMES.map(inPath).find((path) => path !== undefined);
+}
+
+/**
+ * @param {string[]} graphics
+ * @returns {Promise<import('playwright-core').Browser>}
+ */
+export function launch(graphics = SOFTWARE_GL) {
+  const executablePath = findBrowser();
+  if (executablePath === undefined) throw new Error(HINT);
+  return chromium.launch({ executablePath, args: [...ARGS, ...graphics] });
+}
+
+function install() {
+  const apt = inPath('apt-get');
+  if (apt === undefined) throw new Error(HINT);
+  const isRoot = process.getuid?.() === 0;
+  if (!isRoot && spawnSync('sudo', ['-n', 'true']).status !== 0) throw new Error(HINT);
+  const asRoot = (/** @type {string[]} */ ...args) => {
+    const [program, ...rest] = isRoot ? [apt, ...args] : ['sudo', '-n', apt, ...args];
+    execFileSync(program, rest, { stdio: 'inherit', env: { ...process.env, DEBIAN_FRONTEND: 'noninteractive' } });
+  };
+  try {
+    asRoot('install', '--yes', '--no-install-recommends', 'chromium');
+  } catch {
+    // Lists of packages may be old, or not there at all.
+    asRoot('update');
+    asRoot('install', '--yes', '--no-install-recommends', 'chromium');
+  }
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  try {
+    if (findBrowser() === undefined && process.argv.includes('--install')) install();
+    const found = findBrowser();
+    if (found === undefined) throw new Error(HINT);
+    console.log(found);
+  } catch (error) {
+    console.error(error instanceof Error ? error.message : error);
+    process.exitCode = 1;
+  }
+}

@@ -1,0 +1,3 @@
+// All tests in one process, so that they share viewer and browser. Each file also runs alone.
+
+import './touch.test.mjs';
