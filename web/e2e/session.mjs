@@ -22,10 +22,14 @@ export function sharedBrowser() {
   return browser;
 }
 
-/** The page that controls the shared viewer, with a body at rest. */
+/** The page that controls the shared viewer; nothing is held. */
 export async function sharedPage() {
   page ??= open();
   const palpa = await page;
+  // A test before that failed may hold something.
+  await palpa.page.mouse.up();
+  await palpa.page.keyboard.up('Shift');
+  await palpa.page.keyboard.press('Escape');
   await palpa.running();
   return palpa;
 }

@@ -93,7 +93,7 @@ export class Viewer {
     return (await this.get('api/engine')).json();
   }
 
-  /** A request of a program, as a page's own would be. @param {object} request */
+  /** A request of a program, as a page's own would be; or any text. @param {object | string} request */
   async control(request) {
     const response = await fetch(new URL('api/control', this.url), {
       method: 'POST',

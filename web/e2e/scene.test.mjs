@@ -1,0 +1,113 @@
+// What the body is made of, and what presses it, changed while it lies there.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { sharedPage } from './session.mjs';
+import { until } from './viewer.mjs';
+
+/** The force of the same press by keys. @param {import('./page.mjs').PalpaPage} palpa */
+async function forceOfPress(palpa) {
+  await palpa.atRest();
+  await palpa.focus();
+  await palpa.page.keyboard.press('Space');
+  const { newtons, metres } = await palpa.steady();
+  await palpa.page.keyboard.press('Escape');
+  await palpa.atRest();
+  return { newtons, metres };
+}
+
+test('a harder tissue gives more force at the same press', async (t) => {
+  const palpa = await sharedPage();
+  await palpa.choose('forearm');
+  const before = await forceOfPress(palpa);
+  await palpa.tab('tissues');
+  await palpa.type('layer-2-young', '88 kPa', ({ layers }) => Math.abs(layers[2].stiffness - 88e3) < 1e3);
+  const after = await forceOfPress(palpa);
+  t.diagnostic(`muscle of 22 kPa: ${before.newtons.toFixed(3)} N, of 88 kPa: ${after.newtons.toFixed(3)} N`);
+  assert.ok(after.newtons > 1.2 * before.newtons, `${before.newtons} N, then ${after.newtons} N`);
+  await palpa.by('layer-2-reset').click();
+  await palpa.viewer.running('the tissue is as before', ({ layers }) => Math.abs(layers[2].stiffness - 22e3) < 1e3);
+});
+
+test('a value that cannot be is refused in words at its field', async () => {
+  const palpa = await sharedPage();
+  await palpa.tab('tissues');
+  await palpa.by('layer-0-young').fill('-3 kPa');
+  await palpa.by('layer-0-young').press('Enter');
+  const alert = palpa.page.locator('#panel .field-error');
+  await alert.waitFor();
+  assert.ok((await alert.innerText()).length > 10);
+  assert.equal(await palpa.by('layer-0-young').getAttribute('aria-invalid'), 'true');
+  await palpa.by('layer-0-young').press('Escape');
+});
+
+test('a lump is added, seen in the section, and taken away', async () => {
+  const palpa = await sharedPage();
+  const { lumps } = await palpa.choose('forearm');
+  assert.equal(lumps.length, 0);
+  await palpa.tab('lumps');
+  await palpa.by('lump-add').click();
+  const with_lump = await palpa.viewer.running('a lump is there', (state) => state.lumps.length === 1);
+  await palpa.by('lump-0').waitFor();
+  await palpa.running();
+
+  await palpa.tab('view');
+  await palpa.by('cutaway-toggle').check();
+  await palpa.by('cutaway-axis-x').check({ force: true });
+  // To where the lump lies, by keys.
+  const slider = palpa.by('cutaway-position');
+  await slider.focus();
+  await palpa.page.keyboard.press('Home');
+  for (let k = 0; k < 20; k++) {
+    if ((await palpa.sectionArea()).lumps > 2e-5) break;
+    await palpa.page.keyboard.press('PageUp');
+    await until('the section follows', async () => (await palpa.sectionArea()).total > 0);
+    await palpa.page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  }
+  const { lumps: area } = await palpa.sectionArea();
+  const { shape } = with_lump.lumps[0];
+  assert.ok(shape.kind === 'ellipsoid', 'a ball');
+  const largest = Math.PI * shape.radii[0] ** 2;
+  assert.ok(area > 2e-5 && area < 1.02 * largest, `the section shows ${area} m² of a lump whose largest slice is ${largest} m²`);
+  await palpa.by('cutaway-toggle').uncheck();
+
+  await palpa.tab('lumps');
+  await palpa.type('lump-0-radius', '8 mm', (state) => state.lumps[0].shape.kind === 'ellipsoid' && state.lumps[0].shape.radii[0] === 0.008);
+  await palpa.by('lump-0-remove').click();
+  await palpa.viewer.running('the lump is gone', (state) => state.lumps.length === 0);
+});
+
+test('tool and friction change', async () => {
+  const palpa = await sharedPage();
+  await palpa.tab('tool');
+  await palpa.by('tool-shape').selectOption('flat-punch');
+  await palpa.viewer.running('the tool is a punch', ({ tool }) => tool.shape.kind === 'flat_punch');
+  await palpa.type('tool-friction', '0.8', ({ tool }) => tool.friction === 0.8);
+  const { newtons } = await forceOfPress(palpa);
+  assert.ok(newtons > 0.1, `${newtons} N`);
+  await palpa.by('tool-shape').selectOption('sphere');
+  await palpa.viewer.running('the tool is a ball', ({ tool }) => tool.shape.kind === 'sphere');
+});
+
+test('the motion of the scene runs by itself', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.tab('motion');
+  await palpa.by('motion-run').click();
+  await palpa.reads('a force of the motion', ({ newtons }) => newtons > 0.1);
+  await palpa.by('motion-stop').or(palpa.by('motion-run')).waitFor();
+  await palpa.viewer.running('the motion is over', (state) => !state.is_motion_running);
+  await palpa.atRest();
+});
+
+for (const key of ['forearm_lump', 'limb', 'block', 'patch_bars', 'patch_tissue', 'forearm']) {
+  test(`the scene ${key} of the gallery can be pressed`, async () => {
+    const palpa = await sharedPage();
+    await palpa.choose(key);
+    await palpa.focus();
+    await palpa.page.keyboard.press('Space');
+    await palpa.reads('a force', ({ newtons }) => newtons > 0);
+    await palpa.page.keyboard.press('Escape');
+    await palpa.reads('no force', ({ newtons }) => newtons < 1e-9);
+  });
+}
