@@ -4,7 +4,9 @@
 const SLOW = 38;
 const FAST = 14;
 const STILL_MS = 260;
-const STILL_RATIO = 2;
+/** Pixel ratios for pictures that stand still in software WebGL, which has no multisampling; the next when one took too long. */
+const STILL_RATIOS = [2, 1.5, 1];
+const STILL_TOO_LONG = 350;
 
 /** From the most to the least: share of the pixel ratio, shadows. */
 const STEPS = [
@@ -26,11 +28,13 @@ export function isSoftwareWebGL(): boolean | null {
 
 export class Quality {
   private step = 0;
+  private stillStep = 0;
   private slow = 0;
   private fast = 0;
   private fence: WebGLSync | null = null;
   private fencedAt = 0;
-  private lastDrawn = 0;
+  /** When a picture was drawn last that others may follow; the first is drawn fast. */
+  private lastDrawn = performance.now();
   private isFull = false;
   private timer = 0;
 
@@ -47,6 +51,7 @@ export class Quality {
     gl.deleteSync(this.fence);
     this.fence = null;
     if (!this.isFull) this.judge(took);
+    else if (this.isSoftware && took > STILL_TOO_LONG) this.stillStep = Math.min(this.stillStep + 1, STILL_RATIOS.length - 1);
     return true;
   }
 
@@ -70,11 +75,10 @@ export class Quality {
 
   /** What to draw now: less while pictures follow each other. */
   begin(now: number): { ratio: number; shadows: boolean } {
-    const isMoving = now - this.lastDrawn < STILL_MS && this.lastDrawn > 0;
+    const isMoving = now - this.lastDrawn < STILL_MS;
     this.isFull = !isMoving || (this.step === 0 && !this.isSoftware);
-    // Software WebGL has no multisampling (it costs threefold): a picture that stands still is drawn larger instead.
     const usual = Math.min(window.devicePixelRatio || 1, 2);
-    const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIO) : usual;
+    const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIOS[this.stillStep]) : usual;
     const step = STEPS[this.isFull ? 0 : this.step];
     return { ratio: most * step.ratio, shadows: step.shadows };
   }
@@ -84,13 +88,13 @@ export class Quality {
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
     this.fencedAt = now;
-    this.lastDrawn = isRefinement ? 0 : now;
+    this.lastDrawn = isRefinement ? -Infinity : now;
     window.clearTimeout(this.timer);
     if (!this.isFull) this.timer = window.setTimeout(() => this.refine(), STILL_MS);
   }
 
   private refine(): void {
-    this.lastDrawn = 0;
+    this.lastDrawn = -Infinity;
     this.redraw();
   }
 
