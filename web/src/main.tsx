@@ -1,0 +1,27 @@
+import { render } from 'preact';
+import './style/tokens.css';
+import './style/layout.css';
+import './style/controls.css';
+import './style/panels.css';
+import './style/stage.css';
+import { effect } from '@preact/signals';
+import { connect, isController, send, state } from './store';
+import { App } from './ui/App';
+import { beginFeedback } from './ui/feedback';
+import { neededField, theme } from './ui/settings';
+import { computed } from '@preact/signals';
+
+effect(() => {
+  document.documentElement.dataset.theme = theme.value;
+});
+
+render(<App />, document.getElementById('app')!);
+beginFeedback();
+connect();
+
+// Fields that only the engine can compute are asked for while they are shown, and no longer.
+const shownField = computed(() => state.value?.field);
+effect(() => {
+  const field = neededField.value;
+  if (isController.value && shownField.value !== field) send({ type: 'show_field', field });
+});

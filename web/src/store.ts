@@ -1,0 +1,183 @@
+// What the page knows: signals that panels read, and the way of everything that is asked.
+
+import { batch, computed, effect, signal } from '@preact/signals';
+import type { EngineFigures, Hello, Message, NoticeLevel, State } from './generated/api';
+import { SNAPSHOT_VERSION, type FrameSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
+import { Connection, type ConnectionStatus, type Request } from './connection';
+import type { SceneTable } from './ui/scene_table';
+import { History } from './ui/history';
+
+export type Vec3 = [number, number, number];
+
+export const status = signal<ConnectionStatus>('connecting');
+/** Whether it has ever been open: before, "connecting" is no loss. */
+export const wasOpen = signal(false);
+export const hello = signal<Hello | null>(null);
+export const state = signal<State | null>(null);
+export const figures = signal<EngineFigures | null>(null);
+
+export const scene = computed<SceneTable | null>(() => (state.value?.scene as SceneTable | undefined) ?? null);
+export const isController = computed(
+  () => status.value === 'open' && hello.value !== null && state.value?.controller === hello.value.client,
+);
+export const isWatching = computed(
+  () => status.value === 'open' && state.value !== null && !isController.value,
+);
+export const isVersionOther = computed(
+  () => hello.value !== null && hello.value.snapshot_version !== SNAPSHOT_VERSION,
+);
+/** A game is on and its truth is not shown: whatever could show a lump must not. */
+export const isHiding = computed(() => state.value?.game != null && state.value.game.result == null);
+export const isReplaying = computed(() => state.value?.recording.is_replaying ?? false);
+
+/** A list of things that happened, newest first. */
+export interface NoticeItem {
+  key: number;
+  level: NoticeLevel;
+  text: string;
+  at: Date;
+  /** How often it came one after the other. */
+  count: number;
+}
+const MOST_NOTICES = 100;
+export const notices = signal<NoticeItem[]>([]);
+/** Those that are shown as toasts, by key. */
+export const toasts = signal<number[]>([]);
+const TOAST_TIME: Record<NoticeLevel, number> = { info: 5000, warning: 8000, error: 14_000 };
+let nextKey = 1;
+
+export function notify(level: NoticeLevel, text: string): void {
+  const newest = notices.value[0];
+  const repeats = newest !== undefined && newest.text === text && newest.level === level;
+  const item: NoticeItem = repeats
+    ? { ...newest, count: newest.count + 1, at: new Date() }
+    : { key: nextKey++, level, text, at: new Date(), count: 1 };
+  const rest = repeats ? notices.value.slice(1) : notices.value;
+  batch(() => {
+    notices.value = [item, ...rest].slice(0, MOST_NOTICES);
+    if (!toasts.value.includes(item.key)) toasts.value = [...toasts.value, item.key].slice(-4);
+  });
+  window.setTimeout(() => dismissToast(item.key), TOAST_TIME[level]);
+}
+
+export function dismissToast(key: number): void {
+  if (toasts.value.includes(key)) toasts.value = toasts.value.filter((other) => other !== key);
+}
+
+// Snapshots come up to 60 times a second: they go to those who draw, past the signals.
+
+export const history = new History();
+export let latestMesh: MeshSnapshot | null = null;
+export let latestFrame: FrameSnapshot | null = null;
+const meshListeners = new Set<(mesh: MeshSnapshot) => void>();
+const frameListeners = new Set<(frame: FrameSnapshot) => void>();
+
+export function onMesh(listener: (mesh: MeshSnapshot) => void): () => void {
+  meshListeners.add(listener);
+  if (latestMesh !== null) listener(latestMesh);
+  return () => meshListeners.delete(listener);
+}
+
+export function onFrame(listener: (frame: FrameSnapshot) => void): () => void {
+  frameListeners.add(listener);
+  if (latestFrame !== null) listener(latestFrame);
+  return () => frameListeners.delete(listener);
+}
+
+function takeSnapshot(snapshot: Snapshot): void {
+  if (snapshot.kind === 1) {
+    latestMesh = snapshot;
+    for (const listener of meshListeners) listener(snapshot);
+  } else {
+    latestFrame = snapshot;
+    history.push(snapshot);
+    for (const listener of frameListeners) listener(snapshot);
+  }
+}
+
+// The scene as it was chosen, to go back to.
+
+export const original = signal<SceneTable | null>(null);
+let originalKey: string | null | undefined;
+let originalRevision: string | null = null;
+
+/** The next scene that comes is one that was chosen, not one that was changed. */
+function awaitScene(): void {
+  originalRevision = JSON.stringify(state.value?.scene ?? null);
+}
+
+function keepOriginal(next: State): void {
+  const key = next.gallery_key ?? null;
+  const isChosen = originalRevision !== null && JSON.stringify(next.scene) !== originalRevision;
+  if (original.value !== null && !isChosen && (key === null || key === originalKey)) return;
+  original.value = next.scene as SceneTable;
+  originalKey = key;
+  originalRevision = null;
+}
+
+function takeMessage(message: Message): void {
+  switch (message.type) {
+    case 'hello':
+      hello.value = message;
+      break;
+    case 'state':
+      batch(() => {
+        keepOriginal(message);
+        state.value = message;
+      });
+      break;
+    case 'engine':
+      figures.value = message;
+      break;
+    case 'notice':
+      notify(message.level, message.text);
+      break;
+    case 'reply':
+      if (message.error != null) notify('warning', message.error);
+  }
+}
+
+let connection: Connection | null = null;
+
+export function connect(): void {
+  connection = new Connection({
+    onStatus: (next) => {
+      batch(() => {
+        status.value = next;
+        if (next === 'open') wasOpen.value = true;
+      });
+    },
+    onMessage: takeMessage,
+    onSnapshot: takeSnapshot,
+  });
+}
+
+/** Asks; resolves to why it was refused, or null. Nothing is shown: for fields, which show it themselves. */
+export function ask(request: Request): Promise<string | null> {
+  if (request.type === 'load_text') awaitScene();
+  return connection?.request(request) ?? Promise.resolve('not connected');
+}
+
+/** Asks, and says in words when it is refused. */
+export async function askAloud(request: Request): Promise<boolean> {
+  const error = await ask(request);
+  if (error !== null) notify('warning', error);
+  return error === null;
+}
+
+/** Asks without waiting, as for every move of the hand. */
+export function send(request: Request): void {
+  connection?.send(request);
+}
+
+/** Changes keys of the scene. */
+export function edit(...edits: [path: string, value: unknown][]): Promise<string | null> {
+  return ask({ type: 'edit', edits: edits.map(([path, value]) => ({ path, value })) });
+}
+
+const galleryKey = computed(() => state.value?.gallery_key);
+effect(() => {
+  // What was pressed before says nothing of another scene.
+  void galleryKey.value;
+  history.clear();
+});

@@ -1,0 +1,19 @@
+// What stands over everything: a lost connection.
+
+import { t } from '../i18n';
+import { status, wasOpen } from '../store';
+
+export function Banner() {
+  const isLost = wasOpen.value && status.value !== 'open';
+  const isUnreachable = !wasOpen.value && status.value === 'lost';
+  return (
+    <div class="banner-place" role="alert">
+      {(isLost || isUnreachable) && (
+        <div class="banner" data-testid="connection-lost">
+          <span class="spinner" aria-hidden="true" />
+          {t(isLost ? 'connection.lost_banner' : 'connection.none_banner')}
+        </div>
+      )}
+    </div>
+  );
+}

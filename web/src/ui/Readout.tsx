@@ -1,0 +1,109 @@
+// The force that a hand would feel: as number, as bar, as curves.
+
+import { signal } from '@preact/signals';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { t } from '../i18n';
+import { isReplaying, latestFrame, onFrame, state } from '../store';
+import type { FrameSnapshot } from '../generated/wire';
+import { axes } from './axes';
+import { Button } from './controls';
+import { Curves } from './Curves';
+import { magnitude } from './history';
+import { Icon } from './icons';
+import { formatNumber, inMillimetres, withPrefix } from './quantity';
+import { PressDepth } from './panels/DevicePanel';
+
+/** Share of the force that is let through, %. */
+const gain = signal(100);
+
+/** Numbers that change faster than this cannot be read, ms. */
+const PERIOD = 80;
+
+export function Readout() {
+  return (
+    <aside class="readout" aria-label={t('readout.title')}>
+      <div class="numbers">
+        <ForceNumber />
+        <PressDepth testid="press-depth" />
+      </div>
+      <Curves />
+    </aside>
+  );
+}
+
+/** Of small networks the force is told in mN: 2009 reckoned in dyn. */
+export function written(force: number): string {
+  return force > 0 && force < 0.005 && state.peek()?.method === 'reference' ? withPrefix(force, 'N', 2) : `${force.toFixed(2)} N`;
+}
+
+function ForceNumber() {
+  const number = useRef<HTMLOutputElement>(null);
+  const depth = useRef<HTMLSpanElement>(null);
+  const gauge = useRef<HTMLDivElement>(null);
+  const bar = useRef<HTMLDivElement>(null);
+  const scale = useRef<HTMLSpanElement>(null);
+  const [spoken, setSpoken] = useState('');
+
+  // Past the page's signals: text is set where it stands, all of it of the same frame.
+  useEffect(() => {
+    let newest: FrameSnapshot | null = null;
+    let timer = 0;
+    const set = (): void => {
+      timer = 0;
+      if (newest === null) return;
+      const force = magnitude(newest.force);
+      const element = number.current!;
+      element.textContent = written(force);
+      element.dataset.newtons = String(force);
+      element.dataset.tick = String(newest.tick);
+      depth.current!.textContent = inMillimetres(newest.depth);
+      depth.current!.dataset.metres = String(newest.depth);
+      gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
+      gauge.current!.setAttribute('aria-valuemax', String(axes.force));
+      scale.current!.textContent = `${formatNumber(axes.force)} N`;
+      gain.value = Math.round(newest.gain * 100);
+      newest = null;
+    };
+    const stop = onFrame((frame) => {
+      newest = frame;
+      const force = magnitude(frame.force);
+      axes.take(force, frame.depth);
+      bar.current!.style.transform = `scaleX(${Math.min(1, force / axes.force)})`;
+      if (timer === 0) timer = window.setTimeout(set, PERIOD);
+    });
+    return () => {
+      stop();
+      window.clearTimeout(timer);
+    };
+  }, []);
+
+  const speak = (): void => {
+    if (latestFrame === null) return;
+    const words = t('readout.spoken', {
+      force: written(magnitude(latestFrame.force)),
+      depth: inMillimetres(latestFrame.depth),
+    });
+    // The same words again must be spoken, too.
+    setSpoken(words === spoken ? `${words}\u00a0` : words);
+  };
+
+  return (
+    <section class="force" aria-labelledby="force-title">
+      <div class="section-head">
+        <h2 id="force-title">{t(isReplaying.value ? 'readout.force_replayed' : 'readout.force')}</h2>
+        <Button kind="quiet" label={t('readout.speak')} onClick={speak}><Icon name="speak" /></Button>
+      </div>
+      <output ref={number} class="force-number" aria-live="off" data-testid="force-number" data-newtons="0" data-tick="0">0.00 N</output>
+      <div ref={gauge} class="gauge" role="meter" aria-label={t('readout.force')} aria-valuemin={0} aria-valuemax={1} aria-valuenow={0}>
+        <div ref={bar} class="gauge-bar" />
+      </div>
+      <div class="gauge-scale" aria-hidden="true"><span>0</span><span ref={scale} /></div>
+      <p class="depth-line">
+        <span>{t('readout.depth')}</span>
+        <span ref={depth} class="depth-number" data-testid="depth-number">–</span>
+      </p>
+      {gain.value < 100 && <p class="held-back" role="status">{t('readout.held_back')}</p>}
+      <p class="sr-only" role="status" aria-live="polite">{spoken}</p>
+    </section>
+  );
+}

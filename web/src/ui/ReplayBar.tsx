@@ -1,0 +1,74 @@
+// A recording is shown: its time, to slide along, and to play.
+
+import { signal } from '@preact/signals';
+import { useEffect, useId, useRef } from 'preact/hooks';
+import { t } from '../i18n';
+import { askAloud, isController, onFrame, send, state } from '../store';
+import { Button } from './controls';
+import { Icon } from './icons';
+
+/** The moment that is shown, s. */
+const time = signal(0);
+const SEEK_PERIOD = 50;
+
+export function ReplayBar() {
+  const recording = state.value?.recording;
+  const id = useId();
+  const isDragging = useRef(false);
+  const wanted = useRef<number | null>(null);
+
+  useEffect(() => {
+    let shownAt = 0;
+    return onFrame((frame) => {
+      const now = performance.now();
+      if (frame.is_replay === 0 || isDragging.current || now - shownAt < 80) return;
+      shownAt = now;
+      time.value = frame.time;
+    });
+  }, []);
+
+  if (recording === undefined || !recording.is_replaying) return null;
+  const seek = (to: number): void => {
+    time.value = to;
+    // The newest wish counts: others between are not sent.
+    if (wanted.current === null) {
+      window.setTimeout(() => {
+        send({ type: 'seek', time: wanted.current ?? to });
+        wanted.current = null;
+      }, SEEK_PERIOD);
+    }
+    wanted.current = to;
+  };
+  const shown = Math.min(time.value, recording.duration);
+  const cannot = !isController.value;
+  return (
+    <section class="replay-bar" aria-label={t('record.replay')} data-testid="replay-bar">
+      <Button
+        label={t(recording.is_playing ? 'replay.pause' : 'replay.play')}
+        disabled={cannot}
+        onClick={() => void askAloud({ type: 'play', on: !recording.is_playing })}
+        testid="replay-play"
+      >
+        <Icon name={recording.is_playing ? 'pause' : 'play'} />
+      </Button>
+      <label class="sr-only" for={id}>{t('replay.time')}</label>
+      <input
+        id={id}
+        type="range"
+        min={0}
+        max={recording.duration}
+        step={0.001}
+        value={shown}
+        disabled={cannot}
+        aria-valuetext={`${shown.toFixed(1)} s`}
+        onPointerDown={() => (isDragging.current = true)}
+        onInput={(event) => seek(event.currentTarget.valueAsNumber)}
+        onChange={() => (isDragging.current = false)}
+        onPointerUp={() => (isDragging.current = false)}
+        data-testid="replay-slider"
+      />
+      <output for={id}>{shown.toFixed(1)} / {recording.duration.toFixed(1)} s</output>
+      <Button disabled={cannot} onClick={() => void askAloud({ type: 'close_replay' })} testid="replay-close">{t('replay.close')}</Button>
+    </section>
+  );
+}

@@ -1,0 +1,195 @@
+// The body, and what lies over it: legend, building, problems, replay and game.
+
+import { effect } from '@preact/signals';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { t } from '../i18n';
+import { HandControl } from '../hand';
+import { BodyView, NoWebGL2, type Vec3 } from '../scene';
+import {
+  ask, askAloud, edit, isController, isReplaying, isWatching, notify, onFrame, onMesh, scene, send, state,
+} from '../store';
+import { bodyView, legend, section } from './body';
+import { Button, Segmented } from './controls';
+import { GameBar } from './GameBar';
+import { Icon } from './icons';
+import { LegendBox } from './LegendBox';
+import { ReplayBar } from './ReplayBar';
+import { saveImage } from './save';
+import { writtenPoint } from './quantity';
+import { handMode, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
+
+export const firstBody = { ms: 0 };
+
+export function Stage() {
+  const container = useRef<HTMLDivElement>(null);
+  const [problem, setProblem] = useState<'none' | 'webgl' | 'other'>('none');
+  const [firstMs, setFirstMs] = useState<number | null>(null);
+
+  useEffect(() => {
+    let body: BodyView;
+    try {
+      body = new BodyView(container.current!, view.peek());
+    } catch (error) {
+      console.error(error);
+      setProblem(error instanceof NoWebGL2 ? 'webgl' : 'other');
+      return;
+    }
+    body.onLegend = (next) => (legend.value = next);
+    body.onSection = (next) => (section.value = next);
+    body.onCutaway = (position) => show({ cutaway: { ...wanted.peek().cutaway, position } });
+    body.onFirstBody = () => {
+      const mark = performance.mark('palpa-first-body');
+      firstBody.ms = mark.startTime;
+      setFirstMs(mark.startTime);
+    };
+    const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false });
+    hand.onTarget = (target) => {
+      if (target !== null && target.depth > 0) lastTouched.value = target.point;
+    };
+    hand.onMark = takePicked;
+    bodyView.value = body;
+    const ends = [
+      effect(() => body.setOptions(view.value)),
+      effect(() => {
+        if (state.value !== null) body.setState(state.value);
+      }),
+      effect(() =>
+        hand.set({
+          pressDepth: pressDepth.value,
+          mode: picking.value === null ? handMode.value : 'mark',
+          enabled: isController.value && !isReplaying.value,
+        }),
+      ),
+      onMesh((mesh) => body.setMesh(mesh)),
+      onFrame((frame) => body.setFrame(frame)),
+    ];
+    return () => {
+      for (const end of ends) end();
+      hand.dispose();
+      body.dispose();
+      bodyView.value = null;
+    };
+  }, []);
+
+  return (
+    <main class={`stage ${picking.value === null ? '' : 'picking'}`} aria-label={t('app.body')}>
+      <div class="canvas-place" ref={container} />
+      <span hidden data-testid="first-body-ms" data-ms={firstMs ?? ''}>{firstMs?.toFixed(0)}</span>
+      {problem === 'none' ? <StageTools /> : <NoBody isWebGL={problem === 'webgl'} />}
+      <div class="stage-top">
+        <GameBar />
+        <PickingHint />
+        {isWatching.value && <p class="chip">{t('control.watching_chip')}</p>}
+      </div>
+      <div class="stage-bottom">
+        {problem === 'none' && <LegendBox />}
+        <ReplayBar />
+      </div>
+      <Phase />
+    </main>
+  );
+}
+
+/** What a picked place is for. */
+function takePicked(point: Vec3): void {
+  const purpose = picking.peek();
+  if (purpose === null) return;
+  if (purpose.kind === 'mark') {
+    void markLump(point);
+    return;
+  }
+  picking.value = null;
+  const refusal = purpose.kind === 'place' ? edit(['/press/vertex', null], ['/press/at', writtenPoint(point)]) : moveLump(purpose.index, point);
+  void refusal.then((error) => error !== null && notify('warning', error));
+}
+
+async function markLump(point: Vec3): Promise<void> {
+  const error = await ask({ type: 'mark', point });
+  if (error !== null) notify('warning', error);
+  const game = state.peek()?.game;
+  if (game != null && game.marks.length >= game.n_lumps) picking.value = null;
+}
+
+/** Under another place, as deep as it was. */
+function moveLump(index: number, point: Vec3): Promise<string | null> {
+  const lump = scene.peek()?.lump?.[index];
+  const path = `/lump/${index}`;
+  const changed = { ...lump, below: writtenPoint(point), depth: lump?.depth ?? '10 mm' };
+  delete changed.at;
+  delete changed.below_vertex;
+  return edit([path, changed]);
+}
+
+function PickingHint() {
+  const purpose = picking.value;
+  if (purpose === null) return null;
+  return (
+    <p class="chip accent" role="status">
+      {t(purpose.kind === 'mark' ? 'game.mark_hint' : purpose.kind === 'lump' ? 'lumps.pick_hint' : 'motion.pick_hint')}
+      <Button kind="quiet" label={t('app.cancel')} onClick={() => (picking.value = null)}><Icon name="close" /></Button>
+    </p>
+  );
+}
+
+function StageTools() {
+  return (
+    <div class="stage-tools">
+      <Segmented
+        label={t('device.mouse')}
+        isLabelHidden
+        value={handMode.value}
+        options={(['press', 'orbit'] as const).map((value) => ({ value, label: t(`hand.${value}`), testid: `hand-${value}` }))}
+        onChange={(mode) => (handMode.value = mode)}
+      />
+      <div class="tool-buttons" role="group" aria-label={t('view.views')}>
+        {(['home', 'top', 'front', 'side'] as const).map((side) => (
+          <Button key={side} kind="quiet" onClick={() => bodyView.value?.viewFrom(side)}>{t(`view.from_${side}`)}</Button>
+        ))}
+        <Button
+          kind="quiet"
+          label={t('view.save_png')}
+          onClick={() => saveImage().catch((error: unknown) => notify('error', String(error)))}
+        >
+          <Icon name="camera" />
+        </Button>
+      </div>
+    </div>
+  );
+}
+
+function NoBody({ isWebGL }: { isWebGL: boolean }) {
+  return (
+    <div class="no-body" role="alert" data-testid="no-webgl">
+      <h2>{t(isWebGL ? 'webgl.title' : 'webgl.other_title')}</h2>
+      <p>{t(isWebGL ? 'webgl.text' : 'webgl.other_text')}</p>
+      {isWebGL && (
+        <ul>
+          <li>{t('webgl.do_update')}</li>
+          <li>{t('webgl.do_acceleration')}</li>
+          <li>{t('webgl.do_other')}</li>
+        </ul>
+      )}
+      <Button kind="primary" onClick={() => location.reload()}>{t('version.reload')}</Button>
+    </div>
+  );
+}
+
+function Phase() {
+  const now = state.value;
+  if (now === null) return <p class="chip building" role="status">{t('phase.waiting')}</p>;
+  if (now.phase === 'building') {
+    return <p class="chip building" role="status" data-testid="building"><span class="spinner" aria-hidden="true" />{t('phase.building_long')}</p>;
+  }
+  if (now.phase !== 'stopped' && now.problem == null) return null;
+  return (
+    <div class={`problem ${now.phase}`} role="alert" data-testid="problem">
+      <strong>{t(now.phase === 'stopped' ? 'phase.stopped_long' : 'phase.not_built')}</strong>
+      {now.problem != null && <p>{now.problem}</p>}
+      {now.phase === 'stopped' && (
+        <Button kind="primary" disabled={!isController.value} onClick={() => void askAloud({ type: 'restart' })} testid="restart">
+          {t('engine.restart')}
+        </Button>
+      )}
+    </div>
+  );
+}

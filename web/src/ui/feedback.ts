@@ -1,0 +1,87 @@
+// The force as sound and vibration, for those who have no haptic device. Both are off until they are wished for.
+
+import { effect } from '@preact/signals';
+import { onFrame, state } from '../store';
+import { magnitude } from './history';
+import { hasSound, hasVibration } from './settings';
+
+const LOWEST_PITCH = 110;
+/** Two octaves and a half over the force of the scale: heard well on small loudspeakers, too. */
+const OCTAVES = 2.5;
+const LOUDEST = 0.18;
+const DEAD_BAND = 0.02;
+/** Phones vibrate in pieces: each is asked for a little before the one before ends. */
+const PIECE = 120;
+
+interface Tone {
+  context: AudioContext;
+  oscillator: OscillatorNode;
+  gain: GainNode;
+}
+
+export function canVibrate(): boolean {
+  return 'vibrate' in navigator || pads().length > 0;
+}
+
+function pads(): Gamepad[] {
+  return (navigator.getGamepads?.() ?? []).filter((pad): pad is Gamepad => pad?.vibrationActuator != null);
+}
+
+function beginTone(): Tone {
+  const context = new AudioContext();
+  const oscillator = context.createOscillator();
+  oscillator.type = 'triangle';
+  const gain = context.createGain();
+  gain.gain.value = 0;
+  oscillator.connect(gain).connect(context.destination);
+  oscillator.start();
+  // Browsers keep a page silent until it is used.
+  const wake = (): void => void context.resume();
+  window.addEventListener('pointerdown', wake, { once: true });
+  window.addEventListener('keydown', wake, { once: true });
+  return { context, oscillator, gain };
+}
+
+/** How strong the force is felt, 0 to 1: of forces, too, the small ones are told apart best. */
+function strength(force: number): number {
+  if (force < DEAD_BAND) return 0;
+  return Math.min(1, Math.sqrt(force / Math.min(state.value?.max_force ?? 8, 8)));
+}
+
+export function beginFeedback(): void {
+  let tone: Tone | null = null;
+  let lastPiece = 0;
+  let heardAt = 0;
+
+  effect(() => {
+    if (hasSound.value) {
+      tone ??= beginTone();
+      return;
+    }
+    void tone?.context.close();
+    tone = null;
+  });
+  onFrame((frame) => {
+    heardAt = performance.now();
+    const felt = strength(magnitude(frame.force));
+    if (tone !== null) {
+      const now = tone.context.currentTime;
+      tone.oscillator.frequency.setTargetAtTime(LOWEST_PITCH * 2 ** (OCTAVES * felt), now, 0.03);
+      tone.gain.gain.setTargetAtTime(LOUDEST * felt, now, 0.03);
+    }
+    if (hasVibration.value && felt > 0 && heardAt - lastPiece > PIECE * 0.8) {
+      lastPiece = heardAt;
+      for (const pad of pads()) {
+        void pad.vibrationActuator.playEffect('dual-rumble', {
+          duration: PIECE, strongMagnitude: felt * 0.6, weakMagnitude: felt,
+        });
+      }
+      // A phone's motor knows on and off only: weak forces are short pulses.
+      navigator.vibrate?.(Math.max(8, Math.round(PIECE * felt)));
+    }
+  });
+  // Without frames nobody knows the force: silence, as of a device that lost its engine.
+  window.setInterval(() => {
+    if (tone !== null && performance.now() - heardAt > 500) tone.gain.gain.setTargetAtTime(0, tone.context.currentTime, 0.05);
+  }, 250);
+}

@@ -1,0 +1,113 @@
+// What a user chose for this browser, remembered between visits, and how the body is shown now.
+
+import { computed, effect, signal, type Signal } from '@preact/signals';
+import { DEFAULT_OPTIONS, type ColourBy, type ViewOptions } from '../scene';
+import { isHiding, state, type Vec3 } from '../store';
+import type { Field } from '../generated/api';
+
+const PREFIX = 'palpa.';
+
+/** A signal whose value outlives the page. Browsers may forbid storage: then it does not. */
+function remembered<T>(name: string, initial: T, isValid: (value: unknown) => boolean): Signal<T> {
+  let value = initial;
+  try {
+    const written = localStorage.getItem(PREFIX + name);
+    if (written !== null) {
+      const read: unknown = JSON.parse(written);
+      if (isValid(read)) value = read as T;
+    }
+  } catch {
+    // The initial value it is.
+  }
+  const kept = signal(value);
+  effect(() => {
+    const written = JSON.stringify(kept.value);
+    try {
+      localStorage.setItem(PREFIX + name, written);
+    } catch {
+      // It lasts as long as the page.
+    }
+  });
+  return kept;
+}
+
+const isBoolean = (value: unknown): boolean => typeof value === 'boolean';
+const isOneOf = (...allowed: unknown[]) => (value: unknown): boolean => allowed.includes(value);
+
+export type ThemeChoice = 'auto' | 'light' | 'dark';
+export const themeChoice = remembered<ThemeChoice>('theme', 'auto', isOneOf('auto', 'light', 'dark'));
+export const hasSound = remembered('sound', false, isBoolean);
+export const hasVibration = remembered('vibration', false, isBoolean);
+
+function matching(query: string): Signal<boolean> {
+  const list = window.matchMedia(query);
+  const matches = signal(list.matches);
+  list.addEventListener('change', () => (matches.value = list.matches));
+  return matches;
+}
+
+const prefersDark = matching('(prefers-color-scheme: dark)');
+export const reducedMotion = matching('(prefers-reduced-motion: reduce)');
+/** Taller than wide, or narrow: panels lie under the body. */
+export const isPortrait = matching('(max-width: 900px), (max-aspect-ratio: 1/1)');
+
+export const theme = computed<'light' | 'dark'>(() => {
+  if (themeChoice.value !== 'auto') return themeChoice.value;
+  return prefersDark.value ? 'dark' : 'light';
+});
+
+export const TABS = [
+  'scene', 'view', 'tissues', 'lumps', 'tool', 'device', 'motion', 'record', 'game', 'engine',
+] as const;
+export type Tab = (typeof TABS)[number];
+export const tab = remembered<Tab>('tab', 'scene', isOneOf(...TABS));
+export const isPanelOpen = remembered('panel', true, isBoolean);
+
+// How the body is touched.
+
+export type HandMode = 'press' | 'orbit';
+export const handMode = signal<HandMode>('press');
+/** How deep a press goes, m; none until it is chosen: then as the scene's hand does. */
+export const chosenDepth = signal<number | null>(null);
+export const pressDepth = computed(() => {
+  const usual = state.value?.usual_depth ?? 0.004;
+  return Math.min(chosenDepth.value ?? usual, state.value?.greatest_depth ?? Infinity);
+});
+
+/** What the next click on the body is for. */
+export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };
+export const picking = signal<Picking | null>(null);
+/** Where the hand was last on the skin, m. */
+export const lastTouched = signal<Vec3 | null>(null);
+
+// How the body is shown.
+
+export const wanted = signal<ViewOptions>({ ...DEFAULT_OPTIONS });
+
+export function show(changes: Partial<ViewOptions>): void {
+  wanted.value = { ...wanted.value, ...changes };
+}
+
+/** Maps by which a hidden lump would be seen. */
+export function isTelling(colourBy: ColourBy): boolean {
+  return colourBy === 'stiffness' || colourBy === 'von_mises' || colourBy === 'pressure' || colourBy === 'stretch';
+}
+
+/** How it is shown indeed: while lumps are hidden, nothing that tells of them. */
+export const view = computed<ViewOptions>(() => {
+  const options = { ...wanted.value, theme: theme.value, reducedMotion: reducedMotion.value };
+  if (!isHiding.value) return options;
+  return {
+    ...options,
+    lumps: false,
+    wireframe: false,
+    colourBy: isTelling(options.colourBy) ? 'tissue' : options.colourBy,
+    range: isTelling(options.colourBy) ? null : options.range,
+    cutaway: { ...options.cutaway, on: false },
+  };
+});
+
+export const neededField = computed<Field>(() => {
+  const colourBy = view.value.colourBy;
+  return colourBy === 'von_mises' || colourBy === 'pressure' || colourBy === 'stretch' ? colourBy : 'none';
+});
