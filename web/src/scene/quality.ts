@@ -33,8 +33,6 @@ export class Quality {
   private fast = 0;
   private fence: WebGLSync | null = null;
   private fencedAt = 0;
-  /** When a picture was drawn last that others may follow; the first is drawn fast. */
-  private lastDrawn = performance.now();
   private isFull = false;
   private timer = 0;
 
@@ -73,10 +71,9 @@ export class Quality {
     }
   }
 
-  /** What to draw now: less while pictures follow each other. */
-  begin(now: number): { ratio: number; shadows: boolean } {
-    const isMoving = now - this.lastDrawn < STILL_MS;
-    this.isFull = !isMoving || (this.step === 0 && !this.isSoftware);
+  /** What to draw now: all of it when nothing has changed for a while, less while pictures follow each other. */
+  begin(isRefinement: boolean): { ratio: number; shadows: boolean } {
+    this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);
     const usual = Math.min(window.devicePixelRatio || 1, 2);
     const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIOS[this.stillStep]) : usual;
     const step = STEPS[this.isFull ? 0 : this.step];
@@ -84,18 +81,17 @@ export class Quality {
   }
 
   /** A picture has been handed to the GPU. */
-  end(now: number, isRefinement: boolean): void {
+  end(now: number): void {
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
     this.fencedAt = now;
-    this.lastDrawn = isRefinement ? -Infinity : now;
-    window.clearTimeout(this.timer);
-    if (!this.isFull) this.timer = window.setTimeout(() => this.refine(), STILL_MS);
+    if (!this.isFull) this.wait();
   }
 
-  private refine(): void {
-    this.lastDrawn = -Infinity;
-    this.redraw();
+  /** Something has changed: what stands still is drawn in full later. */
+  wait(): void {
+    window.clearTimeout(this.timer);
+    if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, STILL_MS);
   }
 
   forget(): void {
