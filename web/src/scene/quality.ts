@@ -3,7 +3,9 @@
 
 const SLOW = 38;
 const FAST = 14;
-const STILL_MS = 260;
+const STILL_MS = 350;
+/** The same where a full picture takes long: it would stand in the way of what comes next. */
+const STILL_MS_SLOW = 900;
 /** Pixel ratios for pictures that stand still in software WebGL, which has no multisampling; the next when one took too long. */
 const STILL_RATIOS = [2, 1.5, 1];
 const STILL_TOO_LONG = 350;
@@ -91,7 +93,7 @@ export class Quality {
   /** Something has changed: what stands still is drawn in full later. */
   wait(): void {
     window.clearTimeout(this.timer);
-    if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, STILL_MS);
+    if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, this.stillStep > 0 ? STILL_MS_SLOW : STILL_MS);
   }
 
   forget(): void {
