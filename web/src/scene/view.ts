@@ -19,7 +19,7 @@ import { Quality, isSoftwareWebGL } from './quality';
 import { CameraRig, SIDES } from './rig';
 import { SectionView } from './sectionview';
 import { Stage } from './stage';
-import { Surfaces, type LayerLook } from './surfaces';
+import { Surfaces, type LayerLook, type Materials } from './surfaces';
 import { ToolView } from './tool';
 
 /** A new mesh waits so long for its first frame: shown without it, a pressed body would jump to rest and back. */
@@ -69,6 +69,7 @@ export class BodyView {
   private readonly clip = new Plane();
   /** Given to all materials that are cut; empty when nothing is. */
   private readonly planes: Plane[] = [];
+  private readonly materials: Materials = new Map();
   private readonly planeFrame = new Lines(1.2);
   private readonly sectionView = new SectionView(this.shared);
   private readonly lumps: LumpsView;
@@ -288,6 +289,7 @@ export class BodyView {
     this.gestures.dispose();
     this.quality.dispose();
     this.surfaces?.dispose();
+    for (const material of this.materials.values()) material.dispose();
     this.sectionView.dispose();
     this.planeFrame.dispose();
     this.lumps.dispose();
@@ -322,7 +324,7 @@ export class BodyView {
     const isOther = !this.body || this.isOther(mesh);
     this.surfaces?.dispose();
     this.body = new Body(mesh);
-    this.surfaces = new Surfaces(this.body, this.shared, this.stage, this.planes);
+    this.surfaces = new Surfaces(this.body, this.shared, this.stage, this.planes, this.materials);
     this.stage.scene.add(this.surfaces.group);
     this.stage.setBody(this.body);
     this.frame = null;
