@@ -123,6 +123,7 @@ export const en = {
   'view.hidden_by_game': 'While lumps are hidden, the cutaway, wireframe and maps of stiffness and stress are off.',
   'view.colours': 'Colours',
   'view.colour_by': 'Colour by',
+  'view.field_of_controller': 'Stresses and stretch are computed for the page that controls; take control to see this map.',
   'view.legend': 'Legend',
   'view.range': 'Range',
   'view.range_auto': 'Auto',

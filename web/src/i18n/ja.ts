@@ -125,6 +125,7 @@ export const ja: Dictionary = {
   'view.hidden_by_game': 'しこりを隠している間は、断面・ワイヤーフレーム・硬さと応力の表示は使えません。',
   'view.colours': '色',
   'view.colour_by': '色分け',
+  'view.field_of_controller': '応力と伸長比は操作中のページのために計算されます。表示するには操作を引き継いでください。',
   'view.legend': '凡例',
   'view.range': '範囲',
   'view.range_auto': '自動',
