@@ -1,6 +1,6 @@
 // The body, and what lies over it: legend, building, problems, replay and game.
 
-import { effect } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { t } from '../i18n';
 import { HandControl } from '../hand';
@@ -175,17 +175,23 @@ function NoBody({ isWebGL }: { isWebGL: boolean }) {
   );
 }
 
+/** What was read of what could not be built. */
+const dismissed = signal<string | null>(null);
+
 function Phase() {
   const now = state.value;
   if (now === null) return <p class="chip building" role="status">{t('phase.waiting')}</p>;
   if (now.phase === 'building') {
     return <p class="chip building" role="status" data-testid="building"><span class="spinner" aria-hidden="true" />{t('phase.building_long')}</p>;
   }
-  if (now.phase !== 'stopped' && now.problem == null) return null;
+  if (now.phase !== 'stopped' && (now.problem == null || now.problem === dismissed.value)) return null;
   return (
     <div class={`problem ${now.phase}`} role="alert" data-testid="problem">
       <strong>{t(now.phase === 'stopped' ? 'phase.stopped_long' : 'phase.not_built')}</strong>
       {now.problem != null && <p>{now.problem}</p>}
+      {now.phase === 'running' && (
+        <Button onClick={() => (dismissed.value = now.problem ?? null)}>{t('notices.dismiss')}</Button>
+      )}
       {now.phase === 'stopped' && (
         <Button kind="primary" disabled={!isController.value} onClick={() => void askAloud({ type: 'restart' })} testid="restart">
           {t('engine.restart')}
