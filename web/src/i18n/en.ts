@@ -278,7 +278,7 @@ export const en = {
   'feedback.no_vibration': 'Works with a gamepad or on a phone.',
 
   'motion.title': 'Motion',
-  'motion.hint': 'The simulated hand moves by itself, over and over, at the place of the scene.',
+  'motion.hint': 'The simulated hand moves by itself, at the place of the scene.',
   'motion.run': 'Run',
   'motion.stop': 'Stop',
   'motion.kind': 'Kind',

@@ -280,7 +280,7 @@ export const ja: Dictionary = {
   'feedback.no_vibration': 'ゲームパッドまたはスマートフォンで使えます。',
 
   'motion.title': '動作',
-  'motion.hint': 'シーンの位置で、仮想の手が同じ動きを繰り返します。',
+  'motion.hint': 'シーンの位置で、仮想の手がひとりでに動きます。',
   'motion.run': '開始',
   'motion.stop': '停止',
   'motion.kind': '種類',
