@@ -9,6 +9,7 @@
 //! held between writes, as a real amplifier does: what is unstable at 1 kHz is unstable here.
 
 use crate::{DeviceFault, HapticDevice, Path};
+use nalgebra::UnitQuaternion;
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Pose, Vec3};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,6 +18,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const STEP: f64 = 1e-4;
 /// Steps that delays may reach back.
 const HISTORY: usize = 128;
+/// A live target jumps from one event of a mouse to the next; the hand follows as a critically damped mass with this time, s,
+/// and no faster than this, m/s.
+const FOLLOW_TIME: f64 = 0.02;
+const FOLLOW_SPEED: f64 = 1.0;
 /// Longest time that one call makes up for, s: after a longer gap of the clock the rest is left out.
 const MAX_GAP: f64 = 0.25;
 
@@ -169,35 +174,56 @@ impl Grip {
     };
 }
 
-/// Sets where a live hand wants to be, from any thread, without waiting.
+/// Sets where a live hand wants to be and how it is turned, from any thread, without waiting.
 ///
-/// The three coordinates are stored one after the other: a reader may see two old and one new, which for a hand that is
-/// drawn there by a spring is no matter.
+/// The numbers are stored one after the other: a reader may see some old and some new, which for a hand that goes there
+/// smoothly is no matter.
 #[derive(Debug, Clone)]
-pub struct LiveTarget(Arc<[AtomicU64; 3]>);
+pub struct LiveTarget(Arc<[AtomicU64; 7]>);
 
 impl LiveTarget {
-    /// At that point, m.
+    /// At that point, m, not turned.
     pub fn new(at: Vec3) -> Self {
-        Self(Arc::new(
-            [at.x, at.y, at.z].map(|x| AtomicU64::new(x.to_bits())),
-        ))
+        let target = Self(Arc::new([0.0_f64; 7].map(|x| AtomicU64::new(x.to_bits()))));
+        target.set_pose(&Pose::translation(at.x, at.y, at.z));
+        target
     }
 
-    /// Moves it; what is not finite is ignored.
+    /// Moves it, turned as it is; what is not finite is ignored.
     pub fn set(&self, at: Vec3) {
         if at.iter().all(|x| x.is_finite()) {
-            for (cell, x) in self.0.iter().zip(at.iter()) {
-                cell.store(x.to_bits(), Ordering::Relaxed);
-            }
+            self.store(0, at.as_slice());
         }
+    }
+
+    /// Moves and turns it; what is not finite is ignored.
+    pub fn set_pose(&self, pose: &Pose) {
+        let turn = pose.rotation.coords;
+        if turn.iter().all(|x| x.is_finite()) {
+            self.store(3, turn.as_slice());
+        }
+        self.set(pose.translation.vector);
     }
 
     /// Where it is, m.
     pub fn get(&self) -> Vec3 {
-        let [x, y, z] = &*self.0;
-        let read = |cell: &AtomicU64| f64::from_bits(cell.load(Ordering::Relaxed));
-        Vec3::new(read(x), read(y), read(z))
+        Vec3::from_fn(|i, _| self.load(i))
+    }
+
+    /// How it is turned.
+    pub fn turn(&self) -> UnitQuaternion<f64> {
+        let coords = nalgebra::Vector4::from_fn(|i, _| self.load(3 + i));
+        UnitQuaternion::try_new(coords.into(), 0.1).unwrap_or_default()
+    }
+
+    fn store(&self, first: usize, values: &[f64]) {
+        for (cell, x) in self.0[first..].iter().zip(values) {
+            cell.store(x.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    fn load(&self, i: usize) -> f64 {
+        f64::from_bits(self.0[i].load(Ordering::Relaxed))
     }
 }
 
@@ -219,6 +245,9 @@ pub struct SimulatedDevice {
     position: Vec3,
     velocity: Vec3,
     wanted: Vec3,
+    /// Of what a live target is followed with.
+    wanted_velocity: Vec3,
+    turned: UnitQuaternion<f64>,
     /// Newest first, one for each step.
     history: [Vec3; HISTORY],
     /// Commands that do not act yet, oldest first, and the one that acts.
@@ -245,12 +274,17 @@ impl SimulatedDevice {
         Self {
             model,
             grip,
-            target,
             time: 0.0,
             began: None,
             position: at,
             velocity: Vec3::zeros(),
             wanted: at,
+            wanted_velocity: Vec3::zeros(),
+            turned: match &target {
+                Target::Path(_) => UnitQuaternion::identity(),
+                Target::Live(target) => target.turn(),
+            },
+            target,
             history: [at; HISTORY],
             pending: [(0.0, Vec3::zeros()); 16],
             n_pending: 0,
@@ -293,13 +327,19 @@ impl SimulatedDevice {
         }
         let next = match &self.target {
             Target::Path(path) => path.at(self.time + STEP - self.began.unwrap_or(0.0)),
-            Target::Live(target) => target.get(),
+            Target::Live(target) => {
+                let pull = (target.get() - self.wanted) / FOLLOW_TIME - self.wanted_velocity * 2.0;
+                let velocity = self.wanted_velocity + pull * (STEP / FOLLOW_TIME);
+                self.wanted_velocity = velocity.cap_magnitude(FOLLOW_SPEED);
+                let share = STEP / FOLLOW_TIME;
+                self.turned = self
+                    .turned
+                    .try_slerp(&target.turn(), share, 1e-9)
+                    .unwrap_or(self.turned);
+                self.wanted + self.wanted_velocity * STEP
+            }
         };
-        // A live target jumps from one event of a mouse to the next; it pulls, but says nothing of a speed.
-        let target_velocity = match &self.target {
-            Target::Path(_) => (next - self.wanted) / STEP,
-            Target::Live(_) => Vec3::zeros(),
-        };
+        let target_velocity = (next - self.wanted) / STEP;
         let middle = (self.wanted + next) * 0.5;
         self.wanted = next;
         let mass = self.model.mass + self.grip.mass;
@@ -348,7 +388,7 @@ impl HapticDevice for SimulatedDevice {
         };
         let reading = DeviceState {
             time: now,
-            pose: Pose::translation(seen.x, seen.y, seen.z),
+            pose: Pose::from_parts(seen.into(), self.turned),
             velocity: Vec3::zeros(),
             buttons: 0,
         };

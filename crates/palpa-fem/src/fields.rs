@@ -6,7 +6,7 @@ use crate::Mat3;
 use crate::assembly::phases_at;
 use crate::element::{GroupResponse, element_fields, evaluate};
 use crate::model::Model;
-use crate::state::State;
+use crate::state::{Memory, State};
 use crate::statics::Workspace;
 
 /// The state of one prism: means over its volume.
@@ -39,6 +39,17 @@ impl PrismField {
 ///
 /// `ws` is the one that solved the state last.
 pub fn prism_fields(model: &Model, state: &State, ws: &Workspace) -> Vec<PrismField> {
+    fields_with(model, &state.displacements, &ws.memory)
+}
+
+/// The state of every prism at these displacements in the long run: without what viscous materials still remember. `[n_prisms]`
+pub fn relaxed_fields(model: &Model, displacements: &[Vec3]) -> Vec<PrismField> {
+    let mut memory = Memory::new(model);
+    memory.begin(model, &State::new(model), f64::INFINITY);
+    fields_with(model, displacements, &memory)
+}
+
+fn fields_with(model: &Model, displacements: &[Vec3], memory: &Memory) -> Vec<PrismField> {
     let n_intervals = model.body.n_levels - 1;
     let none = PrismField {
         cauchy: Mat3::zeros(),
@@ -51,8 +62,8 @@ pub fn prism_fields(model: &Model, state: &State, ws: &Workspace) -> Vec<PrismFi
     for i in 0..n_intervals {
         for (g, group) in model.structure.groups.iter().enumerate() {
             let index = i * model.n_groups() + g;
-            phases_at(model, &ws.memory, index, &mut phases);
-            let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
+            phases_at(model, memory, index, &mut phases);
+            let local = model.group_nodes(g, i).map(|n| displacements[n]);
             let geometry = &model.geometries[index];
             let wedges = element_fields(group.shape, geometry, &local, &phases, model.params.alpha);
             for (w, &(cauchy, f, volume_ratio, energy)) in wedges

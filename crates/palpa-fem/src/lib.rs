@@ -22,7 +22,7 @@ mod system;
 pub use contact::{ContactResiduals, PosedTool};
 pub use dynamics::Dynamics;
 pub use error::FemError;
-pub use fields::{PrismField, level_forces, prism_fields};
+pub use fields::{PrismField, level_forces, prism_fields, relaxed_fields};
 pub use law::{Kinematics, Law, Material, Response, VolumeMeasure};
 pub use materials::{Materials, StiffnessField};
 pub use model::{Model, ModelParams, Supports};

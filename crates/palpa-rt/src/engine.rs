@@ -419,6 +419,12 @@ impl Engine {
         &self.granted
     }
 
+    /// Threads that ended by themselves: without the tissue's there is no force any more, and the engine is to be started anew.
+    pub fn ended(&self) -> Vec<&'static str> {
+        let is_over = |running: &&Running| running.handle.is_finished();
+        (self.threads.iter().filter(is_over).map(|r| r.name)).collect()
+    }
+
     /// Stops: forces ramp down, devices are let go, what is in the rings is written, the log is closed.
     pub fn stop(mut self) -> Report {
         self.shut_down();

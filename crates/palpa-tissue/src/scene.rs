@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Device, Lump, MaterialStatus, Mesh, Model, Motion, SceneError, Status, Thickness, Tissue, Tool,
-    resolve, write,
+    resolve,
+    write::{self, Names},
 };
 
 /// The forearm that is pressed when no scene is named.
@@ -274,7 +275,12 @@ impl Scene {
     ///
     /// Parsing it again gives an equal scene.
     pub fn to_toml(&self) -> String {
-        write::to_toml(self)
+        write::to_toml(self, Names::OfCatalogue)
+    }
+
+    /// The same, with the tissues of the catalogue written out as well: every number stands in it, to be changed.
+    pub fn to_toml_in_full(&self) -> String {
+        write::to_toml(self, Names::None)
     }
 
     /// Number of prisms under each skin triangle, which is one less than the nodes in a column.

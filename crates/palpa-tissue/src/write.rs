@@ -6,6 +6,7 @@ mod tool;
 
 use std::path::{Path, PathBuf};
 
+pub(crate) use self::tissue::Names;
 use self::tissue::tissue;
 use crate::Thickness;
 use crate::file::{
@@ -17,11 +18,19 @@ use crate::model::{Dynamics, Mesh, Model};
 use crate::scene::{Body, Generator, Layer, Press, Reference, Scene, Skin, Target};
 use crate::units::{Length, Pressure, Rate, Time, Velocity};
 
-pub(crate) fn to_toml(scene: &Scene) -> String {
+pub(crate) fn to_toml(scene: &Scene, names: Names) -> String {
     let file = SceneFile {
         body: body(scene, &scene.body),
-        layer: scene.layers.iter().map(|l| layer(scene, l)).collect(),
-        lump: scene.lumps.iter().map(|l| tool::lump(scene, l)).collect(),
+        layer: scene
+            .layers
+            .iter()
+            .map(|l| layer(scene, l, names))
+            .collect(),
+        lump: scene
+            .lumps
+            .iter()
+            .map(|l| tool::lump(scene, l, names))
+            .collect(),
         tool: tool::tool(&scene.tool),
         press: press(&scene.press),
         device: motion::device(scene.device),
@@ -178,9 +187,9 @@ fn generator(made: Generator) -> GeneratorTable {
     }
 }
 
-fn layer(scene: &Scene, layer: &Layer) -> LayerTable {
+fn layer(scene: &Scene, layer: &Layer, names: Names) -> LayerTable {
     LayerTable {
-        tissue: tissue(&layer.tissue),
+        tissue: tissue(&layer.tissue, names),
         thickness: layer.thickness.as_ref().map(|thickness| match thickness {
             Thickness::Uniform(length) => ThicknessSpec::Uniform(Length::from_si(*length)),
             Thickness::Along { axis, table } => ThicknessSpec::Varying(ThicknessTable {

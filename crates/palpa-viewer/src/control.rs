@@ -103,7 +103,7 @@ pub enum Request {
 }
 
 /// Where the hand holds the tool. Its tip is to be `depth` under `point`, against `normal`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Hand {
     /// A point of the skin at rest, m.
     pub point: Vec3,
@@ -210,7 +210,7 @@ pub enum NoticeLevel {
 }
 
 /// All that pages show beside the moving body.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct State {
     /// Grows with every change.
     pub revision: u64,
@@ -345,7 +345,7 @@ pub enum LumpForm {
 }
 
 /// What presses. In its own frame its tip is the origin, and z points out of the tissue.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ToolInfo {
     /// Its shape.
     pub shape: ToolForm,
@@ -354,7 +354,7 @@ pub struct ToolInfo {
 }
 
 /// The shape of a tool, m.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum ToolForm {
     /// A ball.
@@ -389,6 +389,7 @@ pub enum ToolForm {
         radii: Vec3,
     },
     /// A point that holds a node.
+    #[default]
     Node,
 }
 

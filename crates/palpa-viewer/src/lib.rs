@@ -5,7 +5,49 @@
 //!                  ◄── requests (JSON), of the page that controls ──────┘
 //! ```
 //! A page that is slow misses snapshots; it never holds the session, and the session never waits for a page.
+//!
+//! ```
+//! use palpa_viewer::{Answer, Clients, Host, HostFile, Server, ServerParams, control::Request, wire::FrameSnapshot};
+//! use std::{net::Ipv4Addr, sync::Arc};
+//!
+//! /// A session that says yes to all, and shows nothing.
+//! struct Yes;
+//! impl Host for Yes {
+//!     fn request(&self, _: Request, answer: Answer) {
+//!         answer(Ok(()));
+//!     }
+//!     fn clients(&self, _: Clients) {}
+//!     fn file(&self, _: HostFile) -> Result<Option<Vec<u8>>, String> {
+//!         Ok(None)
+//!     }
+//!     fn problem(&self) -> Option<String> {
+//!         None
+//!     }
+//! }
+//!
+//! let params = ServerParams { bind: Ipv4Addr::LOCALHOST.into(), port: 0, token: None };
+//! let server = Server::start(&params, Arc::new(Yes))?;
+//! assert!(server.url().starts_with("http://127.0.0.1:"));
+//! server.publisher().frame(1, FrameSnapshot::default().encode());
+//! # Ok::<(), palpa_viewer::ServerError>(())
+//! ```
 
+mod api_page;
+mod board;
+mod client;
+mod connections;
 pub mod control;
+mod guard;
+mod host;
+mod hub;
+mod limits;
+mod metrics;
 pub mod openapi;
+mod page;
+mod routes;
+mod server;
 pub mod wire;
+
+pub use board::Publisher;
+pub use host::{Answer, Clients, Host, HostFile};
+pub use server::{Server, ServerError, ServerParams};

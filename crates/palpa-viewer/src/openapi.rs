@@ -35,7 +35,9 @@ pub fn document() -> Value {
     let file = |summary: &str, kind: &str, description: &str| {
         json!({ "get": { "summary": summary, "responses": {
             "200": { "description": description, "content": { kind: {} } },
-            "404": { "description": "There is none yet." } } } })
+            "404": { "description": "There is none yet." },
+            "500": { "description": "It cannot be made; the text says why." },
+            "503": { "description": "Too many files are being made." } } } })
     };
     json!({
         "openapi": "3.1.0",
@@ -44,7 +46,7 @@ pub fn document() -> Value {
             "version": env!("CARGO_PKG_VERSION"),
             "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
             "description": "What a page, or a program in its place, asks of `palpa view` and is told. Where the server was started with \
-                a token, every request carries it: `Authorization: Bearer …`, or `?token=…` for the WebSocket.",
+                a token, every request carries it (401 without): `Authorization: Bearer …`, or `?token=…` for what is only read, as downloads and the WebSocket.",
         },
         "components": {
             "schemas": generator.take_definitions(true),
@@ -54,23 +56,39 @@ pub fn document() -> Value {
         "paths": {
             "/api/control": { "post": {
                 "summary": "Asks for something",
-                "description": "As over the WebSocket, but on behalf of no page: refused while a page controls, unless the request is take_control.",
+                "description": "As over the WebSocket, but on behalf of a program: refused while a page controls, unless the request is \
+                    `take_control`; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.",
                 "requestBody": { "required": true, "content": { "application/json": { "schema": envelope } } },
-                "responses": { "200": reply.clone(), "409": reply, "400": { "description": "It cannot be understood." } },
+                "responses": {
+                    "200": reply.clone(),
+                    "400": { "description": "It cannot be understood; the reply says where." },
+                    "409": reply,
+                    "413": { "description": "It is longer than 1 MiB." },
+                    "415": { "description": "It is not called application/json." },
+                    "429": { "description": "Too many requests." },
+                    "504": { "description": "The engine gave no answer." },
+                },
             } },
-            "/api/state": { "get": { "summary": "The state", "responses": { "200": state } } },
-            "/api/engine": { "get": { "summary": "The engine's figures", "responses": { "200": engine } } },
+            "/api/state": { "get": { "summary": "The state", "responses": { "200": state, "503": { "description": "The engine starts." } } } },
+            "/api/engine": { "get": { "summary": "The engine's figures", "responses": { "200": engine, "503": { "description": "The engine starts." } } } },
             "/api/scene.toml": file("The scene, as a scene file", "application/toml", "The scene with every default written out."),
             "/api/body.vtu": file("The body as it is pressed now", "application/xml", "For ParaView and other readers of VTK files."),
             "/api/recording.mcap": file("The recording", "application/octet-stream", "What `palpa replay` reads."),
             "/api/recording.csv": file("The recording's ticks", "text/csv", "A row per tick of the 1 kHz loop."),
             "/ws": { "get": {
                 "summary": "The WebSocket",
-                "description": "Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in `crates/palpa-viewer/src/wire.rs`.",
+                "description": "Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in \
+                    `crates/palpa-viewer/src/wire.rs`. The first who connects controls, the others watch until they take control. A client that \
+                    is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), asks more than 200 times a \
+                    second (400 at once) or is not understood 20 times in a row is let go, with the reason.",
                 "parameters": [{ "name": "token", "in": "query", "schema": { "type": "string" } }],
-                "responses": { "101": { "description": "A WebSocket." } },
+                "responses": {
+                    "101": { "description": "A WebSocket." },
+                    "403": { "description": "It is asked from a page of another place." },
+                    "503": { "description": "32 are connected, which is the most." },
+                },
             } },
-            "/healthz": { "get": { "summary": "Whether it runs", "responses": { "200": { "description": "It runs." }, "503": { "description": "The engine stands." } } } },
+            "/healthz": { "get": { "summary": "Whether it runs", "responses": { "200": { "description": "It runs." }, "503": { "description": "The engine stands; the text says why." } } } },
             "/metrics": { "get": { "summary": "Figures for Prometheus", "responses": { "200": { "description": "Text format 0.0.4." } } } },
         },
     })

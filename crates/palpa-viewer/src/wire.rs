@@ -106,7 +106,7 @@ snapshot! {
     MeshSnapshot = 1 {
         /// Its number; frames say to which they belong.
         mesh: u32,
-        /// Nodes in a column. Node (v, l) of skin vertex v has the index v * n_levels + l; level 0 is the skin, the last is held by bone or base.
+        /// Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level 0 is the skin, the last is held by bone or base.
         n_levels: u32,
         /// Nodes at rest, m: x, y, z one after the other.
         positions: Vec<f32>,
@@ -114,7 +114,7 @@ snapshot! {
         triangles: Vec<u32>,
         /// The layer of each interval.
         interval_layer: Vec<u8>,
-        /// Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at t * (n_levels - 1) + i.
+        /// Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at `t * (n_levels - 1) + i`.
         stiffness: Vec<f32>,
         /// Vertices of the bones' surfaces, m; they do not move.
         bone_positions: Vec<f32>,

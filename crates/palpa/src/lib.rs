@@ -18,6 +18,7 @@ pub mod plot;
 pub mod press;
 pub mod reproduce;
 pub mod section;
+pub mod session;
 pub mod table;
 pub mod vtu;
 
@@ -29,3 +30,4 @@ pub use palpa_servo as servo;
 pub use palpa_springs as springs;
 pub use palpa_tissue as tissue;
 pub use palpa_verify as verify;
+pub use palpa_viewer as viewer;

@@ -37,6 +37,20 @@ export interface paths {
                     };
                     content?: never;
                 };
+                /** @description It cannot be made; the text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
             };
         };
         put?: never;
@@ -58,7 +72,7 @@ export interface paths {
         put?: never;
         /**
          * Asks for something
-         * @description As over the WebSocket, but on behalf of no page: refused while a page controls, unless the request is take_control.
+         * @description As over the WebSocket, but on behalf of a program: refused while a page controls, unless the request is `take_control`; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.
          */
         post: {
             parameters: {
@@ -82,7 +96,7 @@ export interface paths {
                         "application/json": components["schemas"]["Reply"];
                     };
                 };
-                /** @description It cannot be understood. */
+                /** @description It cannot be understood; the reply says where. */
                 400: {
                     headers: {
                         [name: string]: unknown;
@@ -97,6 +111,34 @@ export interface paths {
                     content: {
                         "application/json": components["schemas"]["Reply"];
                     };
+                };
+                /** @description It is longer than 1 MiB. */
+                413: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description It is not called application/json. */
+                415: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many requests. */
+                429: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The engine gave no answer. */
+                504: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
                 };
             };
         };
@@ -131,6 +173,13 @@ export interface paths {
                     content: {
                         "application/json": components["schemas"]["EngineFigures"];
                     };
+                };
+                /** @description The engine starts. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
                 };
             };
         };
@@ -170,6 +219,20 @@ export interface paths {
                 };
                 /** @description There is none yet. */
                 404: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description It cannot be made; the text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
                     headers: {
                         [name: string]: unknown;
                     };
@@ -218,6 +281,20 @@ export interface paths {
                     };
                     content?: never;
                 };
+                /** @description It cannot be made; the text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
             };
         };
         put?: never;
@@ -261,6 +338,20 @@ export interface paths {
                     };
                     content?: never;
                 };
+                /** @description It cannot be made; the text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
             };
         };
         put?: never;
@@ -297,6 +388,13 @@ export interface paths {
                         "application/json": components["schemas"]["State"];
                     };
                 };
+                /** @description The engine starts. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
             };
         };
         put?: never;
@@ -331,7 +429,7 @@ export interface paths {
                     };
                     content?: never;
                 };
-                /** @description The engine stands. */
+                /** @description The engine stands; the text says why. */
                 503: {
                     headers: {
                         [name: string]: unknown;
@@ -391,7 +489,7 @@ export interface paths {
         };
         /**
          * The WebSocket
-         * @description Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in `crates/palpa-viewer/src/wire.rs`.
+         * @description Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in `crates/palpa-viewer/src/wire.rs`. The first who connects controls, the others watch until they take control. A client that is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), asks more than 200 times a second (400 at once) or is not understood 20 times in a row is let go, with the reason.
          */
         get: {
             parameters: {
@@ -406,6 +504,20 @@ export interface paths {
             responses: {
                 /** @description A WebSocket. */
                 101: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description It is asked from a page of another place. */
+                403: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description 32 are connected, which is the most. */
+                503: {
                     headers: {
                         [name: string]: unknown;
                     };

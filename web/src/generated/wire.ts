@@ -47,7 +47,7 @@ export interface MeshSnapshot {
   kind: 1;
   /** Its number; frames say to which they belong. */
   mesh: number;
-  /** Nodes in a column. Node (v, l) of skin vertex v has the index v * n_levels + l; level 0 is the skin, the last is held by bone or base. */
+  /** Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level 0 is the skin, the last is held by bone or base. */
   n_levels: number;
   /** Nodes at rest, m: x, y, z one after the other. */
   positions: Float32Array;
@@ -55,7 +55,7 @@ export interface MeshSnapshot {
   triangles: Uint32Array;
   /** The layer of each interval. */
   interval_layer: Uint8Array;
-  /** Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at t * (n_levels - 1) + i. */
+  /** Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at `t * (n_levels - 1) + i`. */
   stiffness: Float32Array;
   /** Vertices of the bones' surfaces, m; they do not move. */
   bone_positions: Float32Array;

@@ -38,7 +38,13 @@ export class HandControl {
   onMark: (point: Vec3) => void = () => {};
   private settings: HandSettings;
   private target: Target | null = null;
-  private pointer: { id: number; depth: number; dragFrom: { y: number; depth: number } | null } | null = null;
+  private pointer: {
+    id: number;
+    depth: number;
+    dragFrom: { x: number; y: number; depth: number } | null;
+    /** From the cursor to the place that is pressed, px: what shift-drags have moved it off. */
+    off: { x: number; y: number };
+  } | null = null;
   private click: { id: number; x: number; y: number } | null = null;
   /** Keys hold the tool until it is let go. */
   private isHeldByKeys = false;
@@ -97,7 +103,7 @@ export class HandControl {
     this.view.canvas.setPointerCapture(event.pointerId);
     this.isHeldByKeys = false;
     const depth = event.shiftKey ? 0 : pressDepth;
-    this.pointer = { id: event.pointerId, depth, dragFrom: event.shiftKey ? { y: event.clientY, depth } : null };
+    this.pointer = { id: event.pointerId, depth, dragFrom: event.shiftKey ? { x: event.clientX, y: event.clientY, depth } : null, off: { x: 0, y: 0 } };
     this.goTo({ ...at, depth });
     return true;
   }
@@ -110,14 +116,18 @@ export class HandControl {
     }
     if (event.shiftKey) {
       // The spring of shift-drag: down presses deeper, and letting go of shift goes back.
-      pointer.dragFrom ??= { y: event.clientY, depth: target.depth };
+      pointer.dragFrom ??= { x: event.clientX, y: event.clientY, depth: target.depth };
       const depth = pointer.dragFrom.depth + (event.clientY - pointer.dragFrom.y) * this.view.metresPerPixel();
       this.goTo({ ...target, depth: this.limited(depth) });
       return;
     }
-    pointer.dragFrom = null;
+    if (pointer.dragFrom) {
+      pointer.off.x += pointer.dragFrom.x - event.clientX;
+      pointer.off.y += pointer.dragFrom.y - event.clientY;
+      pointer.dragFrom = null;
+    }
     // Off the body the tool stays at the last place.
-    const at = this.view.pickRest(event.clientX, event.clientY);
+    const at = this.view.pickRest(event.clientX + pointer.off.x, event.clientY + pointer.off.y);
     this.goTo({ ...(at ?? target), depth: pointer.depth });
   }
 

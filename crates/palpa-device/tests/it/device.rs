@@ -1,10 +1,11 @@
 //! The simulated device and hand against closed forms.
 
+use nalgebra::UnitQuaternion;
 use palpa_device::{
     DeviceModel, Fault, Faulty, Grip, HapticDevice, LiveTarget, Path, Scripted, SimulatedDevice,
     Vec3,
 };
-use palpa_servo::ForceCommand;
+use palpa_servo::{ForceCommand, Pose};
 
 fn force(z: f64) -> ForceCommand {
     ForceCommand {
@@ -99,6 +100,26 @@ fn a_live_hand_goes_where_it_is_set() {
     device.read(0.2).expect("a reading");
     device.read(0.4).expect("a reading");
     assert!((device.position() - target.get()).norm() < 0.05 / 400.0 + 1e-4);
+}
+
+#[test]
+fn a_live_hand_turns_and_neither_jumps_nor_overshoots() {
+    let target = LiveTarget::new(Vec3::zeros());
+    let mut device = SimulatedDevice::live(DeviceModel::IDEAL, Grip::STIFF, target.clone());
+    device.read(0.0).expect("a reading");
+    let turn = UnitQuaternion::from_euler_angles(0.0, 0.5, 0.0);
+    target.set_pose(&Pose::from_parts(Vec3::new(0.02, 0.0, 0.0).into(), turn));
+    let mut before = Pose::identity();
+    for tick in 1..400 {
+        let pose = device.read(f64::from(tick) * 1e-3).expect("a reading").pose;
+        let way = (pose.translation.vector - before.translation.vector).norm();
+        assert!(way < 1e-3, "{way} m in a tick");
+        assert!(pose.translation.x < 0.0205);
+        assert!(pose.rotation.angle_to(&before.rotation) < 0.05);
+        before = pose;
+    }
+    assert!(before.rotation.angle_to(&turn) < 1e-3);
+    assert!((before.translation.x - 0.02).abs() < 1e-4);
 }
 
 #[test]

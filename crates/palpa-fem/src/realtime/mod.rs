@@ -19,8 +19,8 @@ mod tests;
 mod zone;
 
 pub use live::{
-    ExteriorMode, FineBodies, Live, LiveParams, LiveReport, Rebuild, Rebuilt, RoamDone, RoamJob,
-    Roaming, StepOutcome,
+    ExteriorMode, FineBodies, Glance, Live, LiveParams, LiveReport, Rebuild, Rebuilt, RoamDone,
+    RoamJob, Roaming, StepOutcome,
 };
 pub use local::{LocalContact, LocalModel, LocalTool};
 

@@ -8,8 +8,17 @@ use crate::{
     Volume, catalogue,
 };
 
-pub(super) fn tissue(tissue: &Tissue) -> TissueSpec {
-    if catalogue().contains(tissue) {
+/// How tissues of the catalogue are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Names {
+    /// By their names.
+    OfCatalogue,
+    /// In full, as any other.
+    None,
+}
+
+pub(super) fn tissue(tissue: &Tissue, names: Names) -> TissueSpec {
+    if names == Names::OfCatalogue && catalogue().contains(tissue) {
         return TissueSpec::Name(tissue.name.clone());
     }
     let mut table = TissueTable {

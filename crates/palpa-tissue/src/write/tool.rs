@@ -1,6 +1,6 @@
 //! Tools and lumps back to their tables.
 
-use super::{direction, point, relative, tissue, vertex};
+use super::{Names, direction, point, relative, tissue, vertex};
 use crate::file::{LumpShapeName, LumpTable, ToolShape, ToolTable};
 use crate::lump::{Lump, LumpPlace, LumpShape};
 use crate::scene::Scene;
@@ -53,7 +53,7 @@ pub(super) fn tool(tool: &Tool) -> ToolTable {
     table
 }
 
-pub(super) fn lump(scene: &Scene, lump: &Lump) -> LumpTable {
+pub(super) fn lump(scene: &Scene, lump: &Lump, names: Names) -> LumpTable {
     let mut table = LumpTable {
         name: lump.name.clone(),
         shape: LumpShapeName::Sphere,
@@ -66,7 +66,7 @@ pub(super) fn lump(scene: &Scene, lump: &Lump) -> LumpTable {
         below_vertex: None,
         at: None,
         axis: lump.axis.map(direction),
-        tissue: tissue(&lump.tissue),
+        tissue: tissue(&lump.tissue, names),
         transition: Length::from_si(lump.transition),
     };
     match lump.place {

@@ -15,6 +15,7 @@ pub mod replay;
 pub mod reproduce;
 pub mod schema;
 pub mod verify;
+pub mod view;
 pub mod z_width;
 
 use crate::cli::Context;
@@ -43,6 +44,7 @@ pub enum Command {
     Reproduce(reproduce::Args),
     Schema(schema::Args),
     Verify(verify::Args),
+    View(view::Args),
     ZWidth(z_width::Args),
 }
 
@@ -59,6 +61,7 @@ impl Command {
             Self::Reproduce(_) => "reproduce",
             Self::Schema(_) => "schema",
             Self::Verify(_) => "verify",
+            Self::View(_) => "view",
             Self::ZWidth(_) => "z-width",
         }
     }
@@ -78,6 +81,7 @@ impl Command {
             Self::Reproduce(args) => reproduce::run(args, context),
             Self::Schema(args) => schema::run(args, context),
             Self::Verify(args) => verify::run(args, context),
+            Self::View(args) => view::run(args, context),
             Self::ZWidth(args) => z_width::run(args, context),
         }
     }

@@ -64,6 +64,14 @@ pub fn path(scene: &Scene, scene_from_device: &Pose, seconds: f64) -> Path {
     path
 }
 
+/// The scene's motion once, from where the hand is (m, in the device's frame) to where it begins, and back there.
+pub fn once_from(at: Vec3, scene: &Scene, scene_from_device: &Pose) -> Path {
+    let across = across(&scene.motion, scene_from_device);
+    let begin = start(&scene.motion, &across);
+    let path = Path::from(at).to(begin, scene.motion.speed).hold(PAUSE);
+    once(path, &scene.motion, &across)
+}
+
 /// The unit vector in the device's plane along which the hand goes across.
 fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
     let along = motion.along.map_or(Vec3::x(), |along| {

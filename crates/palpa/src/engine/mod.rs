@@ -10,15 +10,19 @@ mod fine;
 mod hand;
 mod record;
 mod rehearsal;
+mod springs;
 mod tissue;
 mod trace;
+mod watch;
 
 pub use fine::FineScene;
-pub use hand::{device_model, grip, path};
+pub use hand::{device_model, grip, once_from, path};
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
+pub use springs::{SpringScene, SpringTissue};
 pub use tissue::LiveTissue;
 pub use trace::{TraceRow, converged_forces, force_while_moving, trace_picture};
+pub use watch::{Look, Seen, Watch};
 
 use std::sync::Arc;
 
@@ -58,6 +62,8 @@ pub struct LiveScene {
     pub scene_from_device: Pose,
     /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
     pub meshes: Option<Arc<FineScene>>,
+    /// The body as it was grown, with its bones.
+    pub built: Arc<BuiltBody>,
     /// Where the hand begins, in the device's frame, m.
     pub start: Vec3,
     /// How the moving step goes about its work.
@@ -82,7 +88,7 @@ impl LiveScene {
             );
         }
         let scene = &coarser(scene);
-        let built = build(scene)?;
+        let built = Arc::new(build(scene)?);
         let moves = scene.mesh.moves;
         if moves && !scene.mesh.refine {
             bail!(
@@ -125,6 +131,7 @@ impl LiveScene {
         }
         Ok(Self {
             start,
+            built,
             meshes,
             mesh_size: indentation.mesh.mesh_size,
             params: LiveParams {
@@ -144,7 +151,15 @@ impl LiveScene {
     /// # Errors
     /// When the body cannot be factored.
     pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
-        let tools = [self.posed(self.start)];
+        self.tissue_at(self.start)
+    }
+
+    /// The tissue, untouched, with the device at another place than where the scene's hand begins, in its own frame, m.
+    ///
+    /// # Errors
+    /// When the body cannot be factored.
+    pub fn tissue_at(&self, start: Vec3) -> anyhow::Result<LiveTissue> {
+        let tools = [self.posed(start)];
         let body = match &self.meshes {
             Some(meshes) => {
                 let at = tools[0].pose.translation.vector;

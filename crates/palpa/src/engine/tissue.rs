@@ -1,5 +1,6 @@
 //! The moving step as the engine's tissue.
 
+use super::Watch;
 use palpa_fem::PosedTool;
 use palpa_fem::realtime::{Live, LiveReport, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome};
 use palpa_fem::shape::Tool as RigidTool;
@@ -20,6 +21,7 @@ pub struct LiveTissue {
     posed: Vec<PosedTool>,
     local: LocalModel,
     last: Option<LiveReport>,
+    watch: Option<Watch>,
 }
 
 impl LiveTissue {
@@ -50,7 +52,15 @@ impl LiveTissue {
             posed,
             local,
             last: None,
+            watch: None,
         }
+    }
+
+    /// Lets a viewer look on: nothing depends on it.
+    #[must_use]
+    pub fn watched(mut self, watch: Watch) -> Self {
+        self.watch = Some(watch);
+        self
     }
 
     /// The moving step.
@@ -151,6 +161,9 @@ impl Tissue for LiveTissue {
             .local_model(MAX_CONTACTS, &mut self.local);
         self.fill(patch);
         self.last = Some(report);
+        if let Some(watch) = &mut self.watch {
+            watch.look(input.step, input.now, &self.body);
+        }
         TissueStep {
             status: match report.outcome {
                 StepOutcome::Arrived if report.residual <= self.tolerance => StepStatus::Converged,

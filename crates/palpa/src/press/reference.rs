@@ -227,7 +227,7 @@ impl Run<'_> {
 }
 
 /// Refuses what bars between nodes cannot do.
-fn check_reference(scene: &Scene) -> anyhow::Result<()> {
+pub(crate) fn check_reference(scene: &Scene) -> anyhow::Result<()> {
     if !scene.tool.is_bonded() {
         bail!(
             "the reference method moves nodes that are bonded to the tool, and a {} presses by contact; give the scene's \
@@ -244,7 +244,7 @@ fn check_reference(scene: &Scene) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn spring_params(scene: &Scene) -> SpringParams {
+pub(crate) fn spring_params(scene: &Scene) -> SpringParams {
     let layers: Vec<LayerStiffness> = scene
         .layers
         .iter()
@@ -274,7 +274,7 @@ fn spring_params(scene: &Scene) -> SpringParams {
 /// Share of the largest stable step size that Euler alone takes: half of it bears moderate loads and still gets on.
 const EULER_FRACTION: f64 = 0.5;
 
-fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
+pub(crate) fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
     let reference = &scene.reference;
     StepParams {
         substeps: reference.substeps as usize,
@@ -293,7 +293,7 @@ fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
 }
 
 /// The base is fixed, the tool holds `operated`, cut faces as the scene says.
-fn constraints(
+pub(crate) fn constraints(
     scene: &Scene,
     body: &LayeredBody,
     operated: Vec<usize>,

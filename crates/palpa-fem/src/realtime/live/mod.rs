@@ -1,6 +1,7 @@
 //! The moving step.
 
 mod carry;
+mod glance;
 mod roaming;
 
 use std::sync::Arc;
@@ -19,6 +20,7 @@ use crate::law::Prony;
 use crate::model::Model;
 use crate::state::{Memory, State};
 use carry::Come;
+pub use glance::Glance;
 pub use roaming::{FineBodies, RoamDone, RoamJob, Roaming};
 
 /// First spring that holds vertices under a tool where the free body is not stable, relative to their own stiffness, its

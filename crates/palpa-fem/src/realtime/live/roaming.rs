@@ -248,6 +248,12 @@ impl Roaming {
         &mut self.live
     }
 
+    /// Round which place (at rest, m) the mesh is fine, and up to which distance, m; none where it is the same all over or stays.
+    pub fn fine(&self) -> Option<(Vec3, f64)> {
+        let bodies = self.bodies.as_ref()?;
+        Some((self.place, bodies.radius()))
+    }
+
     /// How many meshes there were, and how many could not be taken up.
     pub fn n_meshes(&self) -> [u64; 2] {
         [self.n_meshes, self.n_failed]

@@ -1,0 +1,56 @@
+//! A look at a body that is pressed, taken in passing and made whole elsewhere.
+
+use std::sync::Arc;
+
+use palpa_mesh::Vec3;
+use palpa_sparse::fronts::SolveScratch;
+
+use super::super::zone::{Outside, Plan};
+use super::Live;
+use crate::model::Model;
+
+/// The displacements of a [`Live`] body at one moment.
+///
+/// Where the exterior answers linearly, those outside the zone are left for [`Self::settled`], to be called where nobody
+/// waits.
+#[derive(Debug)]
+pub struct Glance {
+    model: Arc<Model>,
+    /// What the displacements outside the zone follow from; none where they are there.
+    exterior: Option<(Arc<Plan>, Arc<Outside>)>,
+    displacements: Vec<Vec3>,
+}
+
+impl Glance {
+    /// The body and its materials.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Displacements of all nodes, m. `[n_nodes]` Cost: a substitution through the exterior.
+    pub fn settled(&self) -> Vec<Vec3> {
+        let mut displacements = self.displacements.clone();
+        if let Some((plan, outside)) = &self.exterior {
+            let mut scratch = SolveScratch::new(&plan.tree);
+            let mut x = vec![0.0; self.model.structure.n_dofs()];
+            let into = &mut displacements;
+            outside.settle(&self.model, plan, None, into, &mut x, &mut scratch);
+        }
+        displacements
+    }
+}
+
+impl Live {
+    /// Looks at the body, in the memory of an older look where there is one. Cost: a copy of the displacements.
+    pub fn glance(&self, old: Option<Glance>) -> Glance {
+        let mut displacements = old.map_or_else(Vec::new, |old| old.displacements);
+        displacements.clear();
+        displacements.extend_from_slice(&self.state.displacements);
+        let is_followed = self.follower.is_some() || self.is_outside_lost;
+        Glance {
+            model: Arc::clone(&self.model),
+            exterior: (!is_followed).then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside))),
+            displacements,
+        }
+    }
+}

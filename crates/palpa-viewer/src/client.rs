@@ -1,0 +1,406 @@
+//! A page, or a program in its place, at the other end of a WebSocket.
+//!
+//! ```text
+//!  hello, state, mesh, frame │ then, whatever is new and as fast as the client takes it:
+//!                            │ ping, answers, state, notices, engine, mesh before its frames
+//! ```
+//! One task reads and writes. A client that does not take what is sent to it is not waited for by anyone else: it misses
+//! frames, and after a while it is let go.
+
+use crate::{
+    board::{Board, Controller, Picture, json},
+    control::{Envelope, Hello, Message, Notice, NoticeLevel, Reply, Request},
+    hub::Hub,
+    limits::{
+        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, QUIET,
+        SEND_WAIT, SILENCE, Verdict,
+    },
+    wire::SNAPSHOT_VERSION,
+};
+use axum::{
+    body::Bytes,
+    extract::ws::{self, CloseFrame, Utf8Bytes, WebSocket, close_code},
+};
+use futures_util::{
+    SinkExt, StreamExt,
+    stream::{SplitSink, SplitStream},
+};
+use serde::Deserialize;
+use std::{error::Error, io, iter::successors, sync::Arc, time::Instant};
+use tokio::{
+    select,
+    sync::{OwnedSemaphorePermit, broadcast::error::RecvError, mpsc, watch},
+    time::{MissedTickBehavior, interval, timeout},
+};
+
+type Sink = SplitSink<WebSocket, ws::Message>;
+type Answers = mpsc::Sender<Utf8Bytes>;
+
+/// Serves a client until one of the two has had enough.
+pub(crate) async fn serve(socket: WebSocket, hub: Arc<Hub>, place: OwnedSemaphorePermit) {
+    let seat = Seat::take(hub);
+    let (mut sink, mut stream) = socket.split();
+    let (answers, mut to_send) = mpsc::channel(MAX_ANSWERS);
+    let end = select! {
+        biased;
+        () = is_closing(seat.hub.closing.clone()) => End::new(close_code::AWAY, "the program ends"),
+        end = read(&mut stream, &seat, &answers) => end,
+        end = write(&mut sink, &seat, &mut to_send) => end,
+    };
+    if end.is_our_choice() {
+        seat.hub.board.counts.dropped.add(1);
+    }
+    drop(seat);
+    say_good_bye(sink, stream, end).await;
+    drop(place);
+}
+
+/// Returns when the server is to end.
+pub(crate) async fn is_closing(mut closing: watch::Receiver<bool>) {
+    // An error says that the server is gone already.
+    let _ = closing.wait_for(|&is_closing| is_closing).await;
+}
+
+/// A client's place among those who are connected.
+struct Seat {
+    hub: Arc<Hub>,
+    client: u64,
+}
+
+impl Seat {
+    fn take(hub: Arc<Hub>) -> Self {
+        hub.board.counts.connections.add(1);
+        let client = hub.board.enter();
+        hub.tell_clients();
+        Self { hub, client }
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        self.hub.board.leave(self.client);
+        self.hub.tell_clients();
+    }
+}
+
+/// Why a connection ends.
+enum End {
+    /// The client has gone.
+    Gone,
+    /// We let it go.
+    Close { code: u16, reason: Utf8Bytes },
+}
+
+impl End {
+    /// A reason has room for 123 bytes.
+    fn new(code: u16, reason: &str) -> Self {
+        Self::Close {
+            code,
+            reason: cut(reason, 120).into(),
+        }
+    }
+
+    fn is_our_choice(&self) -> bool {
+        matches!(self, Self::Close { code, .. } if *code != close_code::AWAY)
+    }
+}
+
+async fn say_good_bye(mut sink: Sink, mut stream: SplitStream<WebSocket>, end: End) {
+    let good_bye = async {
+        match end {
+            End::Gone => {
+                let _ = sink.close().await;
+            }
+            End::Close { code, reason } => {
+                let frame = CloseFrame { code, reason };
+                if sink.send(ws::Message::Close(Some(frame))).await.is_ok() {
+                    // What the client has sent meanwhile, until it has read that this is the end.
+                    while let Some(Ok(_)) = stream.next().await {}
+                }
+            }
+        }
+    };
+    // A client that takes no leave is left without.
+    let _ = timeout(CLOSE_WAIT, good_bye).await;
+}
+
+/// Hears a client until it is gone, silent, or asks too much.
+async fn read(stream: &mut SplitStream<WebSocket>, seat: &Seat, answers: &Answers) -> End {
+    let mut gate = Gate::new(Instant::now());
+    let mut n_malformed = 0;
+    loop {
+        let message = match timeout(SILENCE, stream.next()).await {
+            Err(_) => return End::new(close_code::POLICY, "no sign of life"),
+            Ok(None | Some(Ok(ws::Message::Close(_)))) => return End::Gone,
+            Ok(Some(Err(error))) => return unreadable(&error),
+            Ok(Some(Ok(message))) => message,
+        };
+        let n_bytes = match &message {
+            ws::Message::Text(text) => text.len(),
+            ws::Message::Binary(bytes) | ws::Message::Ping(bytes) | ws::Message::Pong(bytes) => {
+                bytes.len()
+            }
+            ws::Message::Close(_) => 0,
+        };
+        let heard = match gate.ask(n_bytes, Instant::now()) {
+            Verdict::TooMuch => return End::new(close_code::POLICY, TOO_MANY),
+            Verdict::Refused { tell } => {
+                seat.hub.board.counts.refused.add(1);
+                if tell { warn(answers) } else { Ok(()) }
+            }
+            Verdict::Taken => match message {
+                ws::Message::Text(text) => match understand(&text) {
+                    Ok(envelope) => {
+                        n_malformed = 0;
+                        ask(seat, answers, envelope);
+                        Ok(())
+                    }
+                    Err(reply) => {
+                        n_malformed += 1;
+                        seat.hub.board.counts.malformed.add(1);
+                        send_answer(answers, reply)
+                    }
+                },
+                ws::Message::Binary(_) => {
+                    n_malformed += 1;
+                    seat.hub.board.counts.malformed.add(1);
+                    let error = "bytes are not understood here; requests are JSON in text messages";
+                    send_answer(answers, refusal(None, error.into()))
+                }
+                _ => Ok(()),
+            },
+        };
+        if heard.is_err() {
+            return End::new(close_code::POLICY, "answers are not read");
+        }
+        if n_malformed >= MAX_MALFORMED {
+            let reason = "20 messages in a row were not understood";
+            return End::new(close_code::POLICY, reason);
+        }
+    }
+}
+
+const TOO_MANY: &str = "too many requests; at most 200 a second";
+
+fn unreadable(error: &axum::Error) -> End {
+    let words = error.to_string();
+    let is_io = successors(error.source(), |&e| e.source()).any(<dyn Error>::is::<io::Error>);
+    if is_io || words.contains("without closing handshake") {
+        End::Gone
+    } else if words.contains("too long") {
+        End::new(close_code::SIZE, "a message is longer than 1 MiB")
+    } else {
+        End::new(close_code::PROTOCOL, &words)
+    }
+}
+
+/// A request out of its text, or the refusal.
+pub(crate) fn understand(text: &str) -> Result<Envelope, Reply> {
+    /// The number alone, to answer what is not understood otherwise.
+    #[derive(Deserialize)]
+    struct Numbered {
+        #[serde(default)]
+        id: Option<u32>,
+    }
+    let envelope: Envelope = serde_json::from_str(text).map_err(|error| {
+        let id = serde_json::from_str(text).map_or(None, |numbered: Numbered| numbered.id);
+        let error = error.to_string();
+        let error = format!(
+            "not understood: {}; expected a request as {{\"id\": 1, \"type\": \"lift\"}}, see /api",
+            cut(&error, 1000)
+        );
+        refusal(id, error)
+    })?;
+    if text.len() > MAX_SMALL_MESSAGE && !matches!(envelope.request, Request::LoadText { .. }) {
+        let error = format!(
+            "a request of {} bytes; at most {MAX_SMALL_MESSAGE} but for load_text, which may have 1 MiB",
+            text.len()
+        );
+        return Err(refusal(envelope.id, error));
+    }
+    Ok(envelope)
+}
+
+fn refusal(id: Option<u32>, error: String) -> Reply {
+    Reply {
+        id,
+        error: Some(error),
+    }
+}
+
+fn ask(seat: &Seat, answers: &Answers, Envelope { id, request }: Envelope) {
+    let answers = answers.clone();
+    let who = Controller::Page(seat.client);
+    seat.hub.ask(who, request, move |outcome| {
+        let error = outcome.err();
+        if id.is_some() || error.is_some() {
+            // A client that is gone needs no answer, and one that does not read is let go by the writer.
+            let _ = send_answer(&answers, Reply { id, error });
+        }
+    });
+}
+
+fn send_answer(answers: &Answers, reply: Reply) -> Result<(), ()> {
+    answers
+        .try_send(json(&Message::Reply(reply)))
+        .map_err(|_| ())
+}
+
+fn warn(answers: &Answers) -> Result<(), ()> {
+    let notice = Notice {
+        level: NoticeLevel::Warning,
+        text: format!("{TOO_MANY}; some were left out"),
+    };
+    answers
+        .try_send(json(&Message::Notice(notice)))
+        .map_err(|_| ())
+}
+
+/// Tells a client what is new until it does not take it.
+async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8Bytes>) -> End {
+    let board = &*seat.hub.board;
+    let mut out = Outlet::new(sink, board);
+    let mut notices = board.notices.subscribe();
+    let mut state = board.state.subscribe();
+    let mut picture = board.picture.subscribe();
+    let mut engine = board.engine.subscribe();
+    let hello = Message::Hello(Hello {
+        palpa: env!("CARGO_PKG_VERSION").into(),
+        snapshot_version: SNAPSHOT_VERSION,
+        client: seat.client,
+    });
+    if let Err(end) = out.text(json(&hello)).await {
+        return end;
+    }
+    // What is there already is news to a new client.
+    state.mark_changed();
+    picture.mark_changed();
+    engine.mark_changed();
+    let mut ping = interval(PING_EVERY);
+    ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    ping.reset();
+    loop {
+        // The picture comes last: there is always a newer one.
+        let sent = select! {
+            biased;
+            _ = ping.tick() => {
+                // A page does not see pings. While the session says nothing, it hears the state.
+                let is_silent = out.spoke_at.elapsed() > QUIET;
+                let text = is_silent.then(|| state.borrow().clone()).flatten();
+                match out.some(text).await {
+                    Ok(()) => out.send(ws::Message::Ping(Bytes::new())).await,
+                    end => end,
+                }
+            }
+            Some(answer) = answers.recv() => out.text(answer).await,
+            Ok(()) = state.changed() => {
+                let text = state.borrow_and_update().clone();
+                out.some(text).await
+            }
+            notice = notices.recv() => match notice {
+                Ok(notice) => out.text(notice).await,
+                Err(RecvError::Lagged(_) | RecvError::Closed) => Ok(()),
+            },
+            Ok(()) = engine.changed() => {
+                let text = engine.borrow_and_update().as_ref().map(|(_, text)| text.clone());
+                out.some(text).await
+            }
+            Ok(()) = picture.changed() => {
+                let newest = picture.borrow_and_update().clone();
+                out.picture(newest).await
+            }
+            else => Err(End::Gone),
+        };
+        if let Err(end) = sent {
+            return end;
+        }
+    }
+}
+
+/// Sends, and knows which picture the client has.
+struct Outlet<'a> {
+    sink: &'a mut Sink,
+    board: &'a Board,
+    /// Serial number of the mesh that it has.
+    mesh: u64,
+    /// Serial number of the frame that it had last, or of the one before it came.
+    frame: u64,
+    /// When something was said last.
+    spoke_at: Instant,
+}
+
+impl<'a> Outlet<'a> {
+    fn new(sink: &'a mut Sink, board: &'a Board) -> Self {
+        let before = board
+            .picture
+            .borrow()
+            .frame
+            .as_ref()
+            .map_or(0, |f| f.serial - 1);
+        Self {
+            sink,
+            board,
+            mesh: 0,
+            frame: before,
+            spoke_at: Instant::now(),
+        }
+    }
+
+    async fn send(&mut self, message: ws::Message) -> Result<(), End> {
+        let n_bytes = match &message {
+            ws::Message::Text(text) => text.len(),
+            ws::Message::Binary(bytes) => bytes.len(),
+            _ => 0,
+        };
+        match timeout(SEND_WAIT, self.sink.send(message)).await {
+            Err(_) => Err(End::new(close_code::POLICY, "messages are not read")),
+            Ok(Err(_)) => Err(End::Gone),
+            Ok(Ok(())) => {
+                self.board.counts.bytes_sent.add(n_bytes as u64);
+                if n_bytes > 0 {
+                    self.spoke_at = Instant::now();
+                }
+                Ok(())
+            }
+        }
+    }
+
+    async fn text(&mut self, text: Utf8Bytes) -> Result<(), End> {
+        self.send(ws::Message::Text(text)).await
+    }
+
+    async fn some(&mut self, text: Option<Utf8Bytes>) -> Result<(), End> {
+        match text {
+            Some(text) => self.text(text).await,
+            None => Ok(()),
+        }
+    }
+
+    /// The mesh if the client lacks it, and the frame if it is of that mesh.
+    async fn picture(&mut self, Picture { mesh, frame }: Picture) -> Result<(), End> {
+        let Some(mesh) = mesh else {
+            return Ok(());
+        };
+        let counts = &self.board.counts;
+        if mesh.serial != self.mesh {
+            self.send(ws::Message::Binary(mesh.bytes)).await?;
+            self.mesh = mesh.serial;
+            counts.meshes_sent.add(1);
+        }
+        if let Some(frame) = frame
+            && frame.mesh == mesh.mesh
+            && frame.serial != self.frame
+        {
+            self.send(ws::Message::Binary(frame.bytes)).await?;
+            counts.frames_sent.add(1);
+            counts.frames_dropped.add(frame.serial - self.frame - 1);
+            self.frame = frame.serial;
+        }
+        Ok(())
+    }
+}
+
+/// The beginning of a text, of so many bytes at most.
+fn cut(text: &str, n_bytes: usize) -> &str {
+    &text[..text.floor_char_boundary(n_bytes)]
+}

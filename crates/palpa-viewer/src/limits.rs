@@ -1,0 +1,161 @@
+//! How much a client may ask, and how long it may take.
+
+use std::time::{Duration, Instant};
+
+/// Pages at once. Each has its own copy of what its socket has not taken yet.
+pub(crate) const MAX_CLIENTS: usize = 32;
+/// Connections at once, of pages, downloads and programs.
+pub(crate) const MAX_CONNECTIONS: usize = 256;
+/// A connection that nothing goes through is ended after so long. A page's is pinged; a file may take a while to make.
+pub(crate) const IDLE: Duration = Duration::from_mins(2);
+/// Files that are being made at once.
+pub(crate) const MAX_FILES: usize = 4;
+/// Longest message of a client, bytes: the text of a scene with its tissues written out has room in it many times.
+pub(crate) const MAX_MESSAGE: usize = 1 << 20;
+/// Longest message that is not the text of a scene, bytes.
+pub(crate) const MAX_SMALL_MESSAGE: usize = 64 << 10;
+/// Malformed messages in a row: who sends so many does not speak our language.
+pub(crate) const MAX_MALFORMED: u32 = 20;
+/// Answers that wait for a client to read them. At the allowed rate a client that reads nothing is dropped before.
+pub(crate) const MAX_ANSWERS: usize = 4096;
+/// How long a client may take for one message.
+pub(crate) const SEND_WAIT: Duration = Duration::from_secs(10);
+/// How often a client is asked for a sign of life, and given one.
+pub(crate) const PING_EVERY: Duration = Duration::from_secs(4);
+/// A session that says nothing for so long is silent. With the time between pings it is less than the 6 s of the page.
+pub(crate) const QUIET: Duration = Duration::from_secs(1);
+/// A client that says nothing for so long is gone: three pings were not answered.
+pub(crate) const SILENCE: Duration = Duration::from_secs(14);
+/// How long a client may take to say good-bye.
+pub(crate) const CLOSE_WAIT: Duration = Duration::from_millis(500);
+/// How long a program may wait for the answer to its request.
+pub(crate) const ANSWER_WAIT: Duration = Duration::from_secs(30);
+/// What the system may keep for a client that does not read, bytes. More than this is latency.
+pub(crate) const SEND_BUFFER: u32 = 256 << 10;
+
+/// Requests per second, and at once. A hand asks 60 times a second.
+const RATE: (f64, f64) = (200.0, 400.0);
+/// Refused requests per second, and at once, before the connection is closed.
+const REFUSED_RATE: (f64, f64) = (20.0, 400.0);
+/// A message costs one request, and one more for each so many bytes.
+const BYTES_PER_REQUEST: usize = 4096;
+
+/// Whether a message is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// It is.
+    Taken,
+    /// It is not; who asks is to be told, if it was not just now.
+    Refused {
+        /// Whether it was not.
+        tell: bool,
+    },
+    /// It goes on for too long.
+    TooMuch,
+}
+
+/// Counts what a client asks.
+#[derive(Debug)]
+pub(crate) struct Gate {
+    requests: Bucket,
+    refused: Bucket,
+    told: Option<Instant>,
+}
+
+impl Gate {
+    pub(crate) fn new(now: Instant) -> Self {
+        Self {
+            requests: Bucket::new(RATE, now),
+            refused: Bucket::new(REFUSED_RATE, now),
+            told: None,
+        }
+    }
+
+    /// Whether a message of so many bytes is taken.
+    pub(crate) fn ask(&mut self, bytes: usize, now: Instant) -> Verdict {
+        let cost = 1.0 + (bytes / BYTES_PER_REQUEST) as f64;
+        if self.requests.take(cost, now) {
+            return Verdict::Taken;
+        }
+        if !self.refused.take(1.0, now) {
+            return Verdict::TooMuch;
+        }
+        let tell = self
+            .told
+            .is_none_or(|told| now.saturating_duration_since(told) >= Duration::from_secs(1));
+        if tell {
+            self.told = Some(now);
+        }
+        Verdict::Refused { tell }
+    }
+}
+
+/// Tokens that flow in at a rate, and are taken out.
+#[derive(Debug)]
+struct Bucket {
+    rate: f64,
+    capacity: f64,
+    level: f64,
+    at: Instant,
+}
+
+impl Bucket {
+    fn new((rate, capacity): (f64, f64), at: Instant) -> Self {
+        Self {
+            rate,
+            capacity,
+            level: capacity,
+            at,
+        }
+    }
+
+    fn take(&mut self, cost: f64, now: Instant) -> bool {
+        let passed = now.saturating_duration_since(self.at).as_secs_f64();
+        self.level = (self.level + passed * self.rate).min(self.capacity);
+        self.at = now;
+        let is_there = self.level >= cost;
+        if is_there {
+            self.level -= cost;
+        }
+        is_there
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_burst_is_taken_and_then_the_rate() {
+        let start = Instant::now();
+        let mut gate = Gate::new(start);
+        assert!((0..400).all(|_| gate.ask(10, start) == Verdict::Taken));
+        assert_eq!(gate.ask(10, start), Verdict::Refused { tell: true });
+        assert_eq!(gate.ask(10, start), Verdict::Refused { tell: false });
+        let later = start + Duration::from_millis(101);
+        let taken = (0..100)
+            .filter(|_| gate.ask(10, later) == Verdict::Taken)
+            .count();
+        assert_eq!(taken, 20);
+    }
+
+    #[test]
+    fn who_goes_on_is_closed_and_who_rests_is_not() {
+        let start = Instant::now();
+        let mut gate = Gate::new(start);
+        let n = (0..2000)
+            .position(|_| gate.ask(0, start) == Verdict::TooMuch)
+            .unwrap();
+        assert_eq!(n, 800);
+        let rested = start + Duration::from_secs(20);
+        assert_eq!(gate.ask(0, rested), Verdict::Taken);
+    }
+
+    #[test]
+    fn long_messages_cost_more() {
+        let start = Instant::now();
+        let mut gate = Gate::new(start);
+        assert_eq!(gate.ask(MAX_MESSAGE, start), Verdict::Taken);
+        assert_ne!(gate.ask(MAX_MESSAGE, start), Verdict::Taken);
+    }
+}

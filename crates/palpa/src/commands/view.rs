@@ -1,0 +1,112 @@
+//! `palpa view`: the body under one's own hand, in a browser.
+
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use palpa_tissue::Scene;
+use palpa_viewer::{Server, ServerParams};
+use serde::Serialize;
+
+use super::Outcome;
+use crate::cli::Context;
+use crate::session::{Session, SessionParams, gallery};
+
+/// Touch a body in a browser: see it deform, read and feel the force
+///
+/// Starts the engine (tissue, 1 kHz loop, a simulated haptic device) and a web server on this machine, opens the page, and runs
+/// until Ctrl-C. Without a SCENE, a forearm is shown; the page has more. Recordings go to the output folder.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scene file (TOML), or the key of a scene of the gallery: forearm, `forearm_lump`, limb, block, `patch_bars`, `patch_tissue`
+    scene: Option<PathBuf>,
+    /// Do not open a browser
+    #[arg(long)]
+    no_open: bool,
+    /// Port to listen at; 0 takes any that is free [default: 7750, or any if that is in use]
+    #[arg(long, value_name = "PORT")]
+    port: Option<u16>,
+    /// Address to listen at; any but this machine's own (127.0.0.1) needs --token
+    #[arg(long, default_value = "127.0.0.1", value_name = "IP")]
+    bind: IpAddr,
+    /// What a page must know to come in: 8 characters or more
+    #[arg(long, value_name = "TEXT", env = "PALPA_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    /// Let the page ask for faults of the engine, for drills and tests
+    #[arg(long, hide = true)]
+    allow_faults: bool,
+}
+
+/// Where the page is, for machines.
+#[derive(Debug, Serialize)]
+struct Started {
+    url: String,
+    port: u16,
+}
+
+/// Where the page is when nothing else is said.
+const PORT: u16 = 7750;
+
+/// Runs the command.
+///
+/// # Errors
+/// On a scene that cannot be read, and when the server cannot listen where it should.
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    let (scene, gallery_key) = scene_of(args)?;
+    let out = context.out_dir()?;
+    let (session, remote) = Session::new(SessionParams {
+        scene,
+        gallery_key,
+        out: out.path().to_owned(),
+        allows_faults: args.allow_faults,
+    });
+    let params = |port| ServerParams {
+        bind: args.bind,
+        port,
+        token: args.token.clone(),
+    };
+    let server = match args.port {
+        Some(port) => Server::start(&params(port), remote)?,
+        // Who did not ask for a port is not to be held up by another viewer.
+        None => match Server::start(&params(PORT), remote.clone()) {
+            Err(palpa_viewer::ServerError::PortInUse { .. }) => Server::start(&params(0), remote)?,
+            started => started?,
+        },
+    };
+    let handle = session.start(server.publisher())?;
+    let url = server.url();
+    context.say(format!("the viewer is at {url}  (Ctrl-C ends it)"))?;
+    context.json(&Started {
+        url: url.clone(),
+        port: server.address().port(),
+    })?;
+    if !args.no_open
+        && let Err(error) = open::that_detached(&url)
+    {
+        context.note(format!(
+            "no browser could be opened ({error}); open {url} in one"
+        ));
+    }
+    context.begin_recording();
+    while !context.is_interrupted() {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    drop(handle);
+    drop(server);
+    Ok(Outcome::Done)
+}
+
+fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {
+    let Some(path) = &args.scene else {
+        return Ok((
+            gallery::scene(gallery::FIRST)?,
+            Some(gallery::FIRST.to_owned()),
+        ));
+    };
+    let key = path.to_string_lossy();
+    let is_key = !path.exists() && gallery::entries().iter().any(|entry| entry.key == key);
+    if is_key {
+        return Ok((gallery::scene(&key)?, Some(key.into_owned())));
+    }
+    Ok((Scene::load(path)?, None))
+}

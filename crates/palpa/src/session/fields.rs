@@ -1,0 +1,124 @@
+//! Fields over the nodes, computed on a thread of their own: they cost more than a frame may.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::thread;
+
+use palpa_fem::{Model, PrismField, relaxed_fields};
+use palpa_mesh::Vec3;
+use palpa_viewer::control::Field;
+
+/// A field over the nodes of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NodeField {
+    /// The mesh.
+    pub(super) mesh: u64,
+    /// Which field.
+    pub(super) field: Field,
+    /// Means of the prisms round each node. `[n_nodes]`
+    pub(super) values: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Job {
+    mesh: u64,
+    field: Field,
+    model: Arc<Model>,
+    displacements: Vec<Vec3>,
+}
+
+/// The worker, and the last field that it made.
+#[derive(Debug)]
+pub(super) struct Fields {
+    jobs: SyncSender<Job>,
+    done: Receiver<NodeField>,
+    latest: Option<NodeField>,
+}
+
+impl Fields {
+    /// Starts the worker, which ends when this is dropped.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub(super) fn start() -> std::io::Result<Self> {
+        let (jobs, inbox) = sync_channel::<Job>(1);
+        let (outbox, done) = sync_channel(1);
+        thread::Builder::new()
+            .name("palpa-fields".to_owned())
+            .spawn(move || {
+                for job in inbox {
+                    let Job {
+                        mesh,
+                        field,
+                        model,
+                        displacements,
+                    } = job;
+                    let values = at_nodes(&model, &displacements, field);
+                    let field = NodeField {
+                        mesh,
+                        field,
+                        values,
+                    };
+                    if outbox.send(field).is_err() {
+                        return;
+                    }
+                }
+            })?;
+        Ok(Self {
+            jobs,
+            done,
+            latest: None,
+        })
+    }
+
+    /// The latest field of this kind on this mesh; asks for the one of these displacements if the worker is free.
+    pub(super) fn of(
+        &mut self,
+        mesh: u64,
+        field: Field,
+        model: &Arc<Model>,
+        displacements: &[Vec3],
+    ) -> Option<&NodeField> {
+        if field == Field::None {
+            return None;
+        }
+        match self.done.try_recv() {
+            Ok(done) => self.latest = Some(done),
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
+        }
+        // Full: the worker is at one and has the next; the one after will be newer.
+        let _ = self.jobs.try_send(Job {
+            mesh,
+            field,
+            model: Arc::clone(model),
+            displacements: displacements.to_vec(),
+        });
+        self.latest
+            .as_ref()
+            .filter(|latest| latest.mesh == mesh && latest.field == field)
+    }
+}
+
+/// A field at the nodes: the mean of the prisms that meet there.
+fn at_nodes(model: &Model, displacements: &[Vec3], field: Field) -> Vec<f64> {
+    let body = model.body();
+    let value = |prism: &PrismField| match field {
+        Field::None => 0.0,
+        Field::VonMises => prism.von_mises(),
+        Field::Pressure => prism.pressure(),
+        Field::Stretch => prism.stretches[2],
+    };
+    let prisms = relaxed_fields(model, displacements);
+    let n_intervals = body.n_levels - 1;
+    let mut sums = vec![(0.0, 0_u32); body.n_nodes()];
+    for (p, prism) in prisms.iter().enumerate() {
+        let value = value(prism);
+        for node in body.prism(p / n_intervals, p % n_intervals) {
+            sums[node].0 += value;
+            sums[node].1 += 1;
+        }
+    }
+    sums.into_iter()
+        .map(|(sum, n)| sum / f64::from(n.max(1)))
+        .collect()
+}

@@ -1,0 +1,144 @@
+//! How the engine fares, in numbers and words for a page.
+
+use std::time::Instant;
+
+use palpa_rt::{Level, Quantiles, Report, StepStatus, TickEntry};
+use palpa_servo::{Faults, Limits};
+use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeLevel};
+
+/// Events that a page is told of.
+const LATEST: usize = 30;
+
+/// Counts of the figures before.
+#[derive(Debug)]
+pub(super) struct Figures {
+    at: Instant,
+    steps: u64,
+    ticks: u64,
+    snapshots: u64,
+    n_events: usize,
+    limits: Limits,
+    faults: Faults,
+}
+
+impl Figures {
+    /// Of an engine that begins.
+    pub(super) fn new() -> Self {
+        Self {
+            at: Instant::now(),
+            steps: 0,
+            ticks: 0,
+            snapshots: 0,
+            n_events: 0,
+            limits: Limits::NONE,
+            faults: Faults::NONE,
+        }
+    }
+
+    /// What a tick met.
+    pub(super) fn note(&mut self, entry: &TickEntry) {
+        self.limits |= Limits::from_bits(entry.tick.limits as u16);
+        self.faults |= Faults::from_bits(entry.tick.faults as u16);
+    }
+
+    /// The figures of now, and notices of what was wrong since.
+    pub(super) fn make(
+        &mut self,
+        report: &Report,
+        entry: &TickEntry,
+        status: u8,
+        meshes: u64,
+        n_nodes: usize,
+        snapshots: u64,
+    ) -> (EngineFigures, Vec<Notice>) {
+        let now = Instant::now();
+        let seconds = (now - self.at).as_secs_f64().max(1e-3);
+        let rate = |n: u64, before: u64| n.saturating_sub(before) as f64 / seconds;
+        let device = &entry.devices[0];
+        let mut limits = Vec::new();
+        self.limits
+            .for_each_name(|name| limits.push(name.to_owned()));
+        let mut faults = Vec::new();
+        self.faults
+            .for_each_name(|name| faults.push(name.to_owned()));
+        let events = report
+            .events
+            .iter()
+            .skip(report.events.len().saturating_sub(LATEST));
+        let figures = EngineFigures {
+            seconds: report.duration,
+            tissue_rate: rate(report.steps, self.steps),
+            tick_rate: rate(report.ticks, self.ticks),
+            missed: report.skipped,
+            tick_cpu: three(&report.tick_cpu),
+            lateness: three(&report.lateness),
+            step_cpu: three(&report.step_cpu),
+            tick_histogram: report.tick_cpu_histogram.clone(),
+            latency: finite(entry.tick.patch_age),
+            n_nodes: n_nodes as u32,
+            n_meshes: meshes,
+            limits,
+            faults,
+            energy_in: device.energy_in,
+            energy_out: device.energy_out,
+            energy_budget: entry.tick.energy_budget,
+            step_status: status_name(status).to_owned(),
+            granted: report.granted.iter().map(ToString::to_string).collect(),
+            events: events
+                .map(|event| EventInfo {
+                    time: event.time,
+                    level: level(event.level),
+                    text: event.text.clone(),
+                })
+                .collect(),
+            snapshot_rate: rate(snapshots, self.snapshots),
+        };
+        let notices = report.events[self.n_events.min(report.events.len())..]
+            .iter()
+            .filter(|event| event.level >= Level::Error)
+            .map(|event| Notice {
+                level: NoticeLevel::Error,
+                text: event.text.clone(),
+            })
+            .collect();
+        *self = Self {
+            at: now,
+            steps: report.steps,
+            ticks: report.ticks,
+            snapshots,
+            n_events: report.events.len(),
+            limits: Limits::NONE,
+            faults: Faults::NONE,
+        };
+        (figures, notices)
+    }
+}
+
+fn three(quantiles: &Quantiles) -> [f64; 3] {
+    [quantiles.p50, quantiles.p999, quantiles.max].map(finite)
+}
+
+/// JSON has no infinity.
+fn finite(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
+}
+
+fn level(level: Level) -> NoticeLevel {
+    match level {
+        Level::Info => NoticeLevel::Info,
+        Level::Warning => NoticeLevel::Warning,
+        Level::Error => NoticeLevel::Error,
+    }
+}
+
+fn status_name(status: u8) -> &'static str {
+    let all = [
+        StepStatus::Converged,
+        StepStatus::Unfinished,
+        StepStatus::Behind,
+        StepStatus::Settling,
+        StepStatus::Failed,
+    ];
+    all.get(usize::from(status))
+        .map_or("", |status| status.name())
+}
