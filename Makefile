@@ -1,5 +1,6 @@
-# make run        press the embedded forearm; ends with where the picture is
-# make test       all tests that need nothing but this tree
+# make run        the viewer: a forearm to be touched, in a browser
+# make test       all tests that need nothing but this tree and a browser, which is installed where there is none
+# make dist       one binary with the page inside, packed for others
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation, without a warning
@@ -10,16 +11,35 @@ SHARED  ?= ../shared
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
 RESULTS := $(TARGET)/tmp/results
 VENV    := $(TARGET)/venv
+SHOTS   ?= $(TARGET)/tmp/screenshots
+PAGE    := web/dist/index.html
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 
-.PHONY: run test test-data shared lint docs bench loop
+.PHONY: run test test-page test-data shared lint docs bench loop dist
 
-run:
-	cargo run --release --package palpa -- press
+run: $(PAGE)
+	cargo run --release --package palpa -- view
 
-test:
+# The page is put into the binary, so it is built first.
+$(PAGE): web/package-lock.json web/index.html web/tsconfig.json web/vite.config.ts $(shell find web/src web/public -type f)
+	@command -v npm >/dev/null || { echo "make: the page needs Node.js 20.19 or newer with npm: https://nodejs.org" >&2; exit 1; }
+	cd web && npm ci --no-audit --no-fund && npm run build
+
+test: $(PAGE) test-page
 	@if command -v cargo-nextest >/dev/null; then cargo nextest run --workspace; \
 	else cargo test --workspace --lib --bins --tests; fi
 	cargo test --workspace --doc
+
+# The binary with its page in a real browser.
+test-page: $(PAGE)
+	cd web && npm run generate --silent && git diff --exit-code -- src/generated
+	cargo build --release --package palpa
+	node web/e2e/browser.mjs --install
+	cd web && PALPA_BIN="$(abspath $(TARGET))/release/palpa" PALPA_SHOTS="$(abspath $(SHOTS))" npm test
+
+dist: $(PAGE)
+	cargo build --release --package palpa
+	tools/dist.sh "$(TARGET)" "$(VERSION)"
 
 test-data: shared $(VENV)/ready
 	rm -rf "$(RESULTS)"

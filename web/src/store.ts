@@ -175,7 +175,8 @@ export function edit(...edits: [path: string, value: unknown][]): Promise<string
   return ask({ type: 'edit', edits: edits.map(([path, value]) => ({ path, value })) });
 }
 
-const galleryKey = computed(() => state.value?.gallery_key);
+/** Changes when another body is chosen. */
+export const galleryKey = computed(() => state.value?.gallery_key);
 effect(() => {
   // What was pressed before says nothing of another scene.
   void galleryKey.value;

@@ -123,6 +123,7 @@ export const en = {
   'view.hidden_by_game': 'While lumps are hidden, the cutaway, wireframe and maps of stiffness and stress are off.',
   'view.colours': 'Colours',
   'view.colour_by': 'Colour by',
+  'view.field_of_controller': 'Stresses and stretch are computed for the page that controls; take control to see this map.',
   'view.legend': 'Legend',
   'view.range': 'Range',
   'view.range_auto': 'Auto',
@@ -277,7 +278,7 @@ export const en = {
   'feedback.no_vibration': 'Works with a gamepad or on a phone.',
 
   'motion.title': 'Motion',
-  'motion.hint': 'The simulated hand moves by itself, over and over, at the place of the scene.',
+  'motion.hint': 'The simulated hand moves by itself, at the place of the scene.',
   'motion.run': 'Run',
   'motion.stop': 'Stop',
   'motion.kind': 'Kind',

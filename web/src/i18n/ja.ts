@@ -125,6 +125,7 @@ export const ja: Dictionary = {
   'view.hidden_by_game': 'しこりを隠している間は、断面・ワイヤーフレーム・硬さと応力の表示は使えません。',
   'view.colours': '色',
   'view.colour_by': '色分け',
+  'view.field_of_controller': '応力と伸長比は操作中のページのために計算されます。表示するには操作を引き継いでください。',
   'view.legend': '凡例',
   'view.range': '範囲',
   'view.range_auto': '自動',
@@ -279,7 +280,7 @@ export const ja: Dictionary = {
   'feedback.no_vibration': 'ゲームパッドまたはスマートフォンで使えます。',
 
   'motion.title': '動作',
-  'motion.hint': 'シーンの位置で、仮想の手が同じ動きを繰り返します。',
+  'motion.hint': 'シーンの位置で、仮想の手がひとりでに動きます。',
   'motion.run': '開始',
   'motion.stop': '停止',
   'motion.kind': '種類',

@@ -25,6 +25,10 @@ export class Gestures {
     canvas.addEventListener('pointermove', (e) => this.move(e), { signal });
     for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) canvas.addEventListener(type, (e) => this.up(e), { signal });
     canvas.addEventListener('wheel', (e) => this.wheel(e), { signal, passive: false });
+    // Focus that came by a pointer needs no ring; by script it would have one.
+    canvas.addEventListener('pointerdown', () => (canvas.dataset.focus = 'pointer'), { signal, capture: true });
+    canvas.addEventListener('keydown', () => delete canvas.dataset.focus, { signal, capture: true });
+    canvas.addEventListener('blur', () => delete canvas.dataset.focus, { signal });
     canvas.addEventListener('contextmenu', (e) => e.preventDefault(), { signal });
   }
 

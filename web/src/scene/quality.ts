@@ -3,8 +3,12 @@
 
 const SLOW = 38;
 const FAST = 14;
-const STILL_MS = 260;
-const STILL_RATIO = 2;
+const STILL_MS = 350;
+/** The same where a full picture takes long: it would stand in the way of what comes next. */
+const STILL_MS_SLOW = 900;
+/** Pixel ratios for pictures that stand still in software WebGL, which has no multisampling; the next when one took too long. */
+const STILL_RATIOS = [2, 1.5, 1];
+const STILL_TOO_LONG = 350;
 
 /** From the most to the least: share of the pixel ratio, shadows. */
 const STEPS = [
@@ -26,11 +30,11 @@ export function isSoftwareWebGL(): boolean | null {
 
 export class Quality {
   private step = 0;
+  private stillStep = 0;
   private slow = 0;
   private fast = 0;
   private fence: WebGLSync | null = null;
   private fencedAt = 0;
-  private lastDrawn = 0;
   private isFull = false;
   private timer = 0;
 
@@ -47,6 +51,7 @@ export class Quality {
     gl.deleteSync(this.fence);
     this.fence = null;
     if (!this.isFull) this.judge(took);
+    else if (this.isSoftware && took > STILL_TOO_LONG) this.stillStep = Math.min(this.stillStep + 1, STILL_RATIOS.length - 1);
     return true;
   }
 
@@ -68,30 +73,27 @@ export class Quality {
     }
   }
 
-  /** What to draw now: less while pictures follow each other. */
-  begin(now: number): { ratio: number; shadows: boolean } {
-    const isMoving = now - this.lastDrawn < STILL_MS && this.lastDrawn > 0;
-    this.isFull = !isMoving || (this.step === 0 && !this.isSoftware);
-    // Software WebGL has no multisampling (it costs threefold): a picture that stands still is drawn larger instead.
+  /** What to draw now: all of it when nothing has changed for a while, less while pictures follow each other. */
+  begin(isRefinement: boolean): { ratio: number; shadows: boolean } {
+    this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);
     const usual = Math.min(window.devicePixelRatio || 1, 2);
-    const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIO) : usual;
+    const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIOS[this.stillStep]) : usual;
     const step = STEPS[this.isFull ? 0 : this.step];
     return { ratio: most * step.ratio, shadows: step.shadows };
   }
 
   /** A picture has been handed to the GPU. */
-  end(now: number, isRefinement: boolean): void {
+  end(now: number): void {
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
     this.fencedAt = now;
-    this.lastDrawn = isRefinement ? 0 : now;
-    window.clearTimeout(this.timer);
-    if (!this.isFull) this.timer = window.setTimeout(() => this.refine(), STILL_MS);
+    if (!this.isFull) this.wait();
   }
 
-  private refine(): void {
-    this.lastDrawn = 0;
-    this.redraw();
+  /** Something has changed: what stands still is drawn in full later. */
+  wait(): void {
+    window.clearTimeout(this.timer);
+    if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, this.stillStep > 0 ? STILL_MS_SLOW : STILL_MS);
   }
 
   forget(): void {

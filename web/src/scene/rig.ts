@@ -21,7 +21,7 @@ export class CameraRig {
   private distance = 1;
   private fitted = 1;
   private radius = 0.1;
-  private turn: { from: [number, number, number, Vector3]; to: [number, number, number, Vector3]; since: number } | null = null;
+  private turn: { from: [number, number, number, Vector3]; to: [number, number, number, Vector3]; since: number | null } | null = null;
   reducedMotion = false;
 
   constructor(private readonly onChange: () => void) {
@@ -47,7 +47,7 @@ export class CameraRig {
       this.turn = {
         from: [this.azimuth, this.elevation, this.distance, this.target.clone()],
         to: [near, elevation, distance, centre],
-        since: performance.now(),
+        since: null,
       };
     } else {
       this.turn = null;
@@ -118,7 +118,8 @@ export class CameraRig {
   /** Goes on with a turn. */
   step(now: number): void {
     if (!this.turn) return;
-    const { from, to, since } = this.turn;
+    const { from, to } = this.turn;
+    const since = (this.turn.since ??= now);
     const t = Math.min(1, (now - since) / TURN_MS);
     const s = t * t * (3 - 2 * t);
     this.azimuth = MathUtils.lerp(from[0], to[0], s);

@@ -23,6 +23,9 @@ export interface SurfacesLook {
   wire: { on: boolean; colour: string; opacity: number };
 }
 
+/** Materials by what they are of. They outlive meshes: a new one takes three many times as long as a new mesh. */
+export type Materials = Map<string, SurfaceMaterial>;
+
 export class Surfaces {
   readonly group = new Group();
   private readonly position: BufferAttribute;
@@ -30,7 +33,6 @@ export class Surfaces {
   private readonly rest: BufferAttribute;
   readonly value: BufferAttribute;
   private readonly geometries: BufferGeometry[] = [];
-  private readonly materials: SurfaceMaterial[] = [];
   private readonly outer: Mesh<BufferGeometry, SurfaceMaterial>[] = [];
   private readonly inner: Mesh<BufferGeometry, SurfaceMaterial>[] = [];
   private readonly walls: Mesh<BufferGeometry, SurfaceMaterial>[] = [];
@@ -44,6 +46,7 @@ export class Surfaces {
     private readonly shared: SharedUniforms,
     private readonly stage: Stage,
     private readonly planes: Plane[],
+    private readonly materials: Materials,
   ) {
     const dynamic = (data: Float32Array, size: number) => {
       const attribute = new BufferAttribute(data, size);
@@ -58,11 +61,11 @@ export class Surfaces {
     const { layerStart, nLevels, triangles } = body;
     for (let layer = 0; layer < layerStart.length; layer++) {
       const from = layerStart[layer], to = layerStart[layer + 1] ?? nLevels - 1;
-      this.outer.push(this.mesh(triangles.map((v) => v * nLevels + from)));
-      this.inner.push(this.mesh(triangles.map((v) => v * nLevels + to)));
-      this.walls.push(this.mesh(wallTriangles(body, from, to)));
+      this.outer.push(this.mesh(`outer ${layer}`, triangles.map((v) => v * nLevels + from)));
+      this.inner.push(this.mesh(`inner ${layer}`, triangles.map((v) => v * nLevels + to)));
+      this.walls.push(this.mesh(`walls ${layer}`, wallTriangles(body, from, to)));
     }
-    this.core = this.mesh(body.coreTriangles);
+    this.core = this.mesh('core', body.coreTriangles);
     if (body.boneTriangles.length > 0) this.bones = this.boneMesh();
 
     // What lies deeper is drawn later, so that most of it is hidden before it is shaded.
@@ -96,16 +99,16 @@ export class Surfaces {
     return geometry;
   }
 
-  private mesh(index: Uint32Array): Mesh<BufferGeometry, SurfaceMaterial> {
-    return this.add(this.geometry(index));
+  private mesh(name: string, index: Uint32Array): Mesh<BufferGeometry, SurfaceMaterial> {
+    return this.add(name, this.geometry(index));
   }
 
-  private add(geometry: BufferGeometry): Mesh<BufferGeometry, SurfaceMaterial> {
-    const material = new SurfaceMaterial(this.shared, this.stage.light, this.planes);
+  private add(name: string, geometry: BufferGeometry): Mesh<BufferGeometry, SurfaceMaterial> {
+    const material = this.materials.get(name) ?? new SurfaceMaterial(this.shared, this.stage.light, this.planes);
+    this.materials.set(name, material);
     const mesh = new Mesh(geometry, material);
     mesh.frustumCulled = false;
     mesh.castShadow = mesh.receiveShadow = true;
-    this.materials.push(material);
     this.group.add(mesh);
     return mesh;
   }
@@ -119,7 +122,7 @@ export class Surfaces {
     geometry.setIndex(new BufferAttribute(this.body.boneTriangles, 1));
     geometry.computeVertexNormals();
     this.geometries.push(geometry);
-    return this.add(geometry);
+    return this.add('bones', geometry);
   }
 
   style({ layers, isMapped, isTissue, bones, core, bone, wire }: SurfacesLook): void {
@@ -169,7 +172,6 @@ export class Surfaces {
 
   dispose(): void {
     for (const geometry of this.geometries) geometry.dispose();
-    for (const material of this.materials) material.dispose();
     this.wire.material.dispose();
     this.group.removeFromParent();
   }

@@ -19,13 +19,31 @@ import { Quality, isSoftwareWebGL } from './quality';
 import { CameraRig, SIDES } from './rig';
 import { SectionView } from './sectionview';
 import { Stage } from './stage';
-import { Surfaces, type LayerLook } from './surfaces';
+import { Surfaces, type LayerLook, type Materials } from './surfaces';
 import { ToolView } from './tool';
 
 /** A new mesh waits so long for its first frame: shown without it, a pressed body would jump to rest and back. */
 const MESH_WAIT = 400;
 /** Opacity of all layers while the truth of a game is shown. */
 const TRUTH_OPACITY = 0.38;
+
+/** Changes too small to be seen: m, N. */
+const UNSEEN_LENGTH = 5e-6;
+const UNSEEN_FORCE = 0.004;
+
+/** Whether two frames of a mesh look alike. */
+function isSame(a: FrameSnapshot, b: FrameSnapshot): boolean {
+  if (a.field !== b.field || a.displacements.length !== b.displacements.length || a.is_replay !== b.is_replay) return false;
+  for (let c = 0; c < 3; c++) {
+    if (Math.abs(a.tool[c] - b.tool[c]) > UNSEEN_LENGTH || Math.abs(a.force[c] - b.force[c]) > UNSEEN_FORCE) return false;
+  }
+  const dot = a.orientation[0] * b.orientation[0] + a.orientation[1] * b.orientation[1] + a.orientation[2] * b.orientation[2] + a.orientation[3] * b.orientation[3];
+  if (Math.abs(dot) < 1 - 1e-7) return false;
+  for (let i = 0; i < a.displacements.length; i++) {
+    if (Math.abs(a.displacements[i] * a.displacement_unit - b.displacements[i] * b.displacement_unit) > UNSEEN_LENGTH) return false;
+  }
+  return true;
+}
 
 export class BodyView {
   onLegend: (legend: Legend | null) => void = () => {};
@@ -51,6 +69,7 @@ export class BodyView {
   private readonly clip = new Plane();
   /** Given to all materials that are cut; empty when nothing is. */
   private readonly planes: Plane[] = [];
+  private readonly materials: Materials = new Map();
   private readonly planeFrame = new Lines(1.2);
   private readonly sectionView = new SectionView(this.shared);
   private readonly lumps: LumpsView;
@@ -148,6 +167,8 @@ export class BodyView {
   setFrame(frame: FrameSnapshot): void {
     if (this.waitingMesh?.mesh === frame.mesh) this.takeMesh(this.waitingMesh);
     if (!this.body || frame.mesh !== this.body.id) return;
+    // Most frames of a body that nobody presses say the same again; a picture that stands still is drawn in full and left alone.
+    if (this.frame && isSame(this.frame, frame)) return;
     this.frame = frame;
     this.invalidate('frame');
   }
@@ -176,7 +197,7 @@ export class BodyView {
 
   /** PNG of what is seen, with the scale bar. */
   async image(): Promise<Blob> {
-    this.draw(performance.now(), { ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true });
+    this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true });
     const out = document.createElement('canvas');
     out.width = this.canvas.width;
     out.height = this.canvas.height;
@@ -268,6 +289,7 @@ export class BodyView {
     this.gestures.dispose();
     this.quality.dispose();
     this.surfaces?.dispose();
+    for (const material of this.materials.values()) material.dispose();
     this.sectionView.dispose();
     this.planeFrame.dispose();
     this.lumps.dispose();
@@ -302,7 +324,7 @@ export class BodyView {
     const isOther = !this.body || this.isOther(mesh);
     this.surfaces?.dispose();
     this.body = new Body(mesh);
-    this.surfaces = new Surfaces(this.body, this.shared, this.stage, this.planes);
+    this.surfaces = new Surfaces(this.body, this.shared, this.stage, this.planes, this.materials);
     this.stage.scene.add(this.surfaces.group);
     this.stage.setBody(this.body);
     this.frame = null;
@@ -355,6 +377,10 @@ export class BodyView {
   private invalidate(what: keyof BodyView['changed']): void {
     if (!this.changed) return; // The rig reports while the view is still being made.
     this.changed[what] = true;
+    if (what !== 'shadow') {
+      this.isRefining = false;
+      this.quality?.wait();
+    }
     if (this.isAsked || this.stop.signal.aborted) return;
     this.isAsked = true;
     requestAnimationFrame((now) => this.tick(now));
@@ -364,13 +390,13 @@ export class BodyView {
     this.isAsked = false;
     if (this.stop.signal.aborted || document.hidden) return;
     if (!this.quality.isReady(now)) {
-      this.invalidate('camera');
+      this.isAsked = true;
+      requestAnimationFrame((next) => this.tick(next));
       return;
     }
     this.rig.step(now);
-    const how = this.quality.begin(now);
-    this.draw(now, how);
-    this.quality.end(now, this.isRefining);
+    this.draw(this.quality.begin(this.isRefining));
+    this.quality.end(now);
     this.isRefining = false;
     if (this.rig.isTurning) this.invalidate('camera');
     if (this.isFirst && this.body) {
@@ -379,7 +405,7 @@ export class BodyView {
     }
   }
 
-  private draw(_now: number, how: { ratio: number; shadows: boolean }): void {
+  private draw(how: { ratio: number; shadows: boolean }): void {
     const { changed, renderer, body, surfaces, options } = this;
     if (body && surfaces) {
       const isMoved = changed.frame || changed.style;

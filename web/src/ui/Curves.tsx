@@ -99,7 +99,7 @@ function dataOf(kind: Kind): uPlot.AlignedData {
       // uPlot's type knows aligned data only; facets are documented for mode 2.
       return [null, [depthsInMillimetres(), history.forces]] as unknown as uPlot.AlignedData;
     case 'force-time':
-      return [relativeTimes(), history.forces, history.axials];
+      return [relativeTimes(), history.axials, history.forces];
     case 'depth-time':
       return [relativeTimes(), depthsInMillimetres()];
   }
@@ -137,8 +137,8 @@ function options(kind: Kind, element: HTMLElement): uPlot.Options {
     : isDepth
       ? [{ stroke: colour('--depth'), width: 1.75, points: { show: false } }]
       : [
-          { stroke: colour('--force'), width: 1.75, points: { show: false } },
           { stroke: colour('--ink-muted'), width: 1.25, dash: [4, 3], points: { show: false } },
+          { stroke: colour('--force'), width: 1.75, points: { show: false } },
         ];
   return {
     ...sizeOf(element),

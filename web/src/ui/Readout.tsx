@@ -61,7 +61,8 @@ function ForceNumber() {
       gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
       gauge.current!.setAttribute('aria-valuemax', String(axes.force));
       scale.current!.textContent = `${formatNumber(axes.force)} N`;
-      gain.value = Math.round(newest.gain * 100);
+      // Above the skin nothing is missed.
+      gain.value = newest.depth > 0 ? Math.round(newest.gain * 100) : 100;
       newest = null;
     };
     const stop = onFrame((frame) => {

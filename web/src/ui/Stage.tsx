@@ -1,6 +1,6 @@
 // The body, and what lies over it: legend, building, problems, replay and game.
 
-import { effect } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { t } from '../i18n';
 import { HandControl } from '../hand';
@@ -8,7 +8,7 @@ import { BodyView, NoWebGL2, type Vec3 } from '../scene';
 import {
   ask, askAloud, edit, isController, isReplaying, isWatching, notify, onFrame, onMesh, scene, send, state,
 } from '../store';
-import { bodyView, legend, section } from './body';
+import { bodyView, firstBodyMs, legend, section } from './body';
 import { Button, Segmented } from './controls';
 import { GameBar } from './GameBar';
 import { Icon } from './icons';
@@ -18,12 +18,9 @@ import { saveImage } from './save';
 import { writtenPoint } from './quantity';
 import { handMode, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
 
-export const firstBody = { ms: 0 };
-
 export function Stage() {
   const container = useRef<HTMLDivElement>(null);
   const [problem, setProblem] = useState<'none' | 'webgl' | 'other'>('none');
-  const [firstMs, setFirstMs] = useState<number | null>(null);
 
   useEffect(() => {
     let body: BodyView;
@@ -38,9 +35,7 @@ export function Stage() {
     body.onSection = (next) => (section.value = next);
     body.onCutaway = (position) => show({ cutaway: { ...wanted.peek().cutaway, position } });
     body.onFirstBody = () => {
-      const mark = performance.mark('palpa-first-body');
-      firstBody.ms = mark.startTime;
-      setFirstMs(mark.startTime);
+      firstBodyMs.value = performance.mark('palpa-first-body').startTime;
     };
     const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false });
     hand.onTarget = (target) => {
@@ -74,7 +69,7 @@ export function Stage() {
   return (
     <main class={`stage ${picking.value === null ? '' : 'picking'}`} aria-label={t('app.body')}>
       <div class="canvas-place" ref={container} />
-      <span hidden data-testid="first-body-ms" data-ms={firstMs ?? ''}>{firstMs?.toFixed(0)}</span>
+      <span hidden data-testid="first-body-ms" data-ms={firstBodyMs.value ?? ''}>{firstBodyMs.value?.toFixed(0)}</span>
       {problem === 'none' ? <StageTools /> : <NoBody isWebGL={problem === 'webgl'} />}
       <div class="stage-top">
         <GameBar />
@@ -99,7 +94,7 @@ function takePicked(point: Vec3): void {
     return;
   }
   picking.value = null;
-  const refusal = purpose.kind === 'place' ? edit(['/press/vertex', null], ['/press/at', writtenPoint(point)]) : moveLump(purpose.index, point);
+  const refusal = purpose.kind === 'place' ? movePress(point) : moveLump(purpose.index, point);
   void refusal.then((error) => error !== null && notify('warning', error));
 }
 
@@ -108,6 +103,12 @@ async function markLump(point: Vec3): Promise<void> {
   if (error !== null) notify('warning', error);
   const game = state.peek()?.game;
   if (game != null && game.marks.length >= game.n_lumps) picking.value = null;
+}
+
+function movePress(point: Vec3): Promise<string | null> {
+  const changed = { ...scene.peek()?.press, at: writtenPoint(point) };
+  delete changed.vertex;
+  return edit(['/press', changed]);
 }
 
 /** Under another place, as deep as it was. */
@@ -174,17 +175,23 @@ function NoBody({ isWebGL }: { isWebGL: boolean }) {
   );
 }
 
+/** What was read of what could not be built. */
+const dismissed = signal<string | null>(null);
+
 function Phase() {
   const now = state.value;
   if (now === null) return <p class="chip building" role="status">{t('phase.waiting')}</p>;
   if (now.phase === 'building') {
     return <p class="chip building" role="status" data-testid="building"><span class="spinner" aria-hidden="true" />{t('phase.building_long')}</p>;
   }
-  if (now.phase !== 'stopped' && now.problem == null) return null;
+  if (now.phase !== 'stopped' && (now.problem == null || now.problem === dismissed.value)) return null;
   return (
     <div class={`problem ${now.phase}`} role="alert" data-testid="problem">
       <strong>{t(now.phase === 'stopped' ? 'phase.stopped_long' : 'phase.not_built')}</strong>
       {now.problem != null && <p>{now.problem}</p>}
+      {now.phase === 'running' && (
+        <Button onClick={() => (dismissed.value = now.problem ?? null)}>{t('notices.dismiss')}</Button>
+      )}
       {now.phase === 'stopped' && (
         <Button kind="primary" disabled={!isController.value} onClick={() => void askAloud({ type: 'restart' })} testid="restart">
           {t('engine.restart')}

@@ -7,3 +7,5 @@ export const bodyView = signal<BodyView | null>(null);
 export const legend = signal<Legend | null>(null);
 /** Area of the cutaway's section, m². */
 export const section = signal<{ total: number; layers: number[]; lumps: number } | null>(null);
+/** From the page's begin to its first body, ms. */
+export const firstBodyMs = signal<number | null>(null);

@@ -94,6 +94,22 @@ export function Toggle(props: {
   );
 }
 
+/** How long an answer may take before what was there is shown again. */
+const ANSWER_WAIT = 600;
+
+/** What was chosen, shown while the engine builds what it says, and until that is there. */
+function usePending<T>(value: T): [shown: T, choose: (chosen: T) => void] {
+  const [pending, setPending] = useState<{ value: T } | null>(null);
+  const phase = state.value?.phase;
+  useEffect(() => setPending(null), [value]);
+  useEffect(() => {
+    if (pending === null || phase === 'building') return;
+    const timer = window.setTimeout(() => setPending(null), ANSWER_WAIT);
+    return () => window.clearTimeout(timer);
+  }, [pending, phase]);
+  return [pending === null ? value : pending.value, (chosen) => setPending({ value: chosen })];
+}
+
 export function Select<T extends string>(props: {
   label: string;
   value: T | '';
@@ -104,18 +120,23 @@ export function Select<T extends string>(props: {
   testid?: string;
 }) {
   const id = useId();
-  const isKnown = props.options.some((option) => option.value === props.value);
+  const [shown, choose] = usePending<T | ''>(props.value);
+  const isKnown = props.options.some((option) => option.value === shown);
   return (
     <div class={props.isLabelHidden ? 'select-alone' : 'row'}>
       <label for={id} class={props.isLabelHidden ? 'sr-only' : ''}>{props.label}</label>
       <select
         id={id}
-        value={props.value}
+        value={shown}
         disabled={props.disabled}
-        onChange={(event) => props.onChange(event.currentTarget.value as T)}
+        onChange={(event) => {
+          const chosen = event.currentTarget.value as T;
+          choose(chosen);
+          props.onChange(chosen);
+        }}
         data-testid={props.testid}
       >
-        {!isKnown && <option value={props.value}>{props.value === '' ? '–' : props.value}</option>}
+        {!isKnown && <option value={shown}>{shown === '' ? '–' : shown}</option>}
         {props.options.map((option) => (
           <option key={option.value} value={option.value} disabled={option.disabled}>{option.label}</option>
         ))}
@@ -134,19 +155,23 @@ export function Segmented<T extends string>(props: {
   isLabelHidden?: boolean;
 }) {
   const name = useId();
+  const [shown, choose] = usePending(props.value);
   return (
     <div class={props.isLabelHidden ? 'segmented-alone' : 'row'} role="radiogroup" aria-label={props.label}>
       {!props.isLabelHidden && <span class="label" aria-hidden="true">{props.label}</span>}
       <div class="segmented">
         {props.options.map((option) => (
-          <label key={option.value} class={props.value === option.value ? 'chosen' : ''}>
+          <label key={option.value} class={shown === option.value ? 'chosen' : ''}>
             <input
               type="radio"
               name={name}
               value={option.value}
-              checked={props.value === option.value}
+              checked={shown === option.value}
               disabled={props.disabled}
-              onChange={() => props.onChange(option.value)}
+              onChange={() => {
+                choose(option.value);
+                props.onChange(option.value);
+              }}
               data-testid={option.testid}
             />
             <span>{option.label}</span>
@@ -262,13 +287,18 @@ export function QuantityField(props: {
   const [draft, setDraft] = useState<string | null>(null);
   const [error, setError] = useState<string | null>(null);
   const [isSliding, setSliding] = useState(false);
+  const committed = useRef<string | null>(null);
   // What was committed is shown until the engine says what it has made of it.
   useEffect(() => {
     if (!isSliding) setDraft(null);
     setError(null);
   }, [props.value]);
+  // What could not be built is not there: then the field says again what is.
+  const isBuilding = state.value?.phase === 'building';
+  useEffect(() => {
+    if (!isBuilding && !isSliding && draft !== null && draft === committed.current) setDraft(null);
+  }, [isBuilding]);
   const commitLatest = useLatest(props.onCommit, setError);
-  const committed = useRef<string | null>(null);
 
   const value = tidied(props.value, props.dimension);
   const shown = draft ?? value;
@@ -321,7 +351,7 @@ export function QuantityField(props: {
           aria-valuetext={shown}
           disabled={props.disabled}
           onInput={(event) => {
-            const text = formatQuantity(fromSlider(event.currentTarget.valueAsNumber, props.range!), props.dimension, 2);
+            const text = formatQuantity(fromSlider(event.currentTarget.valueAsNumber, props.range!), props.dimension, 3);
             setSliding(true);
             setDraft(text);
             committed.current = text;

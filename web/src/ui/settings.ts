@@ -1,8 +1,8 @@
 // What a user chose for this browser, remembered between visits, and how the body is shown now.
 
-import { computed, effect, signal, type Signal } from '@preact/signals';
+import { batch, computed, effect, signal, type Signal } from '@preact/signals';
 import { DEFAULT_OPTIONS, type ColourBy, type ViewOptions } from '../scene';
-import { isHiding, state, type Vec3 } from '../store';
+import { galleryKey, isHiding, state, type Vec3 } from '../store';
 import type { Field } from '../generated/api';
 
 const PREFIX = 'palpa.';
@@ -110,4 +110,15 @@ export const view = computed<ViewOptions>(() => {
 export const neededField = computed<Field>(() => {
   const colourBy = view.value.colourBy;
   return colourBy === 'von_mises' || colourBy === 'pressure' || colourBy === 'stretch' ? colourBy : 'none';
+});
+
+effect(() => {
+  // Another body has other layers, another usual depth, other places.
+  void galleryKey.value;
+  batch(() => {
+    chosenDepth.value = null;
+    lastTouched.value = null;
+    picking.value = null;
+    wanted.value = { ...wanted.peek(), layers: [], range: null };
+  });
 });

@@ -15,7 +15,11 @@ const MOST_ITEMS: usize = 100;
 /// # Errors
 /// Never for a scene that was read; scenes made by programs may hold what TOML cannot say.
 pub fn to_json(scene: &Scene) -> anyhow::Result<Value> {
-    let table: toml::Value = toml::from_str(&scene.to_toml_in_full())?;
+    as_json(&scene.to_toml_in_full())
+}
+
+fn as_json(text: &str) -> anyhow::Result<Value> {
+    let table: toml::Value = toml::from_str(text)?;
     Ok(serde_json::to_value(table)?)
 }
 
@@ -24,12 +28,31 @@ pub fn to_json(scene: &Scene) -> anyhow::Result<Value> {
 /// # Errors
 /// Which edit leads nowhere, or what is wrong with the scene that they make.
 pub fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
-    let mut value = to_json(scene)?;
+    let in_full = to_json(scene)?;
+    let mut value = in_full.clone();
     for edit in edits {
         apply(&mut value, edit).with_context(|| format!("edit of \"{}\"", edit.path))?;
     }
+    name_again(&mut value, &in_full, &as_json(&scene.to_toml())?);
     let text = toml::to_string(&without_nulls(value)).context("the edits make no scene file")?;
     parsed(&text, &scene.base_dir)
+}
+
+/// Tissues that are as they were get their names back, and with them what the catalogue knows of their sources.
+fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
+    for list in ["layer", "lump"] {
+        let tissues = |scene: &Value| -> Vec<Value> {
+            let items = scene[list].as_array().map_or(&[][..], Vec::as_slice);
+            items.iter().map(|item| item["tissue"].clone()).collect()
+        };
+        let before: Vec<_> = tissues(in_full).into_iter().zip(tissues(named)).collect();
+        for item in value[list].as_array_mut().into_iter().flatten() {
+            let same = before.iter().find(|(full, _)| *full == item["tissue"]);
+            if let (Some((_, name)), Some(item)) = (same, item.as_object_mut()) {
+                item.insert("tissue".to_owned(), name.clone());
+            }
+        }
+    }
 }
 
 /// A scene from text, with the error in one line.

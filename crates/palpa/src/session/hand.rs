@@ -188,6 +188,11 @@ impl HandDriver {
         self.tip
     }
 
+    /// Whether it is on its way through the air.
+    pub fn is_travelling(&self) -> bool {
+        matches!(self.doing, Doing::Travel(_))
+    }
+
     /// Whether it is at rest over the skin.
     pub fn is_lifted(&self) -> bool {
         self.doing == Doing::There && self.depth <= -HOVER

@@ -626,9 +626,12 @@ impl Body {
         live.figures.note(&live.entry);
         let frame = live.world.scene_from_device;
         let tip = (frame * Point3::from(live.entry.devices[0].position)).coords;
-        let over = match &self.motion {
-            Some(Motion::Moving { .. }) => live.world.skin.nearest(tip).unwrap_or(live.world.home),
-            _ => *live.hand.place(),
+        let is_elsewhere =
+            matches!(self.motion, Some(Motion::Moving { .. })) || live.hand.is_travelling();
+        let over = if is_elsewhere {
+            live.world.skin.nearest(tip).unwrap_or(live.world.home)
+        } else {
+            *live.hand.place()
         };
         frame::put_tick(
             &mut self.frame,

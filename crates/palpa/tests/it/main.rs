@@ -13,6 +13,7 @@ mod press;
 mod press_tissue;
 mod section;
 mod verify;
+mod view;
 mod vtu;
 
 use std::path::PathBuf;

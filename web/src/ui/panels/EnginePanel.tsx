@@ -3,6 +3,7 @@
 import { t } from '../../i18n';
 import { askAloud, figures, isController, state } from '../../store';
 import type { EngineFigures, FaultKind } from '../../generated/api';
+import { firstBodyMs } from '../body';
 import { Button, Controlled, Section } from '../controls';
 import { formatNumber, withPrefix } from '../quantity';
 
@@ -41,6 +42,7 @@ function Figures({ now }: { now: EngineFigures }) {
     [t('engine.meshes'), now.n_meshes.toLocaleString()],
     [t('engine.step'), now.step_status],
   ];
+  if (firstBodyMs.value !== null) rows.push([t('engine.first_body'), `${formatNumber(firstBodyMs.value / 1e3)} s`]);
   return (
     <>
       <Section title={t('engine.rates')}>
@@ -116,7 +118,7 @@ function Histogram({ now }: { now: EngineFigures }) {
   if (counted.length === 0) return null;
   const first = Math.max(counted[0][0], 1e-8);
   const last = Math.max(counted[counted.length - 1][1], 2 * first);
-  const bars = gathered(counted, first, last);
+  const bars = counted.length <= BARS ? counted : gathered(counted, first, last);
   const across = (seconds: number): number => (WIDTH * Math.log(Math.max(seconds, first) / first)) / Math.log(last / first);
   const most = Math.log10(1 + Math.max(...bars.map(([, , count]) => count)));
   const decades = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2].filter((value) => value >= first && value <= last);

@@ -1,7 +1,7 @@
 // Lumps: put in, moved, made larger and harder.
 
 import { signal } from '@preact/signals';
-import { t } from '../../i18n';
+import { named, t } from '../../i18n';
 import { edit, isHiding, scene, state } from '../../store';
 import { aloud, Button, Controlled, QuantityField, Section, Select } from '../controls';
 import { formatQuantity, withUnit, writtenPoint, writtenQuantity } from '../quantity';
@@ -70,15 +70,16 @@ function NewLump({ lumps }: { lumps: LumpTable[] }) {
 function LumpFields({ index, lump }: { index: number; lump: LumpTable }) {
   const path = `/lump/${index}`;
   const shape = lump.shape ?? 'sphere';
+  const name = named('tissue', lump.name ?? t('lumps.name_of_new', { number: index + 1 }));
   const isPicking = picking.value?.kind === 'lump' && picking.value.index === index;
   return (
     <Section
-      title={lump.name ?? t('lumps.name_of_new', { number: index + 1 })}
+      title={name}
       action={
         <Button
           kind="quiet"
           onClick={() => aloud(edit([path, null]))}
-          label={t('lumps.remove_named', { name: lump.name ?? String(index + 1) })}
+          label={t('lumps.remove_named', { name })}
           testid={`lump-${index}-remove`}
         >
           {t('lumps.remove')}

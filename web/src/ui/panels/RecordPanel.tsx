@@ -1,11 +1,13 @@
 // Recording what is felt, looking at it again, and taking it along.
 
+import { useEffect, useState } from 'preact/hooks';
 import { t } from '../../i18n';
 import { askAloud, state } from '../../store';
 import { Button, Controlled, Download, Section } from '../controls';
 
 export function RecordPanel() {
   const recording = state.value?.recording;
+  const seconds = useElapsed(recording?.is_recording ?? false);
   const hasOne = recording !== undefined && recording.duration > 0 && !recording.is_recording;
   return (
     <>
@@ -29,7 +31,9 @@ export function RecordPanel() {
             {recording?.is_recording && <span class="recording-dot" aria-hidden="true" />}
             {recording === undefined || (recording.duration === 0 && !recording.is_recording)
               ? t('record.none')
-              : t(recording.is_recording ? 'record.running' : 'record.kept', { seconds: recording.duration.toFixed(1) })}
+              : t(recording.is_recording ? 'record.running' : 'record.kept', {
+                  seconds: (recording.is_recording ? Math.max(seconds, recording.duration) : recording.duration).toFixed(1),
+                })}
           </p>
         </Section>
         <Section title={t('record.replay')}>
@@ -52,4 +56,17 @@ export function RecordPanel() {
       </Section>
     </>
   );
+}
+
+/** Seconds since it is on: states come only when something changes. */
+function useElapsed(isOn: boolean): number {
+  const [seconds, setSeconds] = useState(0);
+  useEffect(() => {
+    setSeconds(0);
+    if (!isOn) return;
+    const began = performance.now();
+    const timer = window.setInterval(() => setSeconds((performance.now() - began) / 1e3), 200);
+    return () => window.clearInterval(timer);
+  }, [isOn]);
+  return seconds;
 }

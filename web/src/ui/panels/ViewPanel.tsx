@@ -1,12 +1,12 @@
 // How the body is shown: colours, layers, the cutaway.
 
 import { named, t, type Key } from '../../i18n';
-import { isHiding, notify, state } from '../../store';
+import { isHiding, isWatching, notify, state } from '../../store';
 import type { ColourBy, ViewOptions } from '../../scene';
 import { Button, Section, Segmented, Select, Slider, Toggle } from '../controls';
 import { bodyView, legend, section } from '../body';
 import { parseQuantity, formatNumber } from '../quantity';
-import { isTelling, show, view, wanted } from '../settings';
+import { isTelling, neededField, show, view, wanted } from '../settings';
 import { saveImage } from '../save';
 import { useId, useState } from 'preact/hooks';
 
@@ -39,6 +39,9 @@ export function ViewPanel() {
           onChange={(colourBy) => show({ colourBy, range: null })}
           testid="colour-by"
         />
+        {isWatching.value && neededField.value !== 'none' && neededField.value !== state.value?.field && (
+          <p class="hint" role="note">{t('view.field_of_controller')}</p>
+        )}
         <RangeFields options={options} />
       </Section>
       <Section title={t('view.cutaway')}>

@@ -1,0 +1,419 @@
+//! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested in `web/e2e`.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// How long a slow machine may take for anything.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+const GEL: &str = r#"
+[body]
+generator = { kind = "block", size = ["60 mm", "60 mm", "20 mm"], spacing = "10 mm" }
+[[layer]]
+tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
+levels = 2
+[tool]
+shape = "sphere"
+radius = "10 mm"
+[press]
+at = ["0 mm", "0 mm", "0 mm"]
+depth = "3 mm"
+[mesh]
+near_tool = "5 mm"
+growth = 1.0
+[motion]
+depth = "4 mm"
+"#;
+
+struct Viewer {
+    process: Child,
+    url: String,
+    folder: TempDir,
+}
+
+impl Viewer {
+    fn start(more: &[&str]) -> Self {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("gel.toml"), GEL).unwrap();
+        let mut process = Command::new(env!("CARGO_BIN_EXE_palpa"))
+            .args(["view", "--no-open", "--port", "0", "--json", "gel.toml"])
+            .args(more)
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
+        let mut text = String::new();
+        let started: Value = loop {
+            text += &lines.next().unwrap().unwrap();
+            if let Ok(value) = serde_json::from_str(&text) {
+                break value;
+            }
+        };
+        let url = started["url"].as_str().unwrap().to_owned();
+        let viewer = Self {
+            process,
+            url,
+            folder,
+        };
+        viewer.wait_until(|state| state["phase"] == "running");
+        viewer
+    }
+
+    fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        let agent = agent();
+        let mut answer = agent.get(format!("{}{path}", self.url)).call().unwrap();
+        let mut body = Vec::new();
+        answer
+            .body_mut()
+            .as_reader()
+            .read_to_end(&mut body)
+            .unwrap();
+        (answer.status().as_u16(), body)
+    }
+
+    fn json(&self, path: &str) -> Value {
+        serde_json::from_slice(&self.get(path).1).unwrap()
+    }
+
+    /// Status and words of a refusal.
+    fn post(&self, text: &str) -> (u16, String) {
+        let agent = agent();
+        let mut answer = agent
+            .post(format!("{}api/control", self.url))
+            .header("Content-Type", "application/json")
+            .send(text)
+            .unwrap();
+        let body = answer.body_mut().read_to_string().unwrap();
+        let words = serde_json::from_str::<Value>(&body).map_or(body, |reply| {
+            reply["error"].as_str().unwrap_or_default().to_owned()
+        });
+        (answer.status().as_u16(), words)
+    }
+
+    fn ask(&self, request: &Value) {
+        assert_eq!(
+            self.post(&request.to_string()),
+            (200, String::new()),
+            "{request}"
+        );
+    }
+
+    fn wait_until(&self, is_so: impl Fn(&Value) -> bool) -> Value {
+        let began = Instant::now();
+        loop {
+            let state = self.json("api/state");
+            if is_so(&state) {
+                return state;
+            }
+            assert!(began.elapsed() < PATIENCE, "{state:#}");
+            sleep(Duration::from_millis(50));
+        }
+    }
+
+    fn press(&self, depth: f64, seconds: f64) {
+        let home = self.json("api/state")["home"].clone();
+        let began = Instant::now();
+        while began.elapsed().as_secs_f64() < seconds {
+            let hand = json!({ "type": "hand", "point": home["point"], "normal": home["normal"], "depth": depth });
+            self.ask(&hand);
+            sleep(Duration::from_millis(100));
+        }
+    }
+
+    fn record(&self, depth: f64) -> Vec<[f64; 4]> {
+        self.ask(&json!({ "type": "start_recording" }));
+        self.press(depth, 3.0);
+        self.ask(&json!({ "type": "lift" }));
+        sleep(Duration::from_millis(800));
+        self.ask(&json!({ "type": "stop_recording" }));
+        let (status, table) = self.get("api/recording.csv");
+        assert_eq!(status, 200);
+        rows(&table)
+    }
+
+    fn stop(mut self) -> ExitStatus {
+        let pid = self.process.id().to_string();
+        assert!(
+            Command::new("kill")
+                .args(["-INT", &pid])
+                .status()
+                .unwrap()
+                .success()
+        );
+        self.process.wait().unwrap()
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn agent() -> ureq::Agent {
+    ureq::Agent::config_builder()
+        .http_status_as_error(false)
+        .timeout_global(Some(PATIENCE))
+        .build()
+        .into()
+}
+
+/// Time and force of every tick.
+fn rows(table: &[u8]) -> Vec<[f64; 4]> {
+    let text = std::str::from_utf8(table).unwrap();
+    let mut lines = text.lines();
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| columns.iter().position(|c| *c == name).unwrap();
+    let wanted = ["now", "force_x", "force_y", "force_z"].map(column);
+    lines
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            wanted.map(|c| cells[c].parse().unwrap())
+        })
+        .collect()
+}
+
+fn largest(rows: &[[f64; 4]]) -> f64 {
+    let size = |row: &[f64; 4]| (row[1] * row[1] + row[2] * row[2] + row[3] * row[3]).sqrt();
+    rows.iter().map(size).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_press_is_felt_is_released_and_its_recording_runs_again_to_the_bit() {
+    let viewer = Viewer::start(&[]);
+    let rows = viewer.record(4e-3);
+    assert!(rows.len() > 1000, "{} ticks", rows.len());
+    let most = largest(&rows);
+    assert!((0.05..8.0).contains(&most), "{most} N");
+    assert!(largest(&rows[rows.len() - 20..]) < 1e-6, "let go");
+    let log = viewer.folder.path().join("recording.mcap");
+    fs::write(&log, viewer.get("api/recording.mcap").1).unwrap();
+    let replay = Command::new(env!("CARGO_BIN_EXE_palpa"))
+        .args(["replay", "recording.mcap", "--json"])
+        .current_dir(viewer.folder.path())
+        .output()
+        .unwrap();
+    let found: Value = serde_json::from_slice(&replay.stdout).unwrap();
+    assert!(replay.status.success(), "{found:#}");
+    viewer.ask(&json!({ "type": "open_replay" }));
+    viewer.ask(&json!({ "type": "seek", "time": 1.5 }));
+    let state = viewer.wait_until(|state| state["recording"]["is_replaying"] == true);
+    assert!(state["recording"]["duration"].as_f64().unwrap() > 2.0);
+    assert_eq!(viewer.stop().code(), Some(0));
+}
+
+#[test]
+fn a_stiffer_tissue_is_felt_stiffer_and_a_lump_is_there() {
+    let viewer = Viewer::start(&[]);
+    let soft = largest(&viewer.record(4e-3));
+    viewer.ask(&json!({ "type": "edit", "edits": [{ "path": "/layer/0/tissue/young", "value": "40 kPa" }] }));
+    viewer.wait_until(|state| state["layers"][0]["stiffness"] == 40e3);
+    viewer.wait_until(|state| state["phase"] == "running");
+    let stiff = largest(&viewer.record(4e-3));
+    // A hand on a spring does not press four times as hard.
+    assert!(stiff > 1.5 * soft, "{soft} N, then {stiff} N");
+    let lump = json!({ "name": "pea", "shape": "sphere", "radius": "4 mm", "below": ["0 mm", "0 mm", "0 mm"],
+        "depth": "8 mm", "tissue": { "name": "hard", "young": "300 kPa", "poisson": 0.45 } });
+    viewer.ask(&json!({ "type": "edit", "edits": [{ "path": "/lump/-", "value": lump }] }));
+    let state = viewer.wait_until(|state| state["lumps"][0]["name"] == "pea");
+    assert!((state["lumps"][0]["centre"][2].as_f64().unwrap() + 8e-3).abs() < 1e-6);
+    let scene = String::from_utf8(viewer.get("api/scene.toml").1).unwrap();
+    assert!(scene.contains("pea") && scene.contains("40 kPa"), "{scene}");
+}
+
+#[test]
+fn hidden_lumps_stay_hidden_until_the_truth_is_asked_for() {
+    let viewer = Viewer::start(&[]);
+    viewer.ask(&json!({ "type": "load_scene", "key": "block" }));
+    viewer.wait_until(|s| s["gallery_key"] == "block" && s["phase"] == "running");
+    viewer.ask(&json!({ "type": "start_game", "seed": 7, "n_lumps": 2 }));
+    let state = viewer.wait_until(|s| s["game"]["n_lumps"] == 2 && s["phase"] == "running");
+    assert_eq!(state["lumps"], json!([]));
+    assert!(state["scene"].get("lump").is_none());
+    assert!(
+        !viewer
+            .get("api/scene.toml")
+            .1
+            .windows(6)
+            .any(|w| w == b"hidden")
+    );
+    let (code, words) = viewer.post(r#"{"type":"start_recording"}"#);
+    assert!(code == 409 && words.contains("hidden lumps"), "{words}");
+    viewer.press(4e-3, 2.0);
+    viewer.ask(&json!({ "type": "mark", "point": [0.01, 0.0, 0.0] }));
+    viewer.ask(&json!({ "type": "reveal" }));
+    let state = viewer.wait_until(|state| state["game"]["result"].is_object());
+    let result = &state["game"]["result"];
+    assert_eq!(result["lumps"].as_array().unwrap().len(), 2);
+    let errors = result["lumps"].as_array().unwrap().iter();
+    assert_eq!(errors.filter(|lump| lump["error"].is_number()).count(), 1);
+    assert!(result["max_force"].as_f64().unwrap() > 0.05, "{result:#}");
+    assert!(result["covered"].as_f64().unwrap() > 0.0);
+    viewer.ask(&json!({ "type": "end_game" }));
+    viewer
+        .wait_until(|s| s["game"].is_null() && s["lumps"] == json!([]) && s["phase"] == "running");
+}
+
+#[test]
+fn what_is_wrong_is_said_and_the_body_goes_on() {
+    let viewer = Viewer::start(&[]);
+    for (request, words) in [
+        (
+            json!({ "type": "edit", "edits": [{ "path": "/layer/0/tissue/young", "value": "12 apples" }] }),
+            "apples",
+        ),
+        (json!({ "type": "load_text", "text": "[body" }), "line 1"),
+        (
+            json!({ "type": "load_scene", "key": "nonsense" }),
+            "forearm",
+        ),
+        (json!({ "type": "open_replay" }), "no recording"),
+        (
+            json!({ "type": "mark", "point": [0, 0, 0] }),
+            "no lumps are hidden",
+        ),
+        (json!({ "type": "start_game", "n_lumps": 99 }), "1 to 3"),
+        (
+            json!({ "type": "inject", "fault": "tissue_panic" }),
+            "not allowed",
+        ),
+    ] {
+        let (code, found) = viewer.post(&request.to_string());
+        assert!(
+            code == 409 && found.contains(words),
+            "{request}: {code} {found}"
+        );
+    }
+    // A scene that can be read but not built: the body before stays.
+    let too_deep =
+        json!({ "type": "edit", "edits": [{ "path": "/motion/depth", "value": "30 mm" }] });
+    viewer.ask(&too_deep);
+    let state = viewer.wait_until(|state| state["problem"].is_string());
+    assert!(
+        state["problem"].as_str().unwrap().contains("depth"),
+        "{}",
+        state["problem"]
+    );
+    assert_eq!(
+        viewer.wait_until(|s| s["phase"] == "running")["scene"]["motion"]["depth"],
+        "4 mm"
+    );
+    assert_eq!(viewer.get("healthz").0, 200);
+    viewer.press(3e-3, 0.3);
+}
+
+#[test]
+fn a_fault_of_the_tissue_is_told_and_the_engine_starts_anew() {
+    let viewer = Viewer::start(&["--allow-faults"]);
+    let before = viewer.json("api/engine");
+    viewer.ask(&json!({ "type": "inject", "fault": "tissue_panic" }));
+    let began = Instant::now();
+    loop {
+        let now = viewer.json("api/engine");
+        if now["seconds"].as_f64() < before["seconds"].as_f64()
+            && now["tissue_rate"].as_f64() > Some(0.0)
+        {
+            break;
+        }
+        assert!(began.elapsed() < PATIENCE, "{now:#}");
+        sleep(Duration::from_millis(100));
+    }
+    assert!(largest(&viewer.record(4e-3)) > 0.05);
+}
+
+/// Whatever is asked, an answer comes and the body stays.
+#[test]
+fn nonsense_neither_stops_nor_fills_it() {
+    let viewer = Viewer::start(&[]);
+    let mut random = fastrand::Rng::with_seed(11);
+    let numbers = [0.0, -1.0, 1e308, -1e308, 1e-308, 0.02, 4e-3, 1e9];
+    for _ in 0..300 {
+        let mut number = || numbers[random.usize(..numbers.len())];
+        let vector = json!([number(), number(), number()]);
+        let (a, b) = (number(), vector.clone());
+        let path = [
+            "/layer/0/levels",
+            "/lump/-",
+            "/mesh/near_tool",
+            "/tool/radius",
+            "/x",
+            "",
+            "/layer/5",
+            "/press/at/1",
+        ];
+        let path = path[random.usize(..path.len())];
+        let words = [
+            "lift",
+            "stop_motion",
+            "reveal",
+            "unmark",
+            "close_replay",
+            "end_game",
+        ];
+        let word = words[random.usize(..words.len())];
+        let request = match random.u8(..9) {
+            0..=2 => json!({ "type": "hand", "point": vector, "normal": b, "depth": a }),
+            3 => json!({ "type": "seek", "time": a }),
+            4 => json!({ "type": "mark", "point": vector }),
+            5 => json!({ "type": "edit", "edits": [{ "path": path, "value": vector }] }),
+            6 => json!({ "type": "edit", "edits": [{ "path": path, "value": null }] }),
+            7 => json!({ "type": "show_field", "field": "pressure" }),
+            _ => {
+                json!({ "type": word })
+            }
+        };
+        let (code, _) = viewer.post(&request.to_string());
+        assert!(code == 200 || code == 409, "{request}: {code}");
+    }
+    for text in [
+        "",
+        "{",
+        "[]",
+        "{\"type\":\"hand\"}",
+        "{\"type\":1}",
+        "\u{0}",
+        &"[".repeat(100_000),
+    ] {
+        assert_eq!(viewer.post(text).0, 400, "{text:.20}");
+    }
+    assert_eq!(viewer.get("healthz").0, 200);
+    viewer.wait_until(|state| state["phase"] == "running");
+    viewer.press(3e-3, 0.3);
+}
+
+#[test]
+fn where_it_may_not_listen_it_says_so() {
+    let says = |args: &[&str]| {
+        let out = Command::new(env!("CARGO_BIN_EXE_palpa"))
+            .args(["view", "--no-open", "--out"])
+            .arg(TempDir::new().unwrap().path())
+            .args(args)
+            .output()
+            .unwrap();
+        (
+            out.status.code().unwrap(),
+            String::from_utf8(out.stderr).unwrap(),
+        )
+    };
+    let (code, words) = says(&["--bind", "0.0.0.0"]);
+    assert!(code == 2 && words.contains("--token"), "{words}");
+    let (code, words) = says(&["--token", "abc"]);
+    assert!(code == 2 && words.contains("token"), "{words}");
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let (code, words) = says(&["--port", &port]);
+    assert!(code == 2 && words.contains(&port), "{words}");
+    let (code, words) = says(&["no_such_scene.toml"]);
+    assert!(code == 2 && words.contains("no_such_scene.toml"), "{words}");
+}
