@@ -64,7 +64,7 @@ test('all that can be done can be reached by Tab', async () => {
 
 test('pictures in both themes, and in Japanese', async () => {
   const palpa = await sharedPage();
-  if ((await palpa.viewer.state()).gallery_key !== 'forearm_lump') await palpa.choose('forearm_lump');
+  await palpa.have('forearm_lump');
   await palpa.tab('scene');
   await palpa.focus();
   await palpa.page.keyboard.press('Space');

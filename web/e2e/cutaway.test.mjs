@@ -12,7 +12,7 @@ const MARGIN = 0.002;
 
 /** @param {import('./page.mjs').PalpaPage} palpa */
 async function exported(palpa) {
-  return readBody(await (await palpa.viewer.get('api/body.vtu')).text());
+  return readBody(await palpa.viewer.body());
 }
 
 /** Where the slider's position puts the plane, m: the way goes through the body at rest. @param {import('./vtu.mjs').Body & { displacement: import('./vtu.mjs').Vec3[] | null }} body */

@@ -7,7 +7,7 @@ import { saveShot } from './shots.mjs';
 
 test('a round of finding a lump', async () => {
   const palpa = await sharedPage();
-  await palpa.choose('forearm');
+  await palpa.have('forearm');
   await palpa.tab('game');
   await palpa.by('game-seed').fill('7');
   await palpa.by('game-start').click();

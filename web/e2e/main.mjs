@@ -2,8 +2,8 @@
 
 import './touch.test.mjs';
 import './cutaway.test.mjs';
-import './scene.test.mjs';
-import './recording.test.mjs';
 import './game.test.mjs';
+import './recording.test.mjs';
+import './scene.test.mjs';
 import './access.test.mjs';
 import './connection.test.mjs';

@@ -153,6 +153,14 @@ export class PalpaPage {
   }
 
   /**
+   * A scene that tests before this one may have pressed, and left as it was.
+   * @param {string} key
+   */
+  async have(key) {
+    if ((await this.viewer.state()).gallery_key !== key) await this.choose(key);
+  }
+
+  /**
    * Types a quantity into its field, and waits until the engine has it.
    * @param {string} id
    * @param {string} text

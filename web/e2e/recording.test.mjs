@@ -34,6 +34,7 @@ async function download(palpa, link) {
 
 test('what was recorded is what was shown, tick by tick, and is shown again', async (t) => {
   const palpa = await sharedPage();
+  await palpa.have('block');
   await palpa.atRest();
   await palpa.tab('record');
   await palpa.by('record-start').click();
@@ -116,5 +117,5 @@ test('scene, body and picture can be saved', async () => {
   await palpa.viewer.running('the saved scene is there', (state) => state.gallery_key == null);
   await palpa.by('scene-file').setInputFiles({ name: 'broken.toml', mimeType: 'text/plain', buffer: Buffer.from('[layer') });
   await palpa.page.getByTestId('toast').filter({ hasText: 'broken.toml' }).waitFor();
-  await palpa.choose('forearm');
+  await palpa.choose('block');
 });

@@ -93,6 +93,14 @@ export class Viewer {
     return (await this.get('api/engine')).json();
   }
 
+  /** The body as it is exported; of a new scene there is none for a moment. @returns {Promise<string>} */
+  body() {
+    return until('there is a body to export', async () => {
+      const response = await fetch(new URL('api/body.vtu', this.url));
+      return response.status === 200 && response.text();
+    });
+  }
+
   /** A request of a program, as a page's own would be; or any text. @param {object | string} request */
   async control(request) {
     const response = await fetch(new URL('api/control', this.url), {
