@@ -120,17 +120,19 @@ export class PalpaPage {
     }, timeout);
   }
 
-  /** Until the force stands, as it does once the hand is where it goes. */
+  /** Until the force stands, as it does once the hand is where it goes, and all of it is let through. */
   async steady(tolerance = 0.01) {
     /** @type {Readout[]} */
-    const last = [];
+    let last = [];
     return until('the force stands', async () => {
       const now = await this.readout();
-      if (last.at(-1)?.tick !== now.tick) last.push(now);
-      const recent = last.filter((other) => other.tick > now.tick - 800);
-      const isLong = last.length > recent.length && recent.length >= 3;
-      const forces = recent.map((other) => other.newtons);
-      return isLong && now.newtons > 0 && Math.max(...forces) - Math.min(...forces) < tolerance * now.newtons && now;
+      const isHeldBack = (await this.page.locator('.held-back').count()) > 0;
+      if (isHeldBack || now.newtons === 0) last = [];
+      else if (last.at(-1)?.tick !== now.tick) last.push(now);
+      last = last.filter((other) => other.tick > now.tick - 600);
+      const forces = last.map((other) => other.newtons);
+      const isLong = last.length >= 3 && now.tick - last[0].tick > 200;
+      return isLong && Math.max(...forces) - Math.min(...forces) < tolerance * now.newtons && now;
     }, LONG);
   }
 
