@@ -14,6 +14,9 @@ const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
 const HINT = `no browser was found. Install Chromium (on Debian: apt-get install chromium), or say where one is:
   PALPA_CHROMIUM=/path/to/chromium`;
 
+/** Debian's packages: the browser, and letters for the page in Japanese. */
+const PACKAGES = ['chromium', 'fonts-ipafont-gothic'];
+
 /** Quiet, and drawing in software: the tests run where there is no graphics card. */
 export const ARGS = [
   '--no-sandbox',
@@ -89,11 +92,11 @@ function install() {
     execFileSync(program, rest, { stdio: 'inherit', env: { ...process.env, DEBIAN_FRONTEND: 'noninteractive' } });
   };
   try {
-    asRoot('install', '--yes', '--no-install-recommends', 'chromium');
+    asRoot('install', '--yes', '--no-install-recommends', ...PACKAGES);
   } catch {
     // Lists of packages may be old, or not there at all.
     asRoot('update');
-    asRoot('install', '--yes', '--no-install-recommends', 'chromium');
+    asRoot('install', '--yes', '--no-install-recommends', ...PACKAGES);
   }
 }
 

@@ -17,7 +17,7 @@ export async function saveShot(palpa, name) {
     await palpa.by('theme').selectOption(theme);
     await palpa.page.locator(`html[data-theme=${theme}]`).waitFor();
     // Until the body is drawn in the theme's colours.
-    await pause(1500);
+    await pause(1000);
     await palpa.page.screenshot({ path: join(FOLDER, `${name}-${theme}.png`) });
   }
   await palpa.by('theme').selectOption('auto');
