@@ -9,8 +9,8 @@ pub enum Priority {
     RealTime(u8),
     /// Ordinary.
     Normal,
-    /// Ordinary, behind the others; 1 to 19.
-    Nice(u8),
+    /// Ordinary, behind the others, 1 to 19, or before them, -1 to -20.
+    Nice(i8),
 }
 
 /// What a thread wishes for.
@@ -150,7 +150,8 @@ mod system {
                 ThreadPriority::Crossplatform(ThreadPriorityValue::try_from(p)?)
             }
             Priority::Normal => return Ok(()),
-            Priority::Nice(_) => ThreadPriority::Min,
+            Priority::Nice(n) if n > 0 => ThreadPriority::Min,
+            Priority::Nice(_) => return Ok(()),
         };
         wish.set_for_current().map_err(|e| format!("{e:?}"))
     }

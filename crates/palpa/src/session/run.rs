@@ -850,6 +850,8 @@ impl Body {
         self.state.field = Field::None;
         self.game = Some(game);
         self.wanted.scene = scene;
+        // What is known of the lumps before is no help either.
+        self.describe();
         self.build();
         Ok(())
     }

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use palpa_device::{HapticDevice, LiveTarget, SimulatedDevice};
 use palpa_fem::lump::{Lump as PlacedLump, LumpShape};
 use palpa_mesh::{LayeredBody, Surface, Vec3};
-use palpa_rt::{Engine, EngineParams, Reader, RecorderParams, TissueParams};
+use palpa_rt::{Engine, EngineParams, Priority, Reader, RecorderParams, TissueParams, Wish};
 use palpa_servo::{Pose, ServoParams};
 use palpa_tissue::{ContactShape, ContactTool, MaterialStatus, ModelKind, Scene, Tool};
 use palpa_viewer::control::{self, LayerInfo, LumpForm, LumpInfo, Method, ToolForm, ToolInfo};
@@ -22,6 +22,11 @@ use crate::press;
 const LOOK_PERIOD: f64 = 1.0 / 60.0;
 /// Steps of the tissue are this far apart at least, s: who looks on needs the processor as well.
 const STEP_PERIOD: f64 = 2e-3;
+/// A browser without a graphics card takes all cores that it gets; the force comes first, where the system lets it.
+const BEFORE_THE_BROWSER: Wish = Wish {
+    priority: Priority::Nice(-10),
+    core: None,
+};
 /// Least size of what stands for a bonded tool, m.
 const LEAST_TOOL: f64 = 5e-3;
 /// Deepest press that a page offers, as a multiple of that of the scene's motion.
@@ -177,6 +182,8 @@ impl World {
                 min_period: STEP_PERIOD,
                 ..TissueParams::default()
             },
+            tissue_wish: BEFORE_THE_BROWSER,
+            background_wish: BEFORE_THE_BROWSER,
             ..EngineParams::default()
         };
         let (watch, looks) = Watch::new(LOOK_PERIOD);

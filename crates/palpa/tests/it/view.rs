@@ -273,7 +273,7 @@ fn what_is_wrong_is_said_and_the_body_goes_on() {
             json!({ "type": "edit", "edits": [{ "path": "/layer/0/tissue/young", "value": "12 apples" }] }),
             "apples",
         ),
-        (json!({ "type": "load_text", "text": "[body" }), "line 1"),
+        (json!({ "type": "load_text", "text": "[body" }), ":1:6"),
         (
             json!({ "type": "load_scene", "key": "nonsense" }),
             "forearm",
@@ -316,7 +316,12 @@ fn what_is_wrong_is_said_and_the_body_goes_on() {
 #[test]
 fn a_fault_of_the_tissue_is_told_and_the_engine_starts_anew() {
     let viewer = Viewer::start(&["--allow-faults"]);
-    let before = viewer.json("api/engine");
+    let before = loop {
+        match viewer.get("api/engine") {
+            (200, figures) => break serde_json::from_slice::<Value>(&figures).unwrap(),
+            _ => sleep(Duration::from_millis(50)),
+        }
+    };
     viewer.ask(&json!({ "type": "inject", "fault": "tissue_panic" }));
     let began = Instant::now();
     loop {
