@@ -26,7 +26,18 @@ test('a harder tissue gives more force at the same press', async (t) => {
   const after = await forceOfPress(palpa);
   t.diagnostic(`top layer of 10 kPa: ${before.newtons.toFixed(3)} N, of 30 kPa: ${after.newtons.toFixed(3)} N`);
   assert.ok(after.newtons > 1.2 * before.newtons, `${before.newtons} N, then ${after.newtons} N`);
-  await palpa.by('layer-0-reset').click();
+  await palpa.choose('block');
+});
+
+test('a layer is put back to what it was, though a broken file came between', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.tab('scene');
+  await palpa.by('scene-file').setInputFiles({ name: 'broken.toml', mimeType: 'text/plain', buffer: Buffer.from('[layer') });
+  await palpa.page.getByTestId('toast').filter({ hasText: 'broken.toml' }).first().waitFor();
+  await palpa.tab('tissues');
+  await palpa.type('layer-0-young', '20 kPa', ({ layers }) => Math.abs(layers[0].stiffness - 20e3) < 100);
+  await palpa.by('layer-0-reset').click({ timeout: 10_000 });
   await palpa.viewer.running('the tissue is as before', ({ layers }) => Math.abs(layers[0].stiffness - 10e3) < 100);
 });
 
