@@ -17,7 +17,7 @@ import { Viewer, pause } from './viewer.mjs';
 /** The forearm of the gallery, finer all over. */
 const SCENE = `
 [body]
-generator = { kind = "forearm", spacing = "5.2 mm" }
+generator = { kind = "forearm", spacing = "7.8 mm" }
 
 [[layer]]
 tissue = { name = "skin", young = "210 kPa", poisson = 0.45 }
@@ -130,7 +130,7 @@ async function measure(scene, seconds, hasClient) {
     const result = {
       client: hasClient,
       seconds,
-      nodes: last.n_nodes,
+      nodes: state.n_nodes,
       tick_rate: { mean: mean(figures.map((f) => f.tick_rate)), least: Math.min(...figures.map((f) => f.tick_rate)) },
       missed: last.missed - first.missed,
       // Since the start of the engine, which was a moment ago: median, 99.9 %, longest, s.
