@@ -14,10 +14,10 @@ import { parseArgs } from 'node:util';
 import WebSocket from 'ws';
 import { Viewer, pause } from './viewer.mjs';
 
-/** The forearm of the gallery, finer all over. */
+/** The forearm of the gallery, fine all over. */
 const SCENE = `
 [body]
-generator = { kind = "forearm", spacing = "7.8 mm" }
+generator = { kind = "forearm", spacing = "12 mm" }
 
 [[layer]]
 tissue = { name = "skin", young = "210 kPa", poisson = 0.45 }
