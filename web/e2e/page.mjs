@@ -149,7 +149,7 @@ export class PalpaPage {
     await this.tab('scene');
     const before = (await this.viewer.state()).revision;
     await this.by(`scene-${key}`).click();
-    const state = await this.viewer.running(`${key} is there`, (now) => now.revision > before + 1 && now.gallery_key === key);
+    const state = await this.viewer.running(`${key} is there`, (now) => now.revision > before && now.gallery_key === key);
     await this.running();
     return state;
   }
