@@ -997,10 +997,13 @@ impl Body {
     }
 }
 
+/// Nothing that is pressed is larger, m.
+const FAR: f64 = 100.0;
+
 fn finite(v: [f64; 3], what: &str) -> anyhow::Result<Vec3> {
-    if v.iter().all(|x| x.is_finite()) {
+    if v.iter().all(|x| x.abs() < FAR) {
         Ok(v.into())
     } else {
-        bail!("the {what} is not made of numbers")
+        bail!("the {what} is no place or direction near the body")
     }
 }
