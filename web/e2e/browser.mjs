@@ -1,0 +1,113 @@
+// The browser that the tests drive: one that is installed, Debian's Chromium for one; none is downloaded.
+//
+// `node e2e/browser.mjs` says which it is; with `--install` it asks Debian for one when there is none.
+
+import { execFileSync, spawnSync } from 'node:child_process';
+import { accessSync, constants, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { delimiter, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
+
+const HINT = `no browser was found. Install Chromium (on Debian: apt-get install chromium), or say where one is:
+  PALPA_CHROMIUM=/path/to/chromium`;
+
+/** Debian's packages: the browser, and letters for the page in Japanese. */
+const PACKAGES = ['chromium', 'fonts-ipafont-gothic'];
+
+/** Quiet, and drawing in software: the tests run where there is no graphics card. */
+export const ARGS = [
+  '--no-sandbox',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+];
+export const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
+
+/** @param {string} path */
+function canRun(path) {
+  try {
+    accessSync(path, constants.X_OK);
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+/** @param {string} name */
+function inPath(name) {
+  const folders = (process.env.PATH ?? '').split(delimiter);
+  return folders.map((folder) => join(folder, name)).find(canRun);
+}
+
+/** Path of a browser, or none. */
+export function findBrowser() {
+  const told = process.env.PALPA_CHROMIUM;
+  if (told !== undefined && told !== '') {
+    if (!canRun(told)) throw new Error(`PALPA_CHROMIUM=${told} cannot be run`);
+    return told;
+  }
+  return NAMES.map(inPath).find((path) => path !== undefined);
+}
+
+/**
+ * A program that runs the browser behind everything else. Drawing in software takes all cores, and as root Chromium would
+ * even put itself before the engine's tissue, which then answers too late to be felt.
+ * @param {string} browser
+ */
+function behind(browser) {
+  const nice = inPath('nice');
+  const setpriv = process.getuid?.() === 0 ? inPath('setpriv') : undefined;
+  const before = [...(setpriv ? [setpriv, '--bounding-set', '-sys_nice'] : []), ...(nice ? [nice, '-n', '10'] : [])];
+  const folder = mkdtempSync(join(tmpdir(), 'palpa-browser-'));
+  process.once('exit', () => rmSync(folder, { recursive: true, force: true }));
+  const path = join(folder, 'browser');
+  const words = [...before, browser].map((word) => `'${word.replaceAll("'", String.raw`'\''`)}'`);
+  writeFileSync(path, `#!/bin/sh\nexec ${words.join(' ')} "$@"\n`, { mode: 0o755 });
+  return path;
+}
+
+/**
+ * @param {string[]} graphics
+ * @returns {Promise<import('playwright-core').Browser>}
+ */
+export function launch(graphics = SOFTWARE_GL) {
+  const found = findBrowser();
+  if (found === undefined) throw new Error(HINT);
+  return chromium.launch({ executablePath: behind(found), args: [...ARGS, ...graphics] });
+}
+
+function install() {
+  const apt = inPath('apt-get');
+  if (apt === undefined) throw new Error(HINT);
+  const isRoot = process.getuid?.() === 0;
+  if (!isRoot && spawnSync('sudo', ['-n', 'true']).status !== 0) throw new Error(HINT);
+  const asRoot = (/** @type {string[]} */ ...args) => {
+    const [program, ...rest] = isRoot ? [apt, ...args] : ['sudo', '-n', apt, ...args];
+    execFileSync(program, rest, { stdio: 'inherit', env: { ...process.env, DEBIAN_FRONTEND: 'noninteractive' } });
+  };
+  try {
+    asRoot('install', '--yes', '--no-install-recommends', ...PACKAGES);
+  } catch {
+    // Lists of packages may be old, or not there at all.
+    asRoot('update');
+    asRoot('install', '--yes', '--no-install-recommends', ...PACKAGES);
+  }
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  try {
+    if (findBrowser() === undefined && process.argv.includes('--install')) install();
+    const found = findBrowser();
+    if (found === undefined) throw new Error(HINT);
+    console.log(found);
+  } catch (error) {
+    console.error(error instanceof Error ? error.message : error);
+    process.exitCode = 1;
+  }
+}

@@ -1,0 +1,9 @@
+// All tests in one process, so that they share viewer and browser. Each file also runs alone.
+
+import './touch.test.mjs';
+import './cutaway.test.mjs';
+import './game.test.mjs';
+import './recording.test.mjs';
+import './scene.test.mjs';
+import './access.test.mjs';
+import './connection.test.mjs';

@@ -1,0 +1,110 @@
+// What the body is made of, and what presses it, changed while it lies there: on a block, which is built soonest.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { sharedPage } from './session.mjs';
+import { until } from './viewer.mjs';
+import { extent, readBody } from './vtu.mjs';
+
+/** The force of the same press by keys. @param {import('./page.mjs').PalpaPage} palpa */
+async function forceOfPress(palpa) {
+  await palpa.atRest();
+  await palpa.focus();
+  await palpa.page.keyboard.press('Space');
+  const { newtons, metres } = await palpa.steady();
+  await palpa.page.keyboard.press('Escape');
+  await palpa.atRest();
+  return { newtons, metres };
+}
+
+test('a harder tissue gives more force at the same press', async (t) => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  const before = await forceOfPress(palpa);
+  await palpa.tab('tissues');
+  await palpa.type('layer-0-young', '30 kPa', ({ layers }) => Math.abs(layers[0].stiffness - 30e3) < 100);
+  const after = await forceOfPress(palpa);
+  t.diagnostic(`top layer of 10 kPa: ${before.newtons.toFixed(3)} N, of 30 kPa: ${after.newtons.toFixed(3)} N`);
+  assert.ok(after.newtons > 1.2 * before.newtons, `${before.newtons} N, then ${after.newtons} N`);
+  await palpa.by('layer-0-reset').click();
+  await palpa.viewer.running('the tissue is as before', ({ layers }) => Math.abs(layers[0].stiffness - 10e3) < 100);
+});
+
+test('a value that cannot be is refused in words at its field', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.tab('tissues');
+  await palpa.by('layer-0-young').fill('-3 kPa');
+  await palpa.by('layer-0-young').press('Enter');
+  const alert = palpa.page.locator('#panel .field-error');
+  await alert.waitFor();
+  assert.ok((await alert.innerText()).length > 10);
+  assert.equal(await palpa.by('layer-0-young').getAttribute('aria-invalid'), 'true');
+  await palpa.by('layer-0-young').press('Escape');
+});
+
+test('a lump is added, seen in the section, and taken away', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.tab('lumps');
+  await palpa.by('lump-add').click();
+  const withLump = await palpa.viewer.running('a lump is there', (state) => state.lumps.length === 1);
+  await palpa.by('lump-0').waitFor();
+  await palpa.running();
+
+  await palpa.tab('view');
+  await palpa.by('cutaway-toggle').check();
+  await palpa.by('cutaway-axis-x').check({ force: true });
+  // To where the lump lies.
+  const { centre, shape } = withLump.lumps[0];
+  const { points } = readBody(await palpa.viewer.body());
+  const [low, high] = extent(points, 0);
+  await palpa.by('cutaway-position').fill(((centre[0] - low) / (high - low)).toFixed(2));
+  await until('the section meets the lump', async () => (await palpa.sectionArea()).lumps > 2e-5);
+  const { lumps: area } = await palpa.sectionArea();
+  assert.ok(shape.kind === 'ellipsoid', 'a ball');
+  const largest = Math.PI * shape.radii[0] ** 2;
+  assert.ok(area > 2e-5 && area < 1.02 * largest, `the section shows ${area} m² of a lump whose largest slice is ${largest} m²`);
+  await palpa.by('cutaway-toggle').uncheck();
+
+  await palpa.tab('lumps');
+  await palpa.type('lump-0-radius', '8 mm', (state) => state.lumps[0].shape.kind === 'ellipsoid' && Math.abs(state.lumps[0].shape.radii[0] - 8e-3) < 1e-6);
+  await palpa.by('lump-0-remove').click();
+  await palpa.viewer.running('the lump is gone', (state) => state.lumps.length === 0);
+});
+
+test('tool and friction change', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.tab('tool');
+  await palpa.by('tool-shape').selectOption('sphere');
+  await palpa.viewer.running('the tool is a ball', ({ tool }) => tool.shape.kind === 'sphere');
+  await palpa.type('tool-friction', '0.8', ({ tool }) => tool.friction === 0.8);
+  const { newtons } = await forceOfPress(palpa);
+  assert.ok(newtons > 0.1, `${newtons} N`);
+  await palpa.choose('block');
+});
+
+test('the motion of the scene runs by itself', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.atRest();
+  await palpa.tab('motion');
+  await palpa.by('motion-run').click();
+  await palpa.reads('a force of the motion', ({ newtons }) => newtons > 0.1);
+  await palpa.by('motion-stop').or(palpa.by('motion-run')).waitFor();
+  await palpa.viewer.running('the motion is over', (state) => !state.is_motion_running);
+  await palpa.atRest();
+});
+
+for (const key of ['block', 'limb', 'patch_bars', 'patch_tissue', 'forearm', 'forearm_lump']) {
+  test(`the scene ${key} of the gallery can be pressed`, async () => {
+    const palpa = await sharedPage();
+    await palpa.choose(key);
+    await palpa.focus();
+    await palpa.page.keyboard.press('Space');
+    await palpa.reads('a force', ({ newtons }) => newtons > 0);
+    await palpa.page.keyboard.press('Escape');
+    await palpa.reads('no force', ({ newtons }) => newtons < 1e-9);
+  });
+}

@@ -1,0 +1,108 @@
+// A body is there, and answers to mouse, wheel and keys.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { sharedPage } from './session.mjs';
+import { until } from './viewer.mjs';
+
+/** Each a little under a pixel's worth of another: the picture is looked at, not the scene. @param {Buffer} png */
+const isPicture = (png) => png.subarray(1, 4).toString() === 'PNG' && png.length > 20_000;
+
+test('the page loads, draws a body, and asks nobody else', async (t) => {
+  const palpa = await sharedPage();
+  const ms = await palpa.drawn();
+  t.diagnostic(`page to first drawn body: ${ms.toFixed(0)} ms`);
+  assert.ok(ms > 0);
+  assert.equal(await palpa.by('controller-status').getAttribute('data-controls'), 'you');
+  assert.ok(isPicture(await palpa.canvas.screenshot()), 'something is drawn');
+  assert.deepEqual([...palpa.hosts], [new URL(palpa.viewer.url).host]);
+  assert.deepEqual(palpa.complaints, []);
+});
+
+test('a press with the mouse is felt, and nothing after it', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.press();
+  const pressed = await palpa.reads('a force', ({ newtons, metres }) => newtons > 0.1 && metres > 0);
+  assert.match(await palpa.by('force-number').innerText(), /^\d+\.\d\d N$/);
+  await palpa.release();
+  const after = await palpa.atRest();
+  assert.ok(after.tick > pressed.tick);
+});
+
+test('the wheel presses deeper, and the force grows', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.press();
+  const before = await palpa.steady();
+  for (let k = 0; k < 4; k++) await palpa.page.mouse.wheel(0, -100);
+  const otherWay = await palpa.reads('another depth', ({ metres }) => Math.abs(metres - before.metres) > 0.5e-3);
+  const after = await palpa.steady();
+  await palpa.release();
+  assert.equal(Math.sign(after.newtons - before.newtons), Math.sign(otherWay.metres - before.metres), 'deeper is harder');
+  await palpa.atRest();
+});
+
+test('shift and drag presses deeper, and springs back', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.press();
+  const before = await palpa.steady();
+  await palpa.page.keyboard.down('Shift');
+  const [x, y] = await palpa.at();
+  await palpa.page.mouse.move(x, y + 10, { steps: 5 });
+  await palpa.reads('a greater depth', ({ metres }) => metres > before.metres + 0.5e-3);
+  await palpa.page.keyboard.up('Shift');
+  await palpa.page.mouse.move(x + 1, y + 10);
+  await palpa.reads('the depth from before', ({ metres }) => metres < before.metres + 0.4e-3);
+  await palpa.release();
+  await palpa.atRest();
+});
+
+test('a drag strokes over the skin under load', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.press(0.44);
+  await palpa.steady(0.05);
+  const forces = [];
+  const [x, y] = await palpa.at(0.44);
+  for (let k = 1; k <= 10; k++) {
+    await palpa.page.mouse.move(x + 8 * k, y);
+    forces.push((await palpa.readout()).newtons);
+  }
+  const end = await palpa.reads('a force at the end', ({ newtons }) => newtons > 0.1);
+  assert.ok(end.metres > 0);
+  await palpa.release();
+  assert.ok(forces.some((force) => force > 0.05), `forces of the stroke: ${forces}`);
+  await palpa.atRest();
+});
+
+test('keys press, step, deepen and lift', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  await palpa.focus();
+  await palpa.page.keyboard.press('Space');
+  const first = await palpa.steady();
+  for (let k = 0; k < 3; k++) await palpa.page.keyboard.press('PageDown');
+  const deeper = await palpa.reads('a greater depth', ({ metres }) => metres > first.metres + 0.8e-3);
+  assert.ok(deeper.newtons > 0);
+  await palpa.page.keyboard.press('ArrowRight');
+  await palpa.page.keyboard.press('Shift+ArrowUp');
+  await palpa.steady(0.05);
+  await palpa.page.keyboard.press('Escape');
+  await palpa.atRest();
+});
+
+test('a drag beside the body turns the view and presses nothing', async () => {
+  const palpa = await sharedPage();
+  await palpa.atRest();
+  const before = await palpa.canvas.screenshot();
+  const [x, y] = await palpa.at(0.5, 0.5);
+  await palpa.page.mouse.move(x, y);
+  await palpa.page.mouse.down({ button: 'right' });
+  await palpa.page.mouse.move(x + 80, y + 30, { steps: 5 });
+  await palpa.page.mouse.up({ button: 'right' });
+  await until('the picture is another', async () => !before.equals(await palpa.canvas.screenshot()));
+  assert.equal((await palpa.readout()).newtons, 0);
+  await palpa.page.getByRole('button', { name: 'Home', exact: true }).first().click();
+});

@@ -1,0 +1,147 @@
+// A real `palpa view`, started and stopped.
+
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const ROOT = fileURLToPath(new URL('../../', import.meta.url));
+export const TARGET = process.env.CARGO_TARGET_DIR ?? join(ROOT, 'target');
+
+function binary() {
+  const path = process.env.PALPA_BIN ?? join(TARGET, 'release', 'palpa');
+  if (!existsSync(path)) throw new Error(`${path} is not there: build it (cargo build --release --bin palpa), or set PALPA_BIN`);
+  return path;
+}
+
+/** How long a slow machine may take to start, ms. */
+const START = 60_000;
+/** How long it may take to end when it is asked to, ms. */
+const END = 5000;
+
+/** @param {number} ms */
+export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/**
+ * Waits until something is so, and returns it.
+ * @template T
+ * @param {string} what
+ * @param {() => Promise<T | false | null | undefined> | T | false | null | undefined} look
+ * @param {number} timeout
+ * @returns {Promise<T>}
+ */
+export async function until(what, look, timeout = 30_000) {
+  const end = performance.now() + timeout;
+  for (;;) {
+    const found = await look();
+    if (found) return found;
+    if (performance.now() > end) throw new Error(`in ${timeout / 1000} s it did not come that ${what}`);
+    await pause(50);
+  }
+}
+
+export class Viewer {
+  /** Standard error, for a test that fails. */
+  stderr = '';
+
+  /**
+   * @param {import('node:child_process').ChildProcess} child
+   * @param {string} out
+   */
+  constructor(child, out) {
+    this.child = child;
+    this.out = out;
+    this.url = '';
+    this.port = 0;
+  }
+
+  /** @param {{ scene?: string, port?: number }} options */
+  static async start({ scene, port = 0 } = {}) {
+    const out = mkdtempSync(join(tmpdir(), 'palpa-e2e-'));
+    const args = ['view', '--no-open', '--port', String(port), '--json', '--allow-faults', '--out', out];
+    const child = spawn(binary(), scene === undefined ? args : [...args, scene], { stdio: ['ignore', 'pipe', 'pipe'] });
+    const viewer = new Viewer(child, out);
+    child.stderr?.on('data', (data) => (viewer.stderr += data));
+    let stdout = '';
+    child.stdout?.on('data', (data) => (stdout += data));
+    const started = await until('the viewer says where it is', () => {
+      if (child.exitCode !== null) throw new Error(`the viewer ended: ${viewer.stderr}`);
+      return stdout.includes('}') && JSON.parse(stdout);
+    }, START);
+    viewer.url = started.url;
+    viewer.port = started.port;
+    return viewer;
+  }
+
+  /** @param {string} path */
+  async get(path) {
+    const response = await fetch(new URL(path, this.url));
+    assert.equal(response.status, 200, `${path}: ${response.status}`);
+    return response;
+  }
+
+  /** All of the state. @returns {Promise<import('../src/generated/api').State>} */
+  async state() {
+    return (await this.get('api/state')).json();
+  }
+
+  /** How the engine fares. @returns {Promise<import('../src/generated/api').EngineFigures>} */
+  async engine() {
+    return (await this.get('api/engine')).json();
+  }
+
+  /** The body as it is exported; of a new scene there is none for a moment. @returns {Promise<string>} */
+  body() {
+    return until('there is a body to export', async () => {
+      const response = await fetch(new URL('api/body.vtu', this.url));
+      return response.status === 200 && response.text();
+    });
+  }
+
+  /** A request of a program, as a page's own would be; or any text. @param {object | string} request */
+  async control(request) {
+    const response = await fetch(new URL('api/control', this.url), {
+      method: 'POST',
+      headers: { 'content-type': 'application/json' },
+      body: typeof request === 'string' ? request : JSON.stringify(request),
+    });
+    return { status: response.status, reply: await response.json() };
+  }
+
+  /**
+   * Waits for a state of the engine in which it runs.
+   * @param {string} what
+   * @param {(state: import('../src/generated/api').State) => boolean} isSo
+   */
+  running(what, isSo) {
+    return until(`${what} and the engine runs`, async () => {
+      const state = await this.state();
+      return state.phase === 'running' && isSo(state) && state;
+    }, 60_000);
+  }
+
+  /** Asks it to end, as Ctrl-C does. */
+  async stop() {
+    if (this.child.exitCode === null) {
+      const ended = once(this.child, 'exit');
+      this.child.kill('SIGINT');
+      const tooLate = setTimeout(() => this.child.kill('SIGKILL'), END);
+      const [code, signal] = await ended;
+      clearTimeout(tooLate);
+      assert.notEqual(signal, 'SIGKILL', `it did not end within ${END / 1000} s: ${this.stderr}`);
+      assert.ok(code === 0 || code === 130, `it ended with ${code ?? signal}: ${this.stderr}`);
+    }
+    rmSync(this.out, { recursive: true, force: true });
+  }
+
+  /** Ends it as a crash would. */
+  async kill() {
+    const ended = once(this.child, 'exit');
+    this.child.kill('SIGKILL');
+    await ended;
+    rmSync(this.out, { recursive: true, force: true });
+  }
+}
