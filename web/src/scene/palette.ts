@@ -32,7 +32,7 @@ const OTHERS = ['#d9a07c', '#8fb8d6', '#e8c66b', '#7fb8a0', '#c98fb0', '#a7a1d1'
 
 export const BONE = '#e9e2cf';
 /** The rigid core between bones. */
-export const CORE = '#dad2c2';
+export const CORE = '#c3b7a3';
 export const LUMP = '#7d5ba6';
 
 /** The colour of every layer, from the skin down: the same in the body, its section, and legends. */

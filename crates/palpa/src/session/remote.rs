@@ -89,18 +89,35 @@ fn written(file: HostFile, material: Material) -> anyhow::Result<Vec<u8>> {
     })
 }
 
-/// Two tables with a row per tick side by side; the second's first column is the tick again.
+/// Two tables with a row per tick side by side; the second's first column is the tick again, and columns of its that are named as
+/// one of the first say that they are the device's.
 fn joined(ticks: &str, device: &str) -> Vec<u8> {
     let mut out = String::with_capacity(ticks.len() + device.len());
-    for (a, b) in ticks.lines().zip(device.lines()) {
+    for (row, (a, b)) in ticks.lines().zip(device.lines()).enumerate() {
         out.push_str(a);
-        if let Some((_, rest)) = b.split_once(',') {
-            out.push(',');
-            out.push_str(rest);
+        for cell in b.split(',').skip(1) {
+            let is_twice = row == 0 && a.split(',').any(|name| name == cell);
+            out.push_str(if is_twice { ",device_" } else { "," });
+            out.push_str(cell);
         }
         out.push('\n');
     }
     out.into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::joined;
+
+    #[test]
+    fn tables_are_joined_with_each_name_once() {
+        let table = joined(
+            "tick,now,faults\n1,0.5,0\n",
+            "tick,force_x,faults\n1,2.5,1\n",
+        );
+        let wanted = "tick,now,faults,force_x,device_faults\n1,0.5,0,2.5,1\n";
+        assert_eq!(String::from_utf8(table).unwrap(), wanted);
+    }
 }
 
 fn vtu(body: &LayeredBody, displacements: &[Vec3]) -> anyhow::Result<Vec<u8>> {

@@ -912,26 +912,32 @@ impl Body {
                 };
                 Some(Material::Scene(scene.to_toml()))
             }
-            HostFile::Body => {
-                let live = self.live.as_mut()?;
-                live.running.looks.take();
-                match &live.running.looks.current().body {
-                    Some(Seen::Tissue(glance)) => Some(Material::Tissue(
-                        Arc::clone(glance.model()),
-                        glance.settled(),
-                    )),
-                    Some(Seen::Springs(displacements)) => Some(Material::Springs(
-                        Box::new(live.world.spring_body()?.clone()),
-                        displacements.clone(),
-                    )),
-                    None => None,
-                }
-            }
+            HostFile::Body => self.body_now(),
             HostFile::RecordingLog | HostFile::RecordingCsv => {
                 let recording = self.recording.as_ref()?;
                 (!recording.is_under_way()).then(|| Material::Log(recording.log().to_owned()))
             }
         }
+    }
+
+    /// The body as the tissue left it last; before its first step, at rest.
+    fn body_now(&mut self) -> Option<Material> {
+        let live = self.live.as_mut()?;
+        live.running.looks.take();
+        Some(match &live.running.looks.current().body {
+            Some(Seen::Tissue(glance)) => {
+                Material::Tissue(Arc::clone(glance.model()), glance.settled())
+            }
+            Some(Seen::Springs(displacements)) => {
+                let body = Box::new(live.world.spring_body()?.clone());
+                Material::Springs(body, displacements.clone())
+            }
+            None => {
+                let model = live.world.first_model()?;
+                let at_rest = vec![Vec3::zeros(); model.n_nodes()];
+                Material::Tissue(model, at_rest)
+            }
+        })
     }
 
     fn tell_figures(&mut self) {
@@ -997,10 +1003,13 @@ impl Body {
     }
 }
 
+/// Nothing that is pressed is larger, m.
+const FAR: f64 = 100.0;
+
 fn finite(v: [f64; 3], what: &str) -> anyhow::Result<Vec3> {
-    if v.iter().all(|x| x.is_finite()) {
+    if v.iter().all(|x| x.abs() < FAR) {
         Ok(v.into())
     } else {
-        bail!("the {what} is not made of numbers")
+        bail!("the {what} is no place or direction near the body")
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use nalgebra::Point3;
 use palpa_device::{HapticDevice, LiveTarget, SimulatedDevice};
+use palpa_fem::Model;
 use palpa_fem::lump::{Lump as PlacedLump, LumpShape};
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_rt::{Engine, EngineParams, Priority, Reader, RecorderParams, TissueParams, Wish};
@@ -217,6 +218,14 @@ impl World {
         match &self.kind {
             Kind::Tissue(live) => live.model.n_nodes(),
             Kind::Springs(springs) => springs.body().n_nodes(),
+        }
+    }
+
+    /// The body of finite elements that the engine begins with.
+    pub fn first_model(&self) -> Option<Arc<Model>> {
+        match &self.kind {
+            Kind::Tissue(live) => Some(Arc::clone(&live.model)),
+            Kind::Springs(_) => None,
         }
     }
 

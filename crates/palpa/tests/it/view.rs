@@ -80,8 +80,9 @@ impl Viewer {
         (answer.status().as_u16(), body)
     }
 
+    /// Null before there is anything to tell.
     fn json(&self, path: &str) -> Value {
-        serde_json::from_slice(&self.get(path).1).unwrap()
+        serde_json::from_slice(&self.get(path).1).unwrap_or(Value::Null)
     }
 
     /// Status and words of a refusal.
@@ -114,7 +115,8 @@ impl Viewer {
             if is_so(&state) {
                 return state;
             }
-            assert!(began.elapsed() < PATIENCE, "{state:#}");
+            let told = [&state["phase"], &state["problem"], &state["scene"]];
+            assert!(began.elapsed() < PATIENCE, "{told:#?}");
             sleep(Duration::from_millis(50));
         }
     }
@@ -309,19 +311,18 @@ fn what_is_wrong_is_said_and_the_body_goes_on() {
         viewer.wait_until(|s| s["phase"] == "running")["scene"]["motion"]["depth"],
         "4 mm"
     );
-    assert_eq!(viewer.get("healthz").0, 200);
+    let (status, words) = viewer.get("healthz");
+    assert_eq!(status, 200, "{}", String::from_utf8_lossy(&words));
     viewer.press(3e-3, 0.3);
 }
 
 #[test]
 fn a_fault_of_the_tissue_is_told_and_the_engine_starts_anew() {
     let viewer = Viewer::start(&["--allow-faults"]);
-    let before = loop {
-        match viewer.get("api/engine") {
-            (200, figures) => break serde_json::from_slice::<Value>(&figures).unwrap(),
-            _ => sleep(Duration::from_millis(50)),
-        }
-    };
+    let mut before = Value::Null;
+    while before.is_null() {
+        before = viewer.json("api/engine");
+    }
     viewer.ask(&json!({ "type": "inject", "fault": "tissue_panic" }));
     let began = Instant::now();
     loop {
@@ -392,7 +393,8 @@ fn nonsense_neither_stops_nor_fills_it() {
     ] {
         assert_eq!(viewer.post(text).0, 400, "{text:.20}");
     }
-    assert_eq!(viewer.get("healthz").0, 200);
+    let (status, words) = viewer.get("healthz");
+    assert_eq!(status, 200, "{}", String::from_utf8_lossy(&words));
     viewer.wait_until(|state| state["phase"] == "running");
     viewer.press(3e-3, 0.3);
 }

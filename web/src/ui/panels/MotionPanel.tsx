@@ -49,7 +49,7 @@ export function MotionPanel() {
       <Section title={t('motion.how')}>
         {field('depth', 'length', [0.5e-3, state.value?.greatest_depth ?? 20e-3])}
         {field('speed', 'speed', [5e-3, 200e-3])}
-        {kind !== 'tap' && field('hold', 'time')}
+        {(kind === 'press' || kind === 'palpate') && field('hold', 'time')}
         {ACROSS.includes(kind) && field('length', 'length', [5e-3, 100e-3])}
         {ACROSS.includes(kind) && (
           <Segmented
