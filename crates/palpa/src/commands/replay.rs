@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use palpa_rt::{Ending, Log, ReplayParams, Table, Verdict, replay_watched};
-use palpa_tissue::Scene;
+use palpa_rt::{Ending, Log, ReplayParams, ReplayReport, Table, Tissue, Verdict, replay_watched};
+use palpa_tissue::{ModelKind, Scene};
 use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use crate::engine::{LiveScene, changed_files, scene_of};
+use crate::engine::{LiveScene, SpringScene, changed_files, scene_of};
 
 /// Run a log again and compare, or export it as tables
 ///
@@ -64,6 +64,20 @@ struct Tables {
     damage: Option<String>,
 }
 
+/// Runs the log again on its tissue, until the end or Ctrl-C.
+fn again(log: &Log, tissue: impl Tissue, context: &Context) -> ReplayReport {
+    context.begin_recording();
+    let bar = context.progress(log.ticks.len(), "ticks run again");
+    let report = replay_watched(log, tissue, &ReplayParams::default(), |tick| {
+        if tick.is_multiple_of(100) {
+            bar.set_position(tick as u64);
+        }
+        !context.is_interrupted()
+    });
+    bar.finish_and_clear();
+    report
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -85,16 +99,17 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     for file in &changed {
         context.note(format!("{}: {}", file.path.display(), file.problem));
     }
-    let live = LiveScene::build(&scene).context("the body of the log")?;
-    context.begin_recording();
-    let bar = context.progress(log.ticks.len(), "ticks run again");
-    let report = replay_watched(&log, live.tissue()?, &ReplayParams::default(), |tick| {
-        if tick.is_multiple_of(100) {
-            bar.set_position(tick as u64);
+    let of_log = || "the body of the log";
+    let report = match scene.model.kind {
+        ModelKind::Tissue => {
+            let live = LiveScene::build(&scene).with_context(of_log)?;
+            again(&log, live.tissue()?, context)
         }
-        !context.is_interrupted()
-    });
-    bar.finish_and_clear();
+        ModelKind::Reference => {
+            let springs = SpringScene::build(&scene).with_context(of_log)?;
+            again(&log, springs.tissue(springs.beginning(), None)?, context)
+        }
+    };
     let damage = damage(&log.ending);
     let found = Found {
         verdict: match report.verdict {

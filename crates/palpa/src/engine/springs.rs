@@ -4,15 +4,18 @@ use palpa_mesh::{LayeredBody, Vec3};
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
 use palpa_servo::{Candidate, ContactPatch, Mat3, Pose, ToolContact};
 use palpa_springs::{Outcome, SpringModel, SpringState, StepParams, Workspace, step};
-use palpa_tissue::Scene;
+use palpa_tissue::{ContactShape, ContactTool, Scene};
 use std::sync::Arc;
 
 use super::Watch;
-use crate::build::{BuiltBody, nearest};
-use crate::press::reference;
+use crate::build::{BuiltBody, build, nearest};
+use crate::continuum;
+use crate::press::{Place, reference};
 
 /// The tip holds the node as a point that hardly slips.
-const FRICTION: f64 = 10.0;
+const FRICTION: f64 = 5.0;
+/// The point that the tip is has a frame as any tool, m.
+const POINT: f64 = 5e-3;
 /// Way of the node by which its stiffness is measured, as a share of the mean edge.
 const PROBE: f64 = 1e-3;
 
@@ -23,6 +26,8 @@ pub struct SpringScene {
     built: Arc<BuiltBody>,
     /// How far from the node the tip may be and still press it, m.
     reach: f64,
+    /// Where the device's frame is: z out of the tissue where the scene presses, its origin over the skin.
+    pub scene_from_device: Pose,
 }
 
 /// The body with one of its nodes operated.
@@ -38,19 +43,37 @@ pub struct Held {
 }
 
 impl SpringScene {
-    /// Of a scene whose model is the reference method, and the body that was grown for it.
+    /// Builds the body of a scene whose model is the reference method.
     ///
     /// # Errors
-    /// When the scene has what the reference method has not.
-    pub fn new(scene: &Scene, built: Arc<BuiltBody>) -> anyhow::Result<Self> {
+    /// When the scene has what the reference method has not, or its body cannot be grown.
+    pub fn build(scene: &Scene) -> anyhow::Result<Self> {
         reference::check_reference(scene)?;
-        let reach = built.growth.body.skin.mean_edge_length();
-        let scene = Arc::new(scene.clone());
+        let built = Arc::new(build(scene)?);
+        let body = &built.growth.body;
+        let place = Place::find(scene, body, built.press_vertex, &mut Vec::new())?;
+        let point = ContactTool {
+            shape: ContactShape::Sphere { radius: POINT },
+            friction: 0.0,
+            axis: None,
+        };
+        let (_, at_rest) = continuum::tool(&point, place.direction.into_inner(), place.at)?;
         Ok(Self {
-            scene,
+            scene_from_device: at_rest * Pose::translation(0.0, 0.0, scene.motion.above),
+            reach: body.skin.mean_edge_length(),
+            scene: Arc::new(scene.clone()),
             built,
-            reach,
         })
+    }
+
+    /// The body as it was grown.
+    pub fn built(&self) -> &Arc<BuiltBody> {
+        &self.built
+    }
+
+    /// Where the hand begins, in the scene's frame, m.
+    pub fn beginning(&self) -> Vec3 {
+        self.scene_from_device.translation.vector
     }
 
     /// The body at rest.
@@ -86,19 +109,13 @@ impl SpringScene {
     ///
     /// # Errors
     /// When its network cannot be built.
-    pub fn tissue(
-        &self,
-        scene_from_device: Pose,
-        tip: Vec3,
-        watch: Watch,
-    ) -> anyhow::Result<SpringTissue> {
+    pub fn tissue(&self, tip: Vec3, watch: Option<Watch>) -> anyhow::Result<SpringTissue> {
         let held = self.held(nearest(&self.body().skin, tip))?;
         Ok(SpringTissue {
             state: SpringState::new(&held.model),
             workspace: Workspace::new(&held.model),
             held,
             scene: self.clone(),
-            scene_from_device,
             grip: None,
             wanted: None,
             n_held: 1,
@@ -128,13 +145,12 @@ pub struct SpringTissue {
     held: Held,
     state: SpringState,
     workspace: Workspace,
-    scene_from_device: Pose,
     /// Where the tip took the node, off the node's place at rest along the skin, m; none while it presses nothing.
     grip: Option<Vec3>,
     /// The vertex that the tip is over, where it is another.
     wanted: Option<usize>,
     n_held: u64,
-    watch: Watch,
+    watch: Option<Watch>,
 }
 
 impl SpringTissue {
@@ -171,7 +187,7 @@ impl SpringTissue {
     }
 
     fn fill(&self, input: &TissueInput, patch: &mut ContactPatch) {
-        let frame = &self.scene_from_device;
+        let frame = &self.scene.scene_from_device;
         let turn: Mat3 = *frame.rotation.to_rotation_matrix().matrix();
         let back = turn.transpose();
         let pose = input.poses[0];
@@ -214,14 +230,15 @@ impl Tissue for SpringTissue {
     type Done = Option<Held>;
 
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
-        let pose = self.scene_from_device * input.poses[0];
+        let pose = self.scene.scene_from_device * input.poses[0];
         let up = pose.rotation * Vec3::z();
         let outcome = self.follow(pose.translation.vector, up);
         self.fill(input, patch);
-        let model = &self.held.model;
-        let moved = self.state.positions.iter().zip(model.rest_positions());
-        self.watch
-            .look_at(input.step, input.now, moved.map(|(now, rest)| now - rest));
+        if let Some(watch) = &mut self.watch {
+            let model = &self.held.model;
+            let moved = self.state.positions.iter().zip(model.rest_positions());
+            watch.look_at(input.step, input.now, moved.map(|(now, rest)| now - rest));
+        }
         TissueStep {
             status: match outcome {
                 Outcome::Converged => StepStatus::Converged,

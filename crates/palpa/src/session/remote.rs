@@ -105,6 +105,17 @@ fn joined(ticks: &str, device: &str) -> Vec<u8> {
     out.into_bytes()
 }
 
+fn vtu(body: &LayeredBody, displacements: &[Vec3]) -> anyhow::Result<Vec<u8>> {
+    let at: Vec<Vec3> = (body.positions.iter().zip(displacements))
+        .map(|(x, u)| x + u)
+        .collect();
+    let mut out = Vec::new();
+    Grid::of_body(body, &at)
+        .with_point_vectors("displacement", displacements)
+        .write(&mut out)?;
+    Ok(out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::joined;
@@ -118,15 +129,4 @@ mod tests {
         let wanted = "tick,now,faults,force_x,device_faults\n1,0.5,0,2.5,1\n";
         assert_eq!(String::from_utf8(table).unwrap(), wanted);
     }
-}
-
-fn vtu(body: &LayeredBody, displacements: &[Vec3]) -> anyhow::Result<Vec<u8>> {
-    let at: Vec<Vec3> = (body.positions.iter().zip(displacements))
-        .map(|(x, u)| x + u)
-        .collect();
-    let mut out = Vec::new();
-    Grid::of_body(body, &at)
-        .with_point_vectors("displacement", displacements)
-        .write(&mut out)?;
-    Ok(out)
 }

@@ -14,7 +14,7 @@ use palpa_tissue::{ContactShape, ContactTool, MaterialStatus, ModelKind, Scene, 
 use palpa_viewer::control::{self, LayerInfo, LumpForm, LumpInfo, Method, ToolForm, ToolInfo};
 
 use super::hand::{HOVER, Place, Skin};
-use crate::build::{BuiltBody, build};
+use crate::build::BuiltBody;
 use crate::continuum;
 use crate::engine::{LiveScene, Look, SpringScene, Watch, device_model, grip};
 use crate::press;
@@ -108,17 +108,9 @@ impl World {
     }
 
     fn of_springs(scene: Scene, notes: Vec<String>) -> anyhow::Result<Self> {
-        let built = Arc::new(build(&scene)?);
-        let springs = SpringScene::new(&scene, Arc::clone(&built))?;
-        let body = &built.growth.body;
-        let place = press::Place::find(&scene, body, built.press_vertex, &mut Vec::new())?;
-        let tool = ContactTool {
-            shape: ContactShape::Sphere { radius: LEAST_TOOL },
-            friction: 0.0,
-            axis: None,
-        };
-        let (_, at_rest) = continuum::tool(&tool, place.direction.into_inner(), place.at)?;
-        let frame = at_rest * Pose::translation(0.0, 0.0, scene.motion.above);
+        let springs = SpringScene::build(&scene)?;
+        let built = Arc::clone(springs.built());
+        let frame = springs.scene_from_device;
         Self::around(scene, &built, frame, notes, Kind::Springs(springs))
     }
 
@@ -194,7 +186,7 @@ impl World {
                 Engine::start(tissue, devices, &params, recorder)?
             }
             Kind::Springs(springs) => {
-                let tissue = springs.tissue(self.scene_from_device, tip, watch)?;
+                let tissue = springs.tissue(tip, Some(watch))?;
                 Engine::start(tissue, devices, &params, recorder)?
             }
         };
@@ -209,7 +201,7 @@ impl World {
     pub fn beginning(&self) -> Vec3 {
         match &self.kind {
             Kind::Tissue(live) => (self.scene_from_device * Point3::from(live.start)).coords,
-            Kind::Springs(_) => self.scene_from_device.translation.vector,
+            Kind::Springs(springs) => springs.beginning(),
         }
     }
 
