@@ -153,9 +153,13 @@ export function connect(): void {
 }
 
 /** Asks; resolves to why it was refused, or null. Nothing is shown: for fields, which show it themselves. */
-export function ask(request: Request): Promise<string | null> {
-  if (request.type === 'load_text') awaitScene();
-  return connection?.request(request) ?? Promise.resolve('not connected');
+export async function ask(request: Request): Promise<string | null> {
+  const isScene = request.type === 'load_text';
+  if (isScene) awaitScene();
+  const error = (await connection?.request(request)) ?? (connection === null ? 'not connected' : null);
+  // What was refused does not come, and the next scene is a changed one again.
+  if (isScene && error !== null) originalRevision = null;
+  return error;
 }
 
 /** Asks, and says in words when it is refused. */

@@ -16,7 +16,7 @@ const SHARE = 0.995;
 
 /** How a quantity is mapped. */
 export function mapFor(by: ColourBy): MapName {
-  return by === 'pressure' ? 'vik' : by === 'stiffness' ? 'cividis' : 'viridis';
+  return by === 'pressure' ? 'vik' : by === 'stiffness' ? 'cividis' : 'ylgnbu';
 }
 
 export class Colouring {

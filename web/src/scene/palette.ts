@@ -50,15 +50,15 @@ export function layerColours(layers: readonly Pick<LayerInfo, 'name'>[]): string
   });
 }
 
-/** Viridis (van der Walt and Smith, 2015), every eighth part. */
-const VIRIDIS = ['#440154', '#472d7b', '#3b528b', '#2c728e', '#21918c', '#28ae80', '#5ec962', '#addc30', '#fde725'];
+/** YlGnBu (Brewer, 2002), safe for colour-blind eyes. Nothing is light, so that a body of which little moves keeps its shape. */
+const YLGNBU = ['#fbf8d0', '#edf4b1', '#c7e9b4', '#7fcdbb', '#41b6c4', '#1d91c0', '#225ea8', '#253494', '#081d58'];
 /** Cividis (Nuñez, Anderton and Renslow, 2018). */
 const CIVIDIS = ['#00224e', '#123570', '#3b496c', '#575d6d', '#707173', '#8a8678', '#a59c74', '#c3b369', '#fee838'];
 /** Vik (Crameri, 2018): blue below the middle, brown above. */
 const VIK = ['#001261', '#033e7d', '#1e6f9d', '#71a8c4', '#c9dde7', '#ece5e0', '#eacebd', '#d39774', '#be6533', '#8b2706', '#590008'];
 
-export type MapName = 'viridis' | 'cividis' | 'vik';
-const MAPS: Record<MapName, string[]> = { viridis: VIRIDIS, cividis: CIVIDIS, vik: VIK };
+export type MapName = 'ylgnbu' | 'cividis' | 'vik';
+const MAPS: Record<MapName, string[]> = { ylgnbu: YLGNBU, cividis: CIVIDIS, vik: VIK };
 
 export function mapStops(name: MapName): string[] {
   return MAPS[name];

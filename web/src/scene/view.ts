@@ -115,7 +115,7 @@ export class BodyView {
       this.isRefining = true;
       this.invalidate('shadow');
     });
-    this.maps = Object.fromEntries((['viridis', 'cividis', 'vik'] as const).map((name) => [name, mapTexture(name)]));
+    this.maps = Object.fromEntries((['ylgnbu', 'cividis', 'vik'] as const).map((name) => [name, mapTexture(name)]));
     this.shared.map.value = this.maps.viridis;
     this.lumps = new LumpsView(this.shared, this.stage, this.planes);
 

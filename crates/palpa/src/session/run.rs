@@ -948,7 +948,10 @@ impl Body {
         let Some(live) = &mut self.live else { return };
         let report = live.running.engine.report();
         let (status, meshes) = (live.step.status, live.step.mesh);
-        let n_nodes = self.frame.displacements.len() / 3;
+        let n_nodes = match self.frame.displacements.len() / 3 {
+            0 => live.world.n_nodes(),
+            n => n,
+        };
         let (figures, notices) =
             live.figures
                 .make(&report, &live.entry, status, meshes, n_nodes, n_frames);
