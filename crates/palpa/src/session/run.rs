@@ -25,12 +25,13 @@ use super::game::Game;
 use super::hand::{Goal, HandDriver, Place};
 use super::recording::{self, MeshBytes, Recording};
 use super::remote::{Material, Order, Remote};
-use super::world::{Running, World};
+use super::world::{BEFORE_THE_BROWSER, Running, World};
 use super::{edit, frame, gallery};
 use crate::cli::one_paragraph;
 use crate::engine::{Look, Seen, notes_of, once_from};
 
 const PERIOD: Duration = Duration::from_micros(16_667);
+const MOST_ORDERS: u32 = 1000;
 const FIGURES_PERIOD: Duration = Duration::from_millis(500);
 /// A page says at least so often where the hand is while it presses; one that says nothing for so long has let go.
 const HAND_SILENCE: Duration = Duration::from_secs(1);
@@ -105,7 +106,11 @@ impl Session {
         let fields = Fields::start()?;
         let thread = thread::Builder::new()
             .name("palpa-session".to_owned())
-            .spawn(move || Body::new(self, publisher, fields).run())?;
+            .spawn(move || {
+                // It moves the hand: as near to the tissue as the system lets it.
+                BEFORE_THE_BROWSER.ask("palpa-session");
+                Body::new(self, publisher, fields).run();
+            })?;
         Ok(Handle {
             orders,
             thread: Some(thread),
@@ -219,18 +224,27 @@ impl Body {
         let mut figures_due = due;
         let mut last = due;
         loop {
-            match self
-                .inbox
-                .recv_timeout(due.saturating_duration_since(Instant::now()))
-            {
-                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => break,
-                Ok(order) => {
-                    self.obey(order);
-                    if Instant::now() < due {
-                        continue;
-                    }
+            let rest = due.saturating_duration_since(Instant::now());
+            let mut next = match self.inbox.recv_timeout(rest) {
+                Err(RecvTimeoutError::Disconnected) => return self.end(),
+                next => next.ok(),
+            };
+            // All that lies there, up to what may come in a second: a page may ask for more than there are frames.
+            let mut n_left = MOST_ORDERS;
+            while let Some(order) = next {
+                if matches!(order, Order::Stop) {
+                    return self.end();
                 }
-                Err(RecvTimeoutError::Timeout) => {}
+                self.obey(order);
+                n_left -= 1;
+                next = if n_left > 0 {
+                    self.inbox.try_recv().ok()
+                } else {
+                    None
+                };
+            }
+            if Instant::now() < due {
+                continue;
             }
             let now = Instant::now();
             due = (due + PERIOD).max(now);
@@ -244,6 +258,9 @@ impl Body {
                 self.tell_state();
             }
         }
+    }
+
+    fn end(self) {
         if let Some(live) = self.live {
             live.running.engine.stop();
         }

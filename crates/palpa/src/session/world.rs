@@ -24,7 +24,7 @@ const LOOK_PERIOD: f64 = 1.0 / 60.0;
 /// Steps of the tissue are this far apart at least, s: who looks on needs the processor as well.
 const STEP_PERIOD: f64 = 2e-3;
 /// A browser without a graphics card takes all cores that it gets; the force comes first, where the system lets it.
-const BEFORE_THE_BROWSER: Wish = Wish {
+pub(super) const BEFORE_THE_BROWSER: Wish = Wish {
     priority: Priority::Nice(-10),
     core: None,
 };
