@@ -84,8 +84,7 @@ test('keys press, step, deepen and lift', async () => {
   await palpa.page.keyboard.press('Space');
   const first = await palpa.steady();
   for (let k = 0; k < 3; k++) await palpa.page.keyboard.press('PageDown');
-  const deeper = await palpa.reads('a greater depth', ({ metres }) => metres > first.metres + 0.8e-3);
-  assert.ok(deeper.newtons > 0);
+  await palpa.reads('a greater depth and a force', ({ metres, newtons }) => metres > first.metres + 0.8e-3 && newtons > 0);
   await palpa.page.keyboard.press('ArrowRight');
   await palpa.page.keyboard.press('Shift+ArrowUp');
   await palpa.steady(0.05);

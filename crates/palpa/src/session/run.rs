@@ -145,6 +145,34 @@ struct Live {
     mesh_bytes: MeshBytes,
 }
 
+impl Live {
+    /// Starts the engine on a body at rest with the hand over a place; with a recorder, where a replay begins.
+    fn start(
+        world: &World,
+        place: Place,
+        recorder: &RecorderParams,
+    ) -> anyhow::Result<impl FnOnce(World) -> Self + use<>> {
+        let along = world.scene_from_device.rotation * Vec3::x();
+        let hand = HandDriver::over(place, along, world.tool_size());
+        let tip = if recorder.path.is_some() {
+            world.beginning()
+        } else {
+            hand.tip()
+        };
+        let running = world.start(tip, recorder)?;
+        Ok(move |world| Self {
+            world,
+            running,
+            hand,
+            figures: Figures::new(),
+            entry: TickEntry::default(),
+            step: StepRecord::default(),
+            mesh: 0,
+            mesh_bytes: MeshBytes::default(),
+        })
+    }
+}
+
 /// All that the thread holds.
 struct Body {
     params: SessionParams,
@@ -417,20 +445,9 @@ impl Body {
         }
     }
 
-    /// Starts the engine on a body at rest, and ends the one before. A recording begins where a replay does.
+    /// Starts the engine on a body at rest, and ends the one before. A recording begins where a replay does. If there is no
+    /// starting it, the body before is there again.
     fn start(&mut self, world: World, log: Option<PathBuf>) -> anyhow::Result<()> {
-        let near = self.live.as_ref().map(|live| live.hand.place().point);
-        let place = near
-            .filter(|_| log.is_none())
-            .and_then(|point| {
-                world
-                    .skin
-                    .nearest(point)
-                    .filter(|p| (p.point - point).norm() < 0.02)
-            })
-            .unwrap_or(world.home);
-        let along = world.scene_from_device.rotation * Vec3::x();
-        let hand = HandDriver::over(place, along, world.tool_size());
         let recorder = match log {
             None => RecorderParams::default(),
             Some(path) => RecorderParams {
@@ -439,28 +456,35 @@ impl Body {
                 notes: notes_of(&world.scene)?,
             },
         };
-        let tip = if recorder.path.is_some() {
-            world.beginning()
-        } else {
-            hand.tip()
-        };
         // First the old one: two at once would share the processor, and the first steps are the costliest.
-        if let Some(old) = self.live.take() {
+        let before = self.live.take().map(|old| {
             old.running.engine.stop();
-        }
-        let running = world.start(tip, &recorder)?;
-        self.live = Some(Live {
-            world,
-            running,
-            hand,
-            figures: Figures::new(),
-            entry: TickEntry::default(),
-            step: StepRecord::default(),
-            mesh: 0,
-            mesh_bytes: MeshBytes::default(),
+            (old.world, old.hand.place().point)
         });
-        self.describe();
-        Ok(())
+        let home = world.home;
+        // A body that was only changed is pressed where it was before.
+        let same = (before.as_ref())
+            .filter(|(old, _)| recorder.path.is_none() && old.scene.body == world.scene.body)
+            .and_then(|(_, point)| world.skin.nearest(*point));
+        let places = same.into_iter().chain([home]);
+        let mut failed = None;
+        for place in places {
+            match Live::start(&world, place, &recorder) {
+                Ok(live) => {
+                    self.live = Some(live(world));
+                    self.describe();
+                    return Ok(());
+                }
+                Err(error) => failed = Some(error),
+            }
+        }
+        if let Some((old, _)) = before
+            && let Ok(live) = Live::start(&old, old.home, &RecorderParams::default())
+        {
+            self.live = Some(live(old));
+        }
+        self.is_changed = true;
+        Err(failed.unwrap_or_else(|| anyhow::anyhow!("there is no place to begin")))
     }
 
     /// What pages are told of the body that is there.
@@ -744,11 +768,9 @@ impl Body {
         }
         self.close_replay();
         self.motion = None;
-        let Some(live) = self.live.take() else {
+        if self.live.is_none() {
             bail!("there is no body yet");
-        };
-        let Live { world, running, .. } = live;
-        running.engine.stop();
+        }
         self.n_recordings += 1;
         std::fs::create_dir_all(&self.params.out)
             .with_context(|| format!("the folder {} cannot be made", self.params.out.display()))?;
@@ -756,6 +778,10 @@ impl Body {
             .params
             .out
             .join(format!("recording-{}.mcap", self.n_recordings));
+        let Some(Live { world, running, .. }) = self.live.take() else {
+            bail!("there is no body yet");
+        };
+        running.engine.stop();
         if let Err(error) = self.start(world, Some(log.clone())) {
             self.build();
             return Err(error);
