@@ -32,6 +32,9 @@ pub struct Args {
     /// What a page must know to come in: 8 characters or more
     #[arg(long, value_name = "TEXT", env = "PALPA_TOKEN", hide_env_values = true)]
     token: Option<String>,
+    /// Seed of the lumps that "find the lump" hides, for the same places again; the rounds after the first count on
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Let the page ask for faults of the engine, for drills and tests
     #[arg(long, hide = true)]
     allow_faults: bool,
@@ -58,6 +61,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         scene,
         gallery_key,
         out: out.path().to_owned(),
+        seed: args.seed,
         allows_faults: args.allow_faults,
     });
     let params = |port| ServerParams {

@@ -49,6 +49,8 @@ pub struct SessionParams {
     pub gallery_key: Option<String>,
     /// The folder for recordings.
     pub out: PathBuf,
+    /// Seed of the first round of finding lumps, where the page gives none; the rounds after it count on.
+    pub seed: Option<u64>,
     /// Whether pages may ask for faults.
     pub allows_faults: bool,
 }
@@ -886,7 +888,11 @@ impl Body {
             Some(game) => game.before.clone(),
             None => self.wanted.scene.clone(),
         };
+        let seed = seed.or(self.params.seed);
         let (game, scene) = Game::hide(&live.world, &before, seed, n_lumps)?;
+        if let Some(next) = &mut self.params.seed {
+            *next = next.wrapping_add(1);
+        }
         self.close_replay();
         self.recording = None;
         self.motion = None;

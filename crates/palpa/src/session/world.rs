@@ -25,7 +25,7 @@ const LOOK_PERIOD: f64 = 1.0 / 60.0;
 const STEP_PERIOD: f64 = 2e-3;
 /// A browser without a graphics card takes all cores that it gets; the force comes first, where the system lets it.
 pub(super) const BEFORE_THE_BROWSER: Wish = Wish {
-    priority: Priority::Nice(-18),
+    priority: Priority::Nice(-10),
     core: None,
 };
 /// Least size of what stands for a bonded tool, m.

@@ -263,11 +263,12 @@ fn the_patch_of_2009_is_felt_with_both_methods() {
 
 #[test]
 fn hidden_lumps_stay_hidden_until_the_truth_is_asked_for() {
-    let viewer = Viewer::start(&[]);
+    let viewer = Viewer::start(&["--seed", "7"]);
     viewer.ask(&json!({ "type": "load_scene", "key": "block" }));
     viewer.wait_until(|s| s["gallery_key"] == "block" && s["phase"] == "running");
-    viewer.ask(&json!({ "type": "start_game", "seed": 7, "n_lumps": 2 }));
+    viewer.ask(&json!({ "type": "start_game", "n_lumps": 2 }));
     let state = viewer.wait_until(|s| s["game"]["n_lumps"] == 2 && s["phase"] == "running");
+    assert_eq!(state["game"]["seed"], 7);
     assert_eq!(state["lumps"], json!([]));
     assert!(state["scene"].get("lump").is_none());
     assert!(
