@@ -19,7 +19,7 @@ const FIRST_WAIT = 500;
 const LONGEST_WAIT = 5000;
 /** A connection that says nothing for so long is lost: the engine speaks twice a second. */
 const SILENCE = 6000;
-const REPLY_WAIT = 10_000;
+const REPLY_WAIT = 35_000;
 
 export class Connection {
   private socket: WebSocket | null = null;

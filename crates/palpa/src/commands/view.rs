@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use palpa_tissue::Scene;
-use palpa_viewer::{Server, ServerParams};
+use palpa_viewer::{Host as _, Server, ServerParams};
 use serde::Serialize;
 
 use super::Outcome;
@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Let the page ask for faults of the engine, for drills and tests
-    #[arg(long, hide = true)]
+    #[arg(long)]
     allow_faults: bool,
 }
 
@@ -70,10 +70,12 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         token: args.token.clone(),
     };
     let server = match args.port {
-        Some(port) => Server::start(&params(port), remote)?,
+        Some(port) => Server::start(&params(port), remote.clone())?,
         // Who did not ask for a port is not to be held up by another viewer.
         None => match Server::start(&params(PORT), remote.clone()) {
-            Err(palpa_viewer::ServerError::PortInUse { .. }) => Server::start(&params(0), remote)?,
+            Err(palpa_viewer::ServerError::PortInUse { .. }) => {
+                Server::start(&params(0), remote.clone())?
+            }
             started => started?,
         },
     };
@@ -92,8 +94,16 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         ));
     }
     context.begin_recording();
+    let mut told = None;
     while !context.is_interrupted() {
         std::thread::sleep(Duration::from_millis(50));
+        let problem = remote.problem();
+        if problem != told {
+            if let Some(problem) = &problem {
+                context.note(format!("there is no body: {problem}"));
+            }
+            told = problem;
+        }
     }
     drop(handle);
     drop(server);
@@ -109,7 +119,8 @@ fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {
     };
     let key = path.to_string_lossy();
     let is_key = !path.exists() && gallery::entries().iter().any(|entry| entry.key == key);
-    if is_key {
+    let is_word = path.extension().is_none() && path.components().count() == 1;
+    if is_key || !path.exists() && is_word {
         return Ok((gallery::scene(&key)?, Some(key.into_owned())));
     }
     Ok((Scene::load(path)?, None))

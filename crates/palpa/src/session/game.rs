@@ -27,6 +27,8 @@ const GRAIN: f64 = 2e-3;
 const MOST_TOUCHES: usize = 4000;
 /// A press tells of the skin as far round it, m.
 const REACH: f64 = 8e-3;
+/// Largest seed: a page has no larger whole numbers.
+const MOST_SEED: u64 = (1 << 53) - 1;
 /// Most marks: nobody finds more lumps than that.
 const MOST_MARKS: usize = 10;
 
@@ -66,6 +68,9 @@ impl Game {
             bail!(
                 "bars between nodes have no place for a lump; choose a scene of the continuum model"
             );
+        }
+        if seed.is_some_and(|seed| seed > MOST_SEED) {
+            bail!("a seed is a whole number up to {MOST_SEED}");
         }
         let seed = seed.unwrap_or_else(|| fastrand::u64(..1_000_000));
         let mut random = fastrand::Rng::with_seed(seed);

@@ -1,8 +1,11 @@
 //! A recording as it is looked at again: its frames in memory, beside the log that the engine writes.
 
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use anyhow::{Context as _, bail};
 use palpa_viewer::control::RecordingInfo;
 use palpa_viewer::wire::FrameSnapshot;
 
@@ -10,6 +13,24 @@ use palpa_viewer::wire::FrameSnapshot;
 const MOST_BYTES: usize = 200 << 20;
 /// Longest recording, s: the log of an hour is some gigabytes.
 pub(super) const LONGEST: f64 = 3600.0;
+
+/// A file for a log in a folder, which is made if need be: the first number that is free, also where others record there.
+///
+/// # Errors
+/// When the folder or the file cannot be made.
+pub(super) fn new_log(folder: &Path) -> anyhow::Result<PathBuf> {
+    let advice = || format!("no recording can be made in {}", folder.display());
+    std::fs::create_dir_all(folder).with_context(advice)?;
+    for n in 1_u32.. {
+        let path = folder.join(format!("recording-{n}.mcap"));
+        match File::create_new(&path) {
+            Ok(_) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error).with_context(advice),
+        }
+    }
+    bail!("{} is full of recordings", folder.display())
+}
 
 /// A mesh, as bytes of a snapshot.
 pub(super) type MeshBytes = Arc<Vec<u8>>;
@@ -186,6 +207,15 @@ mod tests {
         recording.is_playing = true;
         recording.advance(5.0);
         assert!(!recording.is_playing && recording.at >= recording.duration());
+    }
+
+    #[test]
+    fn no_log_is_ever_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = [(); 2].map(|()| new_log(folder.path()).unwrap());
+        assert_ne!(a, b);
+        assert!(a.exists() && b.exists());
+        assert!(new_log(&a).is_err());
     }
 
     #[test]

@@ -193,7 +193,6 @@ struct Body {
     heard: Option<Instant>,
     motion: Option<Motion>,
     recording: Option<Recording>,
-    n_recordings: u32,
     game: Option<Game>,
     /// Numbers of meshes and frames as pages see them.
     mesh: u32,
@@ -237,7 +236,6 @@ impl Body {
             heard: None,
             motion: None,
             recording: None,
-            n_recordings: 0,
             game: None,
             mesh: 0,
             shown_replay_mesh: None,
@@ -581,6 +579,7 @@ impl Body {
     }
 
     fn run_motion(&mut self) -> anyhow::Result<()> {
+        self.close_replay();
         let Some(live) = &mut self.live else {
             bail!("there is no body yet");
         };
@@ -773,13 +772,7 @@ impl Body {
         if self.live.is_none() {
             bail!("there is no body yet");
         }
-        self.n_recordings += 1;
-        std::fs::create_dir_all(&self.params.out)
-            .with_context(|| format!("the folder {} cannot be made", self.params.out.display()))?;
-        let log = self
-            .params
-            .out
-            .join(format!("recording-{}.mcap", self.n_recordings));
+        let log = recording::new_log(&self.params.out)?;
         let Some(Live { world, running, .. }) = self.live.take() else {
             bail!("there is no body yet");
         };
@@ -871,6 +864,10 @@ impl Body {
 
     // Find the lump.
 
+    fn hides_lumps(&self) -> bool {
+        self.game.as_ref().is_some_and(|game| !game.is_revealed())
+    }
+
     fn game(&mut self) -> anyhow::Result<&mut Game> {
         self.game
             .as_mut()
@@ -894,7 +891,6 @@ impl Body {
             *next = next.wrapping_add(1);
         }
         self.close_replay();
-        self.recording = None;
         self.motion = None;
         self.state.field = Field::None;
         self.game = Some(game);
@@ -954,13 +950,14 @@ impl Body {
     fn material(&mut self, file: HostFile) -> Option<Material> {
         match file {
             HostFile::Scene => {
-                let is_hidden = self.game.as_ref().is_some_and(|game| !game.is_revealed());
                 let scene = match &self.game {
-                    Some(game) if is_hidden => &game.before,
+                    Some(game) if self.hides_lumps() => &game.before,
                     _ => &self.wanted.scene,
                 };
                 Some(Material::Scene(scene.to_toml()))
             }
+            // The mesh is finer round lumps.
+            HostFile::Body if self.hides_lumps() => None,
             HostFile::Body => self.body_now(),
             HostFile::RecordingLog | HostFile::RecordingCsv => {
                 let recording = self.recording.as_ref()?;

@@ -28,6 +28,9 @@ pub(super) const BEFORE_THE_BROWSER: Wish = Wish {
     priority: Priority::Nice(-10),
     core: None,
 };
+/// Edges under the tool and in lumps where a scene says nothing of them, m: so many nodes as a hand can be followed with.
+const LEAST_EDGE: f64 = 3e-3;
+const NEAR_LUMPS: f64 = 6e-3;
 /// Least size of what stands for a bonded tool, m.
 const LEAST_TOOL: f64 = 5e-3;
 /// Deepest press that a page offers, as a multiple of that of the scene's motion.
@@ -306,6 +309,20 @@ fn fit_for_touch(scene: &Scene, notes: &mut Vec<String>) -> Scene {
         scene.tool = tool;
     }
     scene.mesh.moves |= scene.mesh.refine;
+    let usual = scene.mesh.near_tool_of(&scene.tool);
+    if scene.mesh.refine && scene.mesh.near_tool.is_none() {
+        let fine = (scene.tool.contact_radius() / 3.0).max(LEAST_EDGE);
+        scene.mesh.near_tool = Some(fine);
+        if usual.is_some_and(|usual| 1.5 * usual < fine) {
+            notes.push(format!(
+                "the skin's edges under the tool are {:.1} mm long, so that a hand can be followed; [mesh] near_tool makes them finer",
+                fine * 1e3
+            ));
+        }
+    }
+    if scene.mesh.near_lumps.is_none() {
+        scene.mesh.near_lumps = Some(NEAR_LUMPS);
+    }
     scene
 }
 
