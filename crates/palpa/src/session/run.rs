@@ -355,9 +355,7 @@ impl Body {
             Request::Seek { time } => self.seek(time),
             Request::Play { on } => self.play(on),
             Request::ShowField { field } => {
-                if self.game.as_ref().is_some_and(|game| !game.is_revealed())
-                    && field != Field::None
-                {
+                if self.hides_lumps() && field != Field::None {
                     bail!("while lumps are hidden, only displacement may be shown");
                 }
                 self.state.field = field;
@@ -492,7 +490,7 @@ impl Body {
         self.is_changed = true;
         let Some(live) = &self.live else { return };
         let world = &live.world;
-        let hides = self.game.as_ref().is_some_and(|game| !game.is_revealed());
+        let hides = self.hides_lumps();
         let mut scene = world.scene.clone();
         if hides {
             scene.lumps.clear();
@@ -762,7 +760,7 @@ impl Body {
         if self.is_recording() {
             bail!("a recording is under way already");
         }
-        if self.game.as_ref().is_some_and(|game| !game.is_revealed()) {
+        if self.hides_lumps() {
             bail!(
                 "a log holds the whole scene, hidden lumps as well: record after the truth is shown"
             );
@@ -989,7 +987,7 @@ impl Body {
     fn tell_figures(&mut self) {
         self.watch_over();
         // Time goes on in a game and in a recording.
-        self.is_changed |= self.game.as_ref().is_some_and(|game| !game.is_revealed());
+        self.is_changed |= self.hides_lumps();
         let n_frames = self.n_frames;
         let Some(live) = &mut self.live else { return };
         let report = live.running.engine.report();
