@@ -1,21 +1,33 @@
 // What goes wrong: connections, engines, browsers, messages. The page says so, and goes on.
 
 import assert from 'node:assert/strict';
-import { after, test } from 'node:test';
+import { after, afterEach, test } from 'node:test';
 import WebSocket from 'ws';
 import { NO_GL, launch } from './browser.mjs';
-import { LONG, PalpaPage } from './page.mjs';
-import { sharedBrowser } from './session.mjs';
+import { PalpaPage } from './page.mjs';
+import { endShared, sharedBrowser } from './session.mjs';
 import { Viewer, pause, until } from './viewer.mjs';
 
 /** A viewer of this file's own: it is stopped, killed and made to fail. A block is built soonest. @type {Viewer | undefined} */
 let viewer;
+/** Those that a test opened; one that failed left them. @type {PalpaPage[]} */
+let pages = [];
+
+afterEach(async () => {
+  for (const palpa of pages) await palpa.close();
+  pages = [];
+});
 after(() => viewer?.stop());
 
-/** @param {import('playwright-core').BrowserContextOptions} options */
-async function openPage(options = {}) {
+async function ownViewer() {
+  await endShared();
   viewer ??= await Viewer.start({ scene: 'block' });
-  const palpa = await PalpaPage.open(await sharedBrowser(), viewer, options);
+  return viewer;
+}
+
+async function openPage() {
+  const palpa = await PalpaPage.open(await sharedBrowser(), await ownViewer());
+  pages.push(palpa);
   await palpa.drawn();
   await palpa.running();
   return palpa;
@@ -51,7 +63,6 @@ test('a connection that is lost is said, and comes back', async () => {
   await until('the state is that of the new engine', async () => (await palpa.by('layer-0-young').inputValue()) !== '321 kPa');
   assert.equal(await palpa.page.locator('html').getAttribute('data-theme'), 'dark', 'settings are kept');
   await pressByKeys(palpa);
-  await palpa.close();
 });
 
 test('an engine that is stopped by the system is said, and goes on', async () => {
@@ -65,7 +76,6 @@ test('an engine that is stopped by the system is said, and goes on', async () =>
   await palpa.by('connection-lost').waitFor({ state: 'detached' });
   await palpa.running();
   await pressByKeys(palpa);
-  await palpa.close();
 });
 
 test('of two pages one controls, and hands over by a click', async () => {
@@ -94,8 +104,6 @@ test('of two pages one controls, and hands over by a click', async () => {
   await until('the second controls', async () => (await who(second)) === 'you');
   await until('the first watches', async () => (await who(first)) === 'other');
   await pressByKeys(second);
-  await first.close();
-  await second.close();
 });
 
 test('a fault of the engine is said in words, and the engine goes on', async () => {
@@ -118,7 +126,6 @@ test('a fault of the engine is said in words, and the engine goes on', async () 
     await palpa.viewer.running('it is well', () => true);
   }
   await pressByKeys(palpa);
-  await palpa.close();
 });
 
 test('messages that are malformed, huge or too many disturb nobody', async () => {
@@ -155,16 +162,14 @@ test('messages that are malformed, huge or too many disturb nobody', async () =>
   assert.equal(await palpa.by('controller-status').getAttribute('data-controls'), 'you');
   assert.equal(await palpa.by('connection-lost').count(), 0);
   await pressByKeys(palpa);
-  await palpa.close();
 });
 
 test('a browser without WebGL 2 is told what to do, and the rest works', async () => {
-  viewer ??= await Viewer.start({ scene: 'block' });
   const browser = await launch(NO_GL);
   try {
-    const palpa = await PalpaPage.open(browser, viewer);
+    const palpa = await PalpaPage.open(browser, await ownViewer());
     const message = palpa.by('no-webgl');
-    await message.waitFor({ timeout: LONG });
+    await message.waitFor();
     assert.match(await message.innerText(), /WebGL 2/);
     assert.match(await message.innerText(), /hardware acceleration/);
     await palpa.running();

@@ -40,7 +40,15 @@ async function open() {
   return palpa;
 }
 
+/** Ends the shared page and viewer: a test that has its own needs the cores for them. */
+export async function endShared() {
+  const [before, served] = [await page, await viewer];
+  page = viewer = undefined;
+  await before?.close();
+  await served?.stop();
+}
+
 after(async () => {
+  await endShared();
   await (await browser)?.close();
-  await (await viewer)?.stop();
 });

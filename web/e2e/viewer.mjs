@@ -17,10 +17,10 @@ function binary() {
   return path;
 }
 
-/** How long a slow machine may take to start, ms. */
-const START = 60_000;
+/** How long a slow machine may take for what a person would wait for, ms. */
+export const LONG = 120_000;
 /** How long it may take to end when it is asked to, ms. */
-const END = 5000;
+const END = 20_000;
 
 /** @param {number} ms */
 export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -33,7 +33,7 @@ export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
  * @param {number} timeout
  * @returns {Promise<T>}
  */
-export async function until(what, look, timeout = 30_000) {
+export async function until(what, look, timeout = LONG) {
   const end = performance.now() + timeout;
   for (;;) {
     const found = await look();
@@ -70,7 +70,7 @@ export class Viewer {
     const started = await until('the viewer says where it is', () => {
       if (child.exitCode !== null) throw new Error(`the viewer ended: ${viewer.stderr}`);
       return stdout.includes('}') && JSON.parse(stdout);
-    }, START);
+    });
     viewer.url = started.url;
     viewer.port = started.port;
     return viewer;
@@ -120,7 +120,7 @@ export class Viewer {
     return until(`${what} and the engine runs`, async () => {
       const state = await this.state();
       return state.phase === 'running' && isSo(state) && state;
-    }, 60_000);
+    });
   }
 
   /** Asks it to end, as Ctrl-C does. */

@@ -288,8 +288,12 @@ export function QuantityField(props: {
   const [error, setError] = useState<string | null>(null);
   const [isSliding, setSliding] = useState(false);
   const committed = useRef<string | null>(null);
+  const seen = useRef(props.value);
   // What was committed is shown until the engine says what it has made of it.
   useEffect(() => {
+    // The first time there is nothing new, and somebody may have begun to type before this runs.
+    if (seen.current === props.value) return;
+    seen.current = props.value;
     if (!isSliding) setDraft(null);
     setError(null);
   }, [props.value]);

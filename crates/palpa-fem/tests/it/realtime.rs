@@ -462,6 +462,61 @@ fn it_lets_go_when_the_tool_leaves() {
 }
 
 #[test]
+fn a_body_at_rest_is_let_be_and_wakes_when_touched() {
+    const DT: f64 = 0.01;
+    let term = PronyTerm { g: 0.5, tau: 0.1 };
+    let viscous = Prony::new(vec![term], Moduli::Instantaneous, true).unwrap();
+    let tool = sphere(0.3);
+    let press = |live: &mut Live| {
+        for k in 1..=20 {
+            live.step(&at(tool, 0.0, 0.0, 0.15e-3 * f64::from(k)), DT);
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+        }
+        live.tool_force(0)
+    };
+    for (prony, mode) in [None, Some(&viscous)]
+        .into_iter()
+        .flat_map(|prony| MODES.map(|mode| (prony, mode)))
+    {
+        let what = format!("viscous: {}, {mode:?}", prony.is_some());
+        // A linear exterior is that of the depth at which it was last brought up to date, at rest or not.
+        let (left_bound, force_bound) = match mode.1 {
+            ExteriorMode::Followed => (5e-7, 1e-3),
+            ExteriorMode::Linear => (2e-5, 0.04),
+        };
+        let model = model_of(13, false, prony);
+        let away = at(tool, 0.0, 0.0, -5e-3);
+        let mut live = Live::new(Arc::clone(&model), &away, params(mode)).unwrap();
+        let first = press(&mut live);
+        // Two seconds are twenty times the longest memory.
+        let mut n_solved = 0;
+        for _ in 0..200 {
+            n_solved += live.step(&away, DT).iterations;
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+        }
+        assert!(n_solved > 0, "{what}: the skin comes back");
+        live.settle();
+        let before = live.displacements().to_vec();
+        let most = before.iter().map(Vec3::norm).fold(0.0, f64::max);
+        assert!(most < left_bound, "{what}: {most} m are left");
+        for _ in 0..20 {
+            assert_eq!(live.step(&away, DT).iterations, 0, "{what}");
+        }
+        assert_eq!(live.displacements(), before, "{what}");
+        let second = press(&mut live);
+        let error = (second - first).norm() / first.norm();
+        assert!(
+            error < force_bound,
+            "{what}: {first} N, and then {second} N"
+        );
+    }
+}
+
+#[test]
 fn the_local_model_tells_the_force_of_a_small_further_press() {
     let model = model(19, false);
     let tool = sphere(0.0);

@@ -47,6 +47,10 @@ const LIFT: f64 = 2e-3;
 const MOST_LIFTS: usize = 100;
 /// A force below which a residual is not relative to it, N.
 const LEAST_FORCE: f64 = 0.01;
+/// A body that nothing touches is still where an iteration moves its zone by no more than this, m, and its forces are in
+/// balance within this share of the tolerance.
+const STILL: f64 = 1e-8;
+const STILL_SHARE: f64 = 0.1;
 /// A tool may come this fast for the vertices that it reaches to be candidates in time, m/s, and the least reach, m.
 const FASTEST: f64 = 0.1;
 const LEAST_REACH: f64 = 0.2e-3;
@@ -135,7 +139,7 @@ pub enum StepOutcome {
 pub struct LiveReport {
     /// How it ended.
     pub outcome: StepOutcome,
-    /// Newton iterations.
+    /// Newton iterations; none while nothing touches a body that is at rest.
     pub iterations: usize,
     /// Forces out of balance in the zone, as a share of the tools'.
     pub residual: f64,
@@ -338,6 +342,8 @@ pub struct Live {
     /// Whether the exterior's are, where it is followed, and how much they are out of balance, N.
     is_outside_fresh: bool,
     outside_residual: f64,
+    /// Whether nothing touched the body in the last step, which left it as it was: there is nothing to solve.
+    is_still: bool,
     x: Vec<f32>,
     moves: Vec<f32>,
     before: Vec<Vec3>,
@@ -460,6 +466,7 @@ impl Live {
             is_fresh: false,
             is_outside_fresh: false,
             outside_residual: 0.0,
+            is_still: false,
             x: vec![0.0; n_dofs],
             moves: vec![0.0; n_dofs],
             before: vec![Vec3::zeros(); n],
@@ -578,7 +585,7 @@ impl Live {
             || report.residual > LOST;
         // What has failed goes back to where the exterior is known.
         if !is_lost {
-            is_lost = self.bring_exterior().is_err();
+            is_lost = !self.is_still && self.bring_exterior().is_err();
             report.outside = self.outside_residual / self.tools_force();
             is_lost |= report.outside.is_nan() || report.outside > LOST;
         }
@@ -598,6 +605,7 @@ impl Live {
             self.pace = (self.pace * 2.0).min(1.0);
             self.n_failed = 0;
             self.keep_good();
+            self.is_still = self.is_still || self.is_still_now(&report);
         }
         if self.model.has_memory && report.outcome != StepOutcome::Failed {
             let (model, memory) = (&*self.model, &self.memory);
@@ -609,6 +617,24 @@ impl Live {
         }
         self.ask(dt);
         report
+    }
+
+    /// Whether a body that nothing touches is where it was.
+    fn stays_still(&mut self) -> bool {
+        self.is_still = self.is_still
+            && self.problem.candidates.is_empty()
+            && self.residual() <= STILL_SHARE * self.params.tolerance;
+        self.is_still
+    }
+
+    /// Whether nothing touches the body, and the iteration before moved nothing.
+    fn is_still_now(&self, report: &LiveReport) -> bool {
+        let move_of = |node: u32| {
+            (self.state.displacements[node as usize] - self.before[node as usize]).amax()
+        };
+        report.n_candidates == 0
+            && report.residual.max(report.outside) <= STILL_SHARE * self.params.tolerance
+            && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
     }
 
     /// Remembers the zone's state as one to come back to.
@@ -642,6 +668,7 @@ impl Live {
         self.tools.copy_from_slice(&self.good_tools);
         self.clearance = 0.0;
         self.spring = 0.0;
+        self.is_still = false;
         self.is_fresh = false;
         self.is_outside_fresh = false;
     }
@@ -653,6 +680,7 @@ impl Live {
         self.pressures.fill(0.0);
         self.frictions.fill(Vec3::zeros());
         self.spring = 0.0;
+        self.is_still = false;
         self.is_fresh = false;
         self.is_outside_fresh = false;
         self.depth_at_factor = f64::INFINITY;
@@ -756,6 +784,11 @@ impl Live {
             self.measure_gaps();
         } else {
             self.find_candidates(dt);
+            if self.stays_still() {
+                report.iterations = 0;
+                report.residual = self.residual();
+                return Ok(());
+            }
             self.refactor(report)?;
         }
         self.right_side();
@@ -1307,6 +1340,7 @@ impl Live {
             self.follower = follower;
             self.keep_good();
         }
+        self.is_still = false;
         self.is_fresh = false;
         self.is_outside_fresh = false;
     }
