@@ -179,6 +179,9 @@ export function edit(...edits: [path: string, value: unknown][]): Promise<string
   return ask({ type: 'edit', edits: edits.map(([path, value]) => ({ path, value })) });
 }
 
+/** Changes when the place that the scene presses does, as with another body. */
+export const homeKey = computed(() => state.value?.home.point.join());
+
 /** Changes when another body is chosen. */
 export const galleryKey = computed(() => state.value?.gallery_key);
 effect(() => {

@@ -48,6 +48,7 @@ export class HandControl {
   private click: { id: number; x: number; y: number } | null = null;
   /** Keys hold the tool until it is let go. */
   private isHeldByKeys = false;
+  private lastPlace: { point: Vec3; normal: Vec3 } | null = null;
   private sentAt = 0;
   private isDirty = false;
   private timer = 0;
@@ -76,6 +77,11 @@ export class HandControl {
     const before = this.settings;
     this.settings = { ...before, ...settings };
     if (!this.settings.enabled || this.settings.mode !== before.mode) this.lift();
+  }
+
+  /** Another body: keys begin at its home, not where another one was pressed. */
+  forget(): void {
+    this.lastPlace = null;
   }
 
   dispose(): void {
@@ -217,7 +223,6 @@ export class HandControl {
     this.isHeldByKeys = true;
     return { point: at.point, normal: at.normal, depth: HOVER };
   }
-  private lastPlace: { point: Vec3; normal: Vec3 } | null = null;
 
   /** A place over the skin, as far to the right and up as seen on the screen. */
   private stepped(from: Target, dx: number, dy: number): { point: Vec3; normal: Vec3 } {

@@ -6,7 +6,7 @@ import { t } from '../i18n';
 import { HandControl } from '../hand';
 import { BodyView, NoWebGL2, type Vec3 } from '../scene';
 import {
-  ask, askAloud, edit, isController, isReplaying, isWatching, notify, onFrame, onMesh, scene, send, state,
+  ask, askAloud, edit, homeKey, isController, isReplaying, isWatching, notify, onFrame, onMesh, scene, send, state,
 } from '../store';
 import { bodyView, firstBodyMs, legend, section } from './body';
 import { Button, Segmented } from './controls';
@@ -55,6 +55,10 @@ export function Stage() {
           enabled: isController.value && !isReplaying.value,
         }),
       ),
+      effect(() => {
+        void homeKey.value;
+        hand.forget();
+      }),
       onMesh((mesh) => body.setMesh(mesh)),
       onFrame((frame) => body.setFrame(frame)),
     ];

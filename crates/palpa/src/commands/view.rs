@@ -1,6 +1,6 @@
 //! `palpa view`: the body under one's own hand, in a browser.
 
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
     /// Address to listen at; any but this machine's own (127.0.0.1) needs --token
-    #[arg(long, default_value = "127.0.0.1", value_name = "IP")]
+    #[arg(long, default_value = "127.0.0.1", value_name = "IP", value_parser = address)]
     bind: IpAddr,
     /// What a page must know to come in: 8 characters or more
     #[arg(long, value_name = "TEXT", env = "PALPA_TOKEN", hide_env_values = true)]
@@ -38,6 +38,16 @@ pub struct Args {
     /// Let the page ask for faults of the engine, for drills and tests
     #[arg(long)]
     allow_faults: bool,
+}
+
+/// An address as a person writes it.
+fn address(text: &str) -> Result<IpAddr, String> {
+    if text == "localhost" {
+        return Ok(Ipv4Addr::LOCALHOST.into());
+    }
+    (text.parse()).map_err(|_| {
+        "expected an IP address as 127.0.0.1, 0.0.0.0 (all of this machine's) or ::1".to_owned()
+    })
 }
 
 /// Where the page is, for machines.
