@@ -57,7 +57,8 @@ export function findBrowser() {
 
 /**
  * A program that runs the browser behind everything else. Drawing in software takes all cores, and as root Chromium would
- * even put itself before the engine's tissue, which then answers too late to be felt.
+ * even put itself before the engine's tissue, which then answers too late to be felt. Where the kernel shares the cores
+ * out by terminal sessions first (autogroups), it is the session that has to be behind; the browser has one of its own.
  * @param {string} browser
  */
 function behind(browser) {
@@ -68,7 +69,7 @@ function behind(browser) {
   process.once('exit', () => rmSync(folder, { recursive: true, force: true }));
   const path = join(folder, 'browser');
   const words = [...before, browser].map((word) => `'${word.replaceAll("'", String.raw`'\''`)}'`);
-  writeFileSync(path, `#!/bin/sh\nexec ${words.join(' ')} "$@"\n`, { mode: 0o755 });
+  writeFileSync(path, `#!/bin/sh\n(echo 19 > /proc/self/autogroup) 2>/dev/null\nexec ${words.join(' ')} "$@"\n`, { mode: 0o755 });
   return path;
 }
 
