@@ -17,7 +17,7 @@ import { Viewer, pause } from './viewer.mjs';
 /** The forearm of the gallery, fine all over. */
 const SCENE = `
 [body]
-generator = { kind = "forearm", spacing = "12 mm" }
+generator = { kind = "forearm", spacing = "11 mm" }
 
 [[layer]]
 tissue = { name = "skin", young = "210 kPa", poisson = 0.45 }
