@@ -59,9 +59,13 @@ export class PalpaPage {
     return Number(await this.by('first-body-ms').getAttribute('data-ms'));
   }
 
-  /** Until the page says that the engine runs. */
+  /** Until the page says that the engine runs, and knows as much of it as others do. */
   async running() {
-    await this.page.locator('[data-testid=connection-status][data-status=open][data-phase=running]').waitFor();
+    const { revision } = await this.viewer.state();
+    await this.page.waitForFunction((least) => {
+      const { status, phase, revision } = /** @type {HTMLElement} */ (document.querySelector('[data-testid=connection-status]')).dataset;
+      return status === 'open' && phase === 'running' && Number(revision) >= least;
+    }, revision);
   }
 
   /** @param {string} name */

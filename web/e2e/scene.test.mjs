@@ -39,6 +39,7 @@ test('a layer is put back to what it was, though a broken file came between', as
   await palpa.type('layer-0-young', '20 kPa', ({ layers }) => Math.abs(layers[0].stiffness - 20e3) < 100);
   await palpa.by('layer-0-reset').click();
   await palpa.viewer.running('the tissue is as before', ({ layers }) => Math.abs(layers[0].stiffness - 10e3) < 100);
+  await palpa.running();
 });
 
 test('a value that cannot be is refused in words at its field', async () => {

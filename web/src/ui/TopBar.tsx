@@ -84,7 +84,7 @@ function ConnectionState() {
   const kind = !isOpen ? 'bad' : phase === 'stopped' ? 'bad' : phase === 'building' ? 'busy' : 'good';
   const rate = figures.value;
   return (
-    <span class={`state ${kind}`} data-testid="connection-status" data-status={status.value} data-phase={phase} role="status">
+    <span class={`state ${kind}`} data-testid="connection-status" data-status={status.value} data-phase={phase} data-revision={state.value?.revision} role="status">
       <span class="dot" aria-hidden="true" />
       {isOpen ? (phase === undefined ? t('connection.open') : t(`phase.${phase}`)) : t(`connection.${status.value}`)}
       {isOpen && phase === 'running' && rate !== null && (

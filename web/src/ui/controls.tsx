@@ -294,7 +294,8 @@ export function QuantityField(props: {
     // The first time there is nothing new, and somebody may have begun to type before this runs.
     if (seen.current === props.value) return;
     seen.current = props.value;
-    if (!isSliding) setDraft(null);
+    // What is being typed stays.
+    if (!isSliding && draft === committed.current) setDraft(null);
     setError(null);
   }, [props.value]);
   // What could not be built is not there: then the field says again what is.
