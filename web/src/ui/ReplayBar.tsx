@@ -65,7 +65,7 @@ export function ReplayBar() {
         onInput={(event) => seek(event.currentTarget.valueAsNumber)}
         onChange={() => (isDragging.current = false)}
         onPointerUp={() => (isDragging.current = false)}
-          onPointerCancel={() => (isDragging.current = false)}
+        onPointerCancel={() => (isDragging.current = false)}
         data-testid="replay-slider"
       />
       <output for={id}>{shown.toFixed(1)} / {recording.duration.toFixed(1)} s</output>
