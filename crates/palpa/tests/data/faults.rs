@@ -35,21 +35,33 @@ above = "3 mm"
 "#;
 /// Moments between which a fault has come and gone, s; before each the force is as it was.
 const FIRST: f64 = 3.0;
-const EVERY: f64 = 1.5;
+const EVERY: f64 = 3.0;
 const N_FAULTS: usize = 9;
+/// Time without a fault after which the force is all back, s: it is let in slowly, in half a second.
+const BACK: f64 = 1.0;
 
 fn at(fault: usize) -> f64 {
     FIRST + EVERY * fault as f64
 }
 
-/// Mean pressing force between two moments, N.
-fn force(log: &Log, from: f64, to: f64) -> f64 {
-    let ticks = log
-        .ticks
-        .iter()
-        .filter(|t| (from..to).contains(&t.tick.now));
-    let forces: Vec<f64> = ticks.map(|t| t.devices[0].force[2]).collect();
-    forces.iter().sum::<f64>() / forces.len() as f64
+/// Pressing forces between two moments, N, where nothing held the force back lately: a machine that stands still for some
+/// milliseconds (a virtual one does) is a fault that this test did not order, and the law answers it as any other.
+fn settled_forces(log: &Log, from: f64, to: f64) -> Vec<f64> {
+    let faults: Vec<f64> = (log.events.iter())
+        .filter(|e| e.text.starts_with("law: "))
+        .map(|e| e.time)
+        .collect();
+    let is_quiet = |now: f64| !faults.iter().any(|at| (now - BACK..=now).contains(at));
+    (log.ticks.iter())
+        .filter(|t| (from..to).contains(&t.tick.now) && is_quiet(t.tick.now))
+        .map(|t| t.devices[0].force[2])
+        .collect()
+}
+
+/// Pressing force at a moment, N.
+fn force_at(log: &Log, moment: f64) -> f64 {
+    let k = log.ticks.partition_point(|t| t.tick.now < moment);
+    log.ticks[k].devices[0].force[2]
 }
 
 fn size(v: [f64; 3]) -> f64 {
@@ -159,19 +171,27 @@ fn faults_while_real_tissue_is_pressed() {
     assert_eq!(report.lost_records, [0, 0]);
     assert_eq!(log.ticks.len() as u64, report.ticks);
     check_limits(&log, &spec);
-    let usual = force(&log, FIRST - 0.3, FIRST);
+    let before = settled_forces(&log, FIRST - 0.5, FIRST);
+    assert!(before.len() > 50, "the force never settled");
+    let usual = before.iter().sum::<f64>() / before.len() as f64;
     assert!(usual > 0.1, "{usual}");
     for fault in 1..=N_FAULTS {
-        let back = force(&log, at(fault) - 0.2, at(fault));
-        println!("before fault {fault}: {back:.4} N of {usual:.4}");
+        let back = settled_forces(&log, at(fault - 1) + BACK + 0.4, at(fault));
+        let [least, most] = [f64::min as fn(_, _) -> _, f64::max]
+            .map(|of| back.iter().copied().reduce(of).unwrap_or(f64::NAN));
+        println!(
+            "before fault {fault}: {least:.4} to {most:.4} N of {usual:.4} in {} ticks",
+            back.len()
+        );
         assert!(
-            (back / usual - 1.0).abs() < 0.1,
-            "before fault {fault}: {back} N, {usual} N"
+            back.len() > 50 && least > 0.9 * usual && most < 1.1 * usual,
+            "before fault {fault}: {least} to {most} N in {} ticks, {usual} N",
+            back.len()
         );
     }
     // Without a tissue, or a device, nothing presses on; the hand that was out felt nothing.
     for (fault, after) in [(1, 0.09), (3, 0.25), (4, 0.28)] {
-        let there = force(&log, at(fault) + after, at(fault) + after + 0.005);
+        let there = force_at(&log, at(fault) + after);
         assert!(there.abs() < 0.7 * usual, "fault {fault}: {there} N");
     }
     check_said(&log);
