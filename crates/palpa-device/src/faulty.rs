@@ -2,6 +2,8 @@
 
 use crate::{DeviceFault, HapticDevice};
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Vec3};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,11 +21,39 @@ pub enum Fault {
     Late,
 }
 
-/// A device with faults, each from one moment of the loop's clock to another, s.
+/// Turns a fault on and off, from any thread, without waiting.
+#[derive(Debug, Clone, Default)]
+pub struct FaultSwitch(Arc<AtomicBool>);
+
+impl FaultSwitch {
+    /// Turns it on or off.
+    pub fn set(&self, is_on: bool) {
+        self.0.store(is_on, Ordering::Relaxed);
+    }
+}
+
+/// When a fault is there.
+#[derive(Debug, Clone)]
+enum When {
+    /// From one moment of the loop's clock to another, s.
+    Between(f64, f64),
+    Switched(FaultSwitch),
+}
+
+impl When {
+    fn is_now(&self, now: f64) -> bool {
+        match self {
+            Self::Between(from, to) => (*from..*to).contains(&now),
+            Self::Switched(switch) => switch.0.load(Ordering::Relaxed),
+        }
+    }
+}
+
+/// A device with faults: at moments that are known before, or whenever somebody turns them on.
 #[derive(Debug, Clone)]
 pub struct Faulty<D> {
     inner: D,
-    faults: Vec<(f64, f64, Fault)>,
+    faults: Vec<(When, Fault)>,
     last: Option<DeviceState>,
 }
 
@@ -37,10 +67,17 @@ impl<D> Faulty<D> {
         }
     }
 
-    /// With one more fault.
+    /// With one more fault, from one moment of the loop's clock to another, s.
     #[must_use]
     pub fn with(mut self, from: f64, to: f64, fault: Fault) -> Self {
-        self.faults.push((from, to, fault));
+        self.faults.push((When::Between(from, to), fault));
+        self
+    }
+
+    /// With one more fault, there while the switch is on.
+    #[must_use]
+    pub fn with_switch(mut self, switch: &FaultSwitch, fault: Fault) -> Self {
+        self.faults.push((When::Switched(switch.clone()), fault));
         self
     }
 
@@ -52,8 +89,8 @@ impl<D> Faulty<D> {
     fn fault_at(&self, now: f64) -> Option<Fault> {
         self.faults
             .iter()
-            .find(|(from, to, _)| (*from..*to).contains(&now))
-            .map(|(_, _, fault)| *fault)
+            .find(|(when, _)| when.is_now(now))
+            .map(|(_, fault)| *fault)
     }
 }
 

@@ -26,7 +26,7 @@ mod trial;
 
 pub use bed::{Bed, BedParams};
 pub use device::{DeviceFault, HapticDevice};
-pub use faulty::{Fault, Faulty};
+pub use faulty::{Fault, FaultSwitch, Faulty};
 pub use palpa_servo::Vec3;
 pub use path::Path;
 pub use simulated::{DeviceModel, Grip, LiveTarget, Scripted, SimulatedDevice};

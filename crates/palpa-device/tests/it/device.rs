@@ -2,8 +2,8 @@
 
 use nalgebra::UnitQuaternion;
 use palpa_device::{
-    DeviceModel, Fault, Faulty, Grip, HapticDevice, LiveTarget, Path, Scripted, SimulatedDevice,
-    Vec3,
+    DeviceModel, Fault, FaultSwitch, Faulty, Grip, HapticDevice, LiveTarget, Path, Scripted,
+    SimulatedDevice, Vec3,
 };
 use palpa_servo::{ForceCommand, Pose};
 
@@ -151,7 +151,9 @@ fn scripts_and_faults_do_as_they_are_told() {
     scripted.read(5.0).expect("a reading");
     let state = scripted.read(5.7).expect("a reading");
     assert!((state.pose.translation.vector - path.at(0.7)).norm() < 1e-12);
+    let unplugged = FaultSwitch::default();
     let mut faulty = Faulty::new(scripted)
+        .with_switch(&unplugged, Fault::Unplug)
         .with(6.0, 6.1, Fault::Unplug)
         .with(6.1, 6.2, Fault::NotANumber)
         .with(6.2, 6.3, Fault::Jump(Vec3::x()));
@@ -180,4 +182,8 @@ fn scripts_and_faults_do_as_they_are_told() {
             < 1e-12
     );
     assert!(faulty.read(6.35).is_ok());
+    unplugged.set(true);
+    assert!(faulty.read(6.4).is_err());
+    unplugged.set(false);
+    assert!(faulty.read(6.45).is_ok());
 }
