@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
-import { until } from './viewer.mjs';
+import { LONG, until } from './viewer.mjs';
 
 /** Each a little under a pixel's worth of another: the picture is looked at, not the scene. @param {Buffer} png */
 const isPicture = (png) => png.subarray(1, 4).toString() === 'PNG' && png.length > 20_000;
@@ -89,6 +89,14 @@ test('keys press, step, deepen and lift', async () => {
   // 2.5 mm, of which the hand's spring takes more than a half.
   for (let k = 0; k < 5; k++) await palpa.page.keyboard.press('PageDown');
   await palpa.reads('a greater depth and force', ({ metres, newtons }) => metres > first.metres + 0.8e-3 && newtons > 1.2 * first.newtons);
+  // Deeper than the tissue is: said, and the first step back is one.
+  for (let k = 0; k < 60; k++) await palpa.page.keyboard.press('PageDown');
+  const deepest = palpa.page.getByTestId('deepest');
+  await deepest.waitFor({ timeout: LONG });
+  await palpa.page.keyboard.press('PageUp');
+  await deepest.waitFor({ state: 'detached', timeout: LONG });
+  await palpa.page.keyboard.press('Space');
+  await palpa.page.keyboard.press('Space');
   await palpa.page.keyboard.press('ArrowRight');
   await palpa.page.keyboard.press('Shift+ArrowUp');
   await palpa.steady(0.05);

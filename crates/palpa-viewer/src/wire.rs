@@ -7,7 +7,7 @@
 use std::fmt::Write as _;
 
 /// Raised with every change of a field.
-pub const SNAPSHOT_VERSION: u32 = 1;
+pub const SNAPSHOT_VERSION: u32 = 2;
 
 /// A type that a snapshot can hold.
 trait Wire {
@@ -146,6 +146,8 @@ snapshot! {
         force: [f64; 3],
         /// How far the tip is under the skin at rest, m.
         depth: f64,
+        /// Deepest that the hand goes there, m: what is under the skin is not thicker.
+        deepest: f64,
         /// Share of the force that is let through; below 1 after a fault.
         gain: f64,
         /// Vertices that touch.

@@ -1,6 +1,6 @@
 // Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.
 
-export const SNAPSHOT_VERSION = 1;
+export const SNAPSHOT_VERSION = 2;
 
 class Reader {
   private at = 0;
@@ -100,6 +100,8 @@ export interface FrameSnapshot {
   force: [number, number, number];
   /** How far the tip is under the skin at rest, m. */
   depth: number;
+  /** Deepest that the hand goes there, m: what is under the skin is not thicker. */
+  deepest: number;
   /** Share of the force that is let through; below 1 after a fault. */
   gain: number;
   /** Vertices that touch. */
@@ -137,6 +139,7 @@ function readFrameSnapshot(r: Reader): FrameSnapshot {
     orientation: [r.f64(), r.f64(), r.f64(), r.f64()],
     force: [r.f64(), r.f64(), r.f64()],
     depth: r.f64(),
+    deepest: r.f64(),
     gain: r.f64(),
     n_active: r.u32(),
     step_status: r.u32(),

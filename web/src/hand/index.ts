@@ -28,14 +28,17 @@ const KEY_STEP_FAR = 0.01;
 const KEY_DEPTH = 0.0005;
 /** Where the tool hovers that is held but does not press, m. */
 const HOVER = -0.003;
-/** Depths that can be asked for lie between this and three times the press's, m; the engine has limits of its own. */
+/** Depths that can be asked for lie between this, m, and so many times the press's, or what the tissue allows. */
 const HIGHEST = -0.03;
+const DEEPEST_SHARE = 3;
 /** Of a click that marks: it moves no farther, px. */
 const CLICK_REACH = 6;
 
 export class HandControl {
   onTarget: (target: Target | null) => void = () => {};
   onMark: (point: Vec3) => void = () => {};
+  /** What the tissue allows where the tool is, m, as the engine says. */
+  deepest = Infinity;
   private settings: HandSettings;
   private target: Target | null = null;
   private pointer: {
@@ -77,6 +80,11 @@ export class HandControl {
     const before = this.settings;
     this.settings = { ...before, ...settings };
     if (!this.settings.enabled || this.settings.mode !== before.mode) this.lift();
+  }
+
+  /** Whether the tool is held as deep as it goes. */
+  get isDeepest(): boolean {
+    return this.target !== null && this.target.depth >= this.greatestDepth() - 1e-9;
   }
 
   /** Another body: keys begin at its home, not where another one was pressed. */
@@ -250,7 +258,11 @@ export class HandControl {
   }
 
   private limited(depth: number): number {
-    return Math.min(Math.max(depth, HIGHEST), 3 * this.settings.pressDepth);
+    return Math.min(Math.max(depth, HIGHEST), this.greatestDepth());
+  }
+
+  private greatestDepth(): number {
+    return Math.min(this.deepest, DEEPEST_SHARE * this.settings.pressDepth);
   }
 
   // What the engine is told.

@@ -81,6 +81,7 @@ export const en = {
   'readout.depth': 'Depth',
   'readout.speak': 'Read out force and depth',
   'readout.spoken': 'Force {force}, depth {depth}',
+  'readout.deepest': 'The hand goes no deeper here.',
   'readout.held_back': 'The force is held back: the engine is getting ready, or something was wrong.',
   'curve.force-depth': 'Force over depth',
   'curve.force-time': 'Force over time',

@@ -83,6 +83,7 @@ export const ja: Dictionary = {
   'readout.depth': '深さ',
   'readout.speak': '力と深さを読み上げる',
   'readout.spoken': '力 {force}、深さ {depth}',
+  'readout.deepest': 'ここではこれ以上深く押せません。',
   'readout.held_back': '力を抑えています。準備中か、異常がありました。',
   'curve.force-depth': '深さと力',
   'curve.force-time': '力の時間変化',

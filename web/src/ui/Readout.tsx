@@ -12,6 +12,7 @@ import { magnitude } from './history';
 import { Icon } from './icons';
 import { formatNumber, inMillimetres, withPrefix } from './quantity';
 import { PressDepth } from './panels/DevicePanel';
+import { isDeepest } from './settings';
 
 /** Share of the force that is let through, %. */
 const gain = signal(100);
@@ -104,6 +105,7 @@ function ForceNumber() {
         <span ref={depth} class="depth-number" data-testid="depth-number">–</span>
       </p>
       {gain.value < 100 && <p class="held-back" role="status">{t('readout.held_back')}</p>}
+      {isDeepest.value && <p class="held-back" role="status" data-testid="deepest">{t('readout.deepest')}</p>}
       <p class="sr-only" role="status" aria-live="polite">{spoken}</p>
     </section>
   );

@@ -16,7 +16,7 @@ import { LegendBox } from './LegendBox';
 import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
-import { handMode, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
+import { handMode, isDeepest, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
 
 export function Stage() {
   const container = useRef<HTMLDivElement>(null);
@@ -40,6 +40,7 @@ export function Stage() {
     const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false });
     hand.onTarget = (target) => {
       if (target !== null && target.depth > 0) lastTouched.value = target.point;
+      isDeepest.value = hand.isDeepest;
     };
     hand.onMark = takePicked;
     bodyView.value = body;
@@ -60,7 +61,11 @@ export function Stage() {
         hand.forget();
       }),
       onMesh((mesh) => body.setMesh(mesh)),
-      onFrame((frame) => body.setFrame(frame)),
+      onFrame((frame) => {
+        body.setFrame(frame);
+        if (frame.is_replay === 0) hand.deepest = frame.deepest;
+        isDeepest.value = hand.isDeepest;
+      }),
     ];
     return () => {
       for (const end of ends) end();

@@ -77,6 +77,8 @@ export const pressDepth = computed(() => {
 /** What the next click on the body is for. */
 export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };
 export const picking = signal<Picking | null>(null);
+/** Whether the hand holds the tool as deep as it goes. */
+export const isDeepest = signal(false);
 /** Where the hand was last on the skin, m. */
 export const lastTouched = signal<Vec3 | null>(null);
 

@@ -73,6 +73,7 @@ fn read_frame(bytes: &[u8]) -> FrameSnapshot {
         orientation: r.f64s(),
         force: r.f64s(),
         depth: r.f64(),
+        deepest: r.f64(),
         gain: r.f64(),
         n_active: r.u32(),
         step_status: r.u32(),
@@ -120,7 +121,7 @@ proptest! {
         let frame = FrameSnapshot {
             mesh, sequence, faults, limits, device, tool, force, depth, gain, time, orientation,
             displacements, field_values, displacement_unit: 1e-6, field: 2, field_min: -1e3, field_max: 4e5,
-            is_replay: 1, tick: 1e9, n_active: 17, step_status: 2,
+            is_replay: 1, tick: 1e9, n_active: 17, step_status: 2, deepest: 0.0125,
         };
         prop_assert_eq!(read_frame(&frame.encode()), frame);
     }
@@ -136,11 +137,11 @@ fn where_things_lie() {
         ..FrameSnapshot::default()
     };
     let bytes = frame.encode();
-    assert_eq!(bytes[..12], [1, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
+    assert_eq!(bytes[..12], [2, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
     // Version, kind, mesh, sequence, is_replay; then doubles from the next multiple of 8.
     assert_eq!(bytes[24..32], 1f64.to_le_bytes());
-    // 2 + 13 + 2 doubles, 4 numbers, a double; the list's length and its items.
-    let list = 24 + 17 * 8 + 4 * 4 + 8;
+    // 2 + 13 + 3 doubles, 4 numbers, a double; the list's length and its items.
+    let list = 24 + 18 * 8 + 4 * 4 + 8;
     assert_eq!(bytes[list..list + 10], [3, 0, 0, 0, 0xfe, 0xff, 3, 0, 4, 0]);
     // field (at a multiple of 4), two doubles, a list of one.
     let field = (list + 10).next_multiple_of(4);

@@ -34,6 +34,7 @@ pub(super) struct Fields {
     jobs: SyncSender<Job>,
     done: Receiver<NodeField>,
     latest: Option<NodeField>,
+    is_busy: bool,
     /// What it was last asked for.
     asked: Option<(u64, Field, Arc<[Vec3]>)>,
 }
@@ -78,6 +79,7 @@ impl Fields {
             jobs,
             done,
             latest: None,
+            is_busy: false,
             asked: None,
         })
     }
@@ -94,10 +96,13 @@ impl Fields {
             return None;
         }
         match self.done.try_recv() {
-            Ok(done) => self.latest = Some(done),
+            Ok(done) => {
+                self.latest = Some(done);
+                self.is_busy = false;
+            }
             Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
         }
-        if !self.is_asked(mesh, field, displacements) {
+        if !self.is_busy && !self.is_asked(mesh, field, displacements) {
             let displacements: Arc<[Vec3]> = displacements.into();
             let job = Job {
                 mesh,
@@ -105,9 +110,9 @@ impl Fields {
                 model: Arc::clone(model),
                 displacements: Arc::clone(&displacements),
             };
-            // Full: the worker is at one and has the next; the one after will be newer.
             if self.jobs.try_send(job).is_ok() {
                 self.asked = Some((mesh, field, displacements));
+                self.is_busy = true;
             }
         }
         self.latest

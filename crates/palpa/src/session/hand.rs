@@ -29,7 +29,7 @@ const FINE: f64 = 0.5;
 /// Distance from the skin at which the tool goes round the body, beside its own size, m.
 const CLEARANCE: f64 = 12e-3;
 /// Deepest press, as a share of the tissue there.
-pub const MOST_OF_TISSUE: f64 = 0.65;
+const MOST_OF_TISSUE: f64 = 0.65;
 
 /// The skin at rest, as the hand knows it.
 #[derive(Debug)]
@@ -53,6 +53,13 @@ pub struct Place {
     pub normal: Vec3,
     /// Depth of the tissue, m.
     pub thickness: f64,
+}
+
+impl Place {
+    /// Deepest that a hand presses here, m.
+    pub fn deepest(&self) -> f64 {
+        MOST_OF_TISSUE * self.thickness
+    }
 }
 
 impl Skin {
@@ -171,11 +178,14 @@ impl HandDriver {
     /// Where it is to go; none lifts it off the skin.
     pub fn set_goal(&mut self, goal: Option<Goal>) {
         self.goal = goal.map(|goal| Goal {
-            depth: goal
-                .depth
-                .clamp(-HOVER, MOST_OF_TISSUE * goal.place.thickness),
+            depth: goal.depth.clamp(-HOVER, goal.place.deepest()),
             ..goal
         });
+    }
+
+    /// Deepest that it goes where it is to be, m.
+    pub fn deepest(&self) -> f64 {
+        self.goal.map_or(self.place, |goal| goal.place).deepest()
     }
 
     /// The place that it is over or in.

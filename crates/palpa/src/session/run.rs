@@ -679,6 +679,7 @@ impl Body {
             &frame,
             &(over.point, over.normal),
         );
+        self.frame.deepest = live.hand.deepest();
         self.frame.step_status = live.step.status.into();
         if let Some(game) = &mut self.game
             && !game.is_revealed()

@@ -234,8 +234,7 @@ impl World {
 
     /// The greatest depth that a page offers, m.
     pub fn greatest_depth(&self) -> f64 {
-        let most = super::hand::MOST_OF_TISSUE * self.home.thickness;
-        (DEEPEST * self.scene.motion.depth).min(most)
+        (DEEPEST * self.scene.motion.depth).min(self.home.deepest())
     }
 
     /// Size of the tool, m.

@@ -619,12 +619,13 @@ impl Live {
         report
     }
 
-    /// Whether a body that nothing touches is where it was.
-    fn stays_still(&mut self) -> bool {
-        self.is_still = self.is_still
-            && self.problem.candidates.is_empty()
-            && self.residual() <= STILL_SHARE * self.params.tolerance;
-        self.is_still
+    /// The residual of a body that nothing touches, if it is still where it was.
+    fn residual_at_rest(&mut self) -> Option<f64> {
+        let is_untouched = self.is_still && self.problem.candidates.is_empty();
+        let residual = is_untouched.then(|| self.residual());
+        let residual = residual.filter(|r| *r <= STILL_SHARE * self.params.tolerance);
+        self.is_still = residual.is_some();
+        residual
     }
 
     /// Whether nothing touches the body, and the iteration before moved nothing.
@@ -784,9 +785,9 @@ impl Live {
             self.measure_gaps();
         } else {
             self.find_candidates(dt);
-            if self.stays_still() {
+            if let Some(residual) = self.residual_at_rest() {
                 report.iterations = 0;
-                report.residual = self.residual();
+                report.residual = residual;
                 return Ok(());
             }
             self.refactor(report)?;
