@@ -73,6 +73,22 @@ pub enum SceneError {
     },
 }
 
+impl SceneError {
+    /// The same by key alone, without line and column: for a text that a program made and nobody saw.
+    #[must_use]
+    pub fn by_key(mut self) -> Self {
+        match &mut self {
+            Self::Io { .. } => {}
+            Self::TooLarge { place, .. }
+            | Self::Syntax { place, .. }
+            | Self::Unknown { place, .. }
+            | Self::OutOfRange { place, .. }
+            | Self::Invalid { place, .. } => (place.line, place.column) = (0, 0),
+        }
+        self
+    }
+}
+
 fn advice(nearest: Option<&str>, allowed: &[String]) -> String {
     let list = allowed.join("`, `");
     match (nearest, allowed) {

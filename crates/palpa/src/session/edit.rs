@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
-use palpa_tissue::Scene;
+use palpa_tissue::{Scene, SceneError};
 use palpa_viewer::control::Edit;
 use serde_json::{Map, Value};
 
@@ -35,7 +35,7 @@ pub fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
     }
     name_again(&mut value, &in_full, &as_json(&scene.to_toml())?);
     let text = toml::to_string(&without_nulls(value)).context("the edits make no scene file")?;
-    parsed(&text, &scene.base_dir)
+    Ok(Scene::parse(&text, &scene.base_dir).map_err(SceneError::by_key)?)
 }
 
 /// Tissues that are as they were get their names back, and with them what the catalogue knows of their sources.
@@ -188,7 +188,8 @@ mod tests {
         assert!(words("layer", json!(1)).contains("begins with"));
         assert!(words("/layer/9/levels", json!(1)).contains("no item 9"));
         assert!(words("/layer/0/levels/x", json!(1)).contains("has no keys"));
-        assert!(words("/layer/0/tissue/young", json!("12 apples")).contains("apples"));
+        let apples = words("/layer/0/tissue/young", json!("12 apples"));
+        assert!(apples.contains("apples") && apples.contains("scene: layer[0]"), "{apples}");
         assert!(words("/nonsense", json!(1)).contains("nonsense"));
     }
 }

@@ -638,6 +638,13 @@ impl Live {
             && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
     }
 
+    /// The body is elsewhere, or another: what was known of its forces is so no more.
+    fn forget_forces(&mut self) {
+        self.is_still = false;
+        self.is_fresh = false;
+        self.is_outside_fresh = false;
+    }
+
     /// Remembers the zone's state as one to come back to.
     fn keep_good(&mut self) {
         // Where the exterior answers linearly it goes with the zone.
@@ -669,9 +676,7 @@ impl Live {
         self.tools.copy_from_slice(&self.good_tools);
         self.clearance = 0.0;
         self.spring = 0.0;
-        self.is_still = false;
-        self.is_fresh = false;
-        self.is_outside_fresh = false;
+        self.forget_forces();
     }
 
     /// Begins at rest, with the tools off the skin: from the last good state there is no way on.
@@ -681,9 +686,7 @@ impl Live {
         self.pressures.fill(0.0);
         self.frictions.fill(Vec3::zeros());
         self.spring = 0.0;
-        self.is_still = false;
-        self.is_fresh = false;
-        self.is_outside_fresh = false;
+        self.forget_forces();
         self.depth_at_factor = f64::INFINITY;
         self.is_outside_lost = true;
         let body = &self.model.body;
@@ -1341,9 +1344,7 @@ impl Live {
             self.follower = follower;
             self.keep_good();
         }
-        self.is_still = false;
-        self.is_fresh = false;
-        self.is_outside_fresh = false;
+        self.forget_forces();
     }
 }
 

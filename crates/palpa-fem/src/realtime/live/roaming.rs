@@ -193,8 +193,7 @@ impl Moved {
         live.latency = old.latency;
         live.pace = old.pace;
         live.clearance = old.clearance;
-        live.is_fresh = false;
-        live.is_outside_fresh = false;
+        live.forget_forces();
         live.depth_at_factor = old.depth();
         live.keep_good();
         live
