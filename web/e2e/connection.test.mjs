@@ -65,6 +65,21 @@ test('a connection that is lost is said, and comes back', async () => {
   await pressByKeys(palpa);
 });
 
+test('a page with another token is told so', async () => {
+  await endShared();
+  const token = 'a-long-word-of-the-test';
+  const guarded = await Viewer.start({ scene: 'block', token });
+  try {
+    const palpa = await PalpaPage.open(await sharedBrowser(), guarded);
+    pages.push(palpa);
+    await palpa.drawn();
+    await palpa.page.goto(guarded.url.replace(token, 'another'));
+    await palpa.by('connection-lost').filter({ hasText: 'token' }).waitFor();
+  } finally {
+    await guarded.stop();
+  }
+});
+
 test('an engine that is stopped by the system is said, and goes on', async () => {
   const palpa = await openPage();
   palpa.viewer.child.kill('SIGSTOP');

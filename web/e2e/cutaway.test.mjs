@@ -3,12 +3,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
-import { until } from './viewer.mjs';
+import { pause, until } from './viewer.mjs';
 import { extent, readBody, sliceAreas } from './vtu.mjs';
 
 const AXES = /** @type {const} */ (['x', 'y', 'z']);
 /** Share of the way through the body that is left at both ends. */
 const MARGIN = 0.002;
+/** ms. */
+const SECTION_WAIT = 20_000;
 
 /** @param {import('./page.mjs').PalpaPage} palpa */
 async function exported(palpa) {
@@ -24,23 +26,35 @@ function planeAt(body, axis = 0, position = 0.5) {
   return low + (high - low) * (MARGIN + (1 - 2 * MARGIN) * position);
 }
 
-/** @param {import('./page.mjs').PalpaPage} palpa @param {number} axis @param {string} when */
-async function assertSameArea(palpa, axis, when) {
+/** How far what is shown is from the slice of what is exported just now. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis */
+async function compared(palpa, axis) {
   const position = Number(await palpa.by('cutaway-position').inputValue());
   const body = await exported(palpa);
   const layers = sliceAreas(body, axis, planeAt(body, axis, position));
   const slice = layers.reduce((sum, area) => sum + area, 0);
   assert.ok(slice > 1e-4, `a slice of ${slice} m²`);
   const shown = await palpa.sectionArea();
-  const off = Math.abs(shown.total - slice) / slice;
-  assert.ok(off < 0.01, `${when}: shown ${shown.total} m², slice of the file ${slice} m²: ${(100 * off).toFixed(3)} % apart`);
   const shownLayers = palpa.by('section-area').locator('[data-layer]');
+  let worstLayer = 0;
   for (const [layer, area] of layers.entries()) {
     if (area < 0.02 * slice) continue;
     const told = Number(await shownLayers.nth(layer).getAttribute('data-area'));
-    assert.ok(Math.abs(told - area) < 0.01 * slice, `${when}, layer ${layer}: shown ${told} m², of the file ${area} m²`);
+    worstLayer = Math.max(worstLayer, Math.abs(told - area) / slice);
   }
-  return { shown, slice, off };
+  return { shown, slice, off: Math.abs(shown.total - slice) / slice, worstLayer };
+}
+
+/** The page draws a section some frames after it was asked for. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis @param {string} when */
+async function assertSameArea(palpa, axis, when) {
+  const end = performance.now() + SECTION_WAIT;
+  for (;;) {
+    const found = await compared(palpa, axis);
+    const { shown, slice, off, worstLayer } = found;
+    if (off < 0.01 && worstLayer < 0.01) return found;
+    const words = `${when}: shown ${shown.total} m², slice of the file ${slice} m²: ${(100 * off).toFixed(3)} % apart, a layer ${(100 * worstLayer).toFixed(3)} %`;
+    assert.ok(performance.now() < end, words);
+    await pause(100);
+  }
 }
 
 test('the section has the area of the slice of the exported body, at rest and pressed', async (t) => {
@@ -56,7 +70,6 @@ test('the section has the area of the slice of the exported body, at rest and pr
     for (let k = 0; k <= axis; k++) await palpa.page.keyboard.press('ArrowLeft');
     await until('the plane moves', async () => (await palpa.by('cutaway-position').inputValue()) !== before);
     await until('an area is shown', async () => (await palpa.sectionArea()).total > 0);
-    await palpa.page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
     const { slice, off } = await assertSameArea(palpa, axis, `at rest, ${name}`);
     t.diagnostic(`${name}: slice of ${(slice * 1e6).toFixed(1)} mm², section ${(100 * off).toFixed(4)} % apart`);
   }

@@ -85,8 +85,12 @@ test('what was recorded is what was shown, tick by tick, and is shown again', as
     const row = byTick.get(seen.tick);
     assert.ok(row && Math.abs(row.force - seen.newtons) <= 1e-9 * Math.max(seen.newtons, 1e-9), `tick ${seen.tick}: shown ${seen.newtons} N, recorded ${row?.force} N`);
   }
-  // By keys, too: one step of the slider is a millisecond.
+  // By keys, too.
   await slider.focus();
+  await palpa.page.keyboard.press('Home');
+  const first = await palpa.reads('the beginning', ({ tick }) => (byTick.get(tick)?.time ?? Infinity) < rows[0].time + FRAME);
+  for (let k = 0; k < 10; k++) await palpa.page.keyboard.press('ArrowRight');
+  await palpa.reads('half a second later', ({ tick }) => (byTick.get(tick)?.time ?? 0) > (byTick.get(first.tick)?.time ?? 0) + 0.5 - FRAME);
   await palpa.page.keyboard.press('End');
   await palpa.reads('the end', ({ tick }) => (byTick.get(tick)?.time ?? 0) > rows[rows.length - 1].time - 2 * FRAME);
   await palpa.by('replay-close').click();

@@ -29,6 +29,22 @@ test('a harder tissue gives more force at the same press', async (t) => {
   await palpa.choose('block');
 });
 
+test('a press that keys hold stays held while a tissue is changed under it', async () => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.atRest();
+  await palpa.focus();
+  await palpa.page.keyboard.press('Space');
+  const before = await palpa.steady();
+  await palpa.tab('tissues');
+  await palpa.type('layer-0-young', '30 kPa', ({ layers }) => Math.abs(layers[0].stiffness - 30e3) < 100);
+  await palpa.reads('more force of the harder tissue', ({ newtons }) => newtons > 1.1 * before.newtons);
+  // From wherever the focus is.
+  await palpa.page.keyboard.press('Escape');
+  await palpa.atRest();
+  await palpa.choose('block');
+});
+
 test('a layer is put back to what it was, though a broken file came between', async () => {
   const palpa = await sharedPage();
   await palpa.have('block');

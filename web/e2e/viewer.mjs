@@ -58,10 +58,11 @@ export class Viewer {
     this.port = 0;
   }
 
-  /** @param {{ scene?: string, port?: number }} options */
-  static async start({ scene, port = 0 } = {}) {
+  /** @param {{ scene?: string, port?: number, token?: string }} options */
+  static async start({ scene, port = 0, token } = {}) {
     const out = mkdtempSync(join(tmpdir(), 'palpa-e2e-'));
     const args = ['view', '--no-open', '--port', String(port), '--json', '--allow-faults', '--out', out];
+    if (token !== undefined) args.push('--token', token);
     const child = spawn(binary(), scene === undefined ? args : [...args, scene], { stdio: ['ignore', 'pipe', 'pipe'] });
     const viewer = new Viewer(child, out);
     child.stderr?.on('data', (data) => (viewer.stderr += data));

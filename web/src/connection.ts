@@ -11,6 +11,8 @@ export type ConnectionStatus = 'connecting' | 'open' | 'lost';
 
 export interface ConnectionListener {
   onStatus(status: ConnectionStatus): void;
+  /** The engine is there, and does not let this page in: the token is missing or another one. */
+  onRefused(): void;
   onMessage(message: Message): void;
   onSnapshot(snapshot: Snapshot): void;
 }
@@ -72,8 +74,10 @@ export class Connection {
     const token = new URLSearchParams(location.search).get('token');
     if (token !== null) url.searchParams.set('token', token);
     const socket = new WebSocket(url);
+    let isOpened = false;
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
+      isOpened = true;
       this.wait = FIRST_WAIT;
       this.listener.onStatus('open');
       this.hear();
@@ -83,8 +87,19 @@ export class Connection {
       if (typeof event.data === 'string') this.read(JSON.parse(event.data) as Message);
       else this.listener.onSnapshot(readSnapshot(event.data));
     };
-    socket.onclose = () => this.lose(socket);
+    socket.onclose = () => {
+      if (!isOpened) void this.askWhy();
+      this.lose(socket);
+    };
     this.socket = socket;
+  }
+
+  /** A WebSocket does not tell why it did not open. */
+  private async askWhy(): Promise<void> {
+    const url = new URL('api/state', location.href);
+    url.search = location.search;
+    const status = await fetch(url, { method: 'HEAD' }).then((response) => response.status, () => 0);
+    if (status === 401 && !this.closed) this.listener.onRefused();
   }
 
   private read(message: Message): void {

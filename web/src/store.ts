@@ -12,6 +12,8 @@ export type Vec3 = [number, number, number];
 export const status = signal<ConnectionStatus>('connecting');
 /** Whether it has ever been open: before, "connecting" is no loss. */
 export const wasOpen = signal(false);
+/** Whether the engine is there and does not let this page in. */
+export const isRefused = signal(false);
 export const hello = signal<Hello | null>(null);
 export const state = signal<State | null>(null);
 export const figures = signal<EngineFigures | null>(null);
@@ -144,9 +146,12 @@ export function connect(): void {
     onStatus: (next) => {
       batch(() => {
         status.value = next;
-        if (next === 'open') wasOpen.value = true;
+        if (next !== 'open') return;
+        wasOpen.value = true;
+        isRefused.value = false;
       });
     },
+    onRefused: () => (isRefused.value = true),
     onMessage: takeMessage,
     onSnapshot: takeSnapshot,
   });

@@ -156,17 +156,26 @@ impl Board {
         client
     }
 
-    /// A client leaves. If it controlled, the only one that is left does.
-    pub(crate) fn leave(&self, client: u64) {
+    /// A client leaves. If it controlled, nobody does until [`inherit`](Self::inherit) or a client comes: a page that is loaded
+    /// again is to have its control again. Says whether it controlled.
+    pub(crate) fn leave(&self, client: u64) -> bool {
         let mut seats = self.seats();
         seats.taken.retain(|&c| c != client);
-        if seats.controller == Controller::Page(client) {
-            seats.controller = match seats.taken[..] {
-                [only] => Controller::Page(only),
-                _ => Controller::Nobody,
-            };
+        let has_controlled = seats.controller == Controller::Page(client);
+        if has_controlled {
+            seats.controller = Controller::Nobody;
         }
         seats.tell(&self.state);
+        has_controlled
+    }
+
+    /// If nobody controls, the only client that is left does.
+    pub(crate) fn inherit(&self) {
+        let mut seats = self.seats();
+        if let ([only], Controller::Nobody) = (&seats.taken[..], seats.controller) {
+            seats.controller = Controller::Page(*only);
+            seats.tell(&self.state);
+        }
     }
 
     /// It is this one who controls from now on.

@@ -12,8 +12,8 @@ use crate::{
     control::{Envelope, Hello, Message, Notice, NoticeLevel, Reply, Request},
     hub::Hub,
     limits::{
-        CLOSE_WAIT, Gate, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY, QUIET,
-        SEND_WAIT, SILENCE, Verdict,
+        CLOSE_WAIT, Gate, HEIR_WAIT, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY,
+        QUIET, SEND_WAIT, SILENCE, Verdict,
     },
     wire::SNAPSHOT_VERSION,
 };
@@ -28,9 +28,10 @@ use futures_util::{
 use serde::Deserialize;
 use std::{error::Error, io, iter::successors, sync::Arc, time::Instant};
 use tokio::{
+    runtime::Handle,
     select,
     sync::{OwnedSemaphorePermit, broadcast::error::RecvError, mpsc, watch},
-    time::{MissedTickBehavior, interval, timeout},
+    time::{MissedTickBehavior, interval, sleep, timeout},
 };
 
 type Sink = SplitSink<WebSocket, ws::Message>;
@@ -78,8 +79,16 @@ impl Seat {
 
 impl Drop for Seat {
     fn drop(&mut self) {
-        self.hub.board.leave(self.client);
+        let has_controlled = self.hub.board.leave(self.client);
         self.hub.tell_clients();
+        if has_controlled && let Ok(runtime) = Handle::try_current() {
+            let hub = Arc::clone(&self.hub);
+            runtime.spawn(async move {
+                sleep(HEIR_WAIT).await;
+                hub.board.inherit();
+                hub.tell_clients();
+            });
+        }
     }
 }
 

@@ -67,7 +67,7 @@ pub(crate) async fn token(State(hub): State<Arc<Hub>>, request: Request, next: N
         return response;
     }
     let why = "the token is missing or another one; the program that was started with --token prints the address with it. \
-               Give it as `Authorization: Bearer …`, or as ?token=…\n";
+               Give it as `Authorization: Bearer …`; to read, and for the WebSocket, ?token=… does too\n";
     let challenge = [(header::WWW_AUTHENTICATE, "Bearer")];
     (StatusCode::UNAUTHORIZED, challenge, why).into_response()
 }

@@ -26,6 +26,8 @@ pub(crate) const PING_EVERY: Duration = Duration::from_secs(4);
 pub(crate) const QUIET: Duration = Duration::from_secs(1);
 /// A client that says nothing for so long is gone: three pings were not answered.
 pub(crate) const SILENCE: Duration = Duration::from_secs(14);
+/// How long nobody controls after who controlled has gone: a page that is loaded again is back by then.
+pub(crate) const HEIR_WAIT: Duration = Duration::from_secs(3);
 /// How long a client may take to say good-bye.
 pub(crate) const CLOSE_WAIT: Duration = Duration::from_millis(500);
 /// How long a program may wait for the answer to its request.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
-use palpa_mesh::growth::{ScatteredThickness, Thickness as ThicknessField};
+use palpa_mesh::growth::{MAX_NODES, ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
     Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface,
     SurfaceIndex, Vec3, grow, read_surface, repair,
@@ -41,6 +41,14 @@ pub struct BuiltBody {
 /// # Errors
 /// When a file cannot be read or used, or the body cannot be grown.
 pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
+    build_within(scene, MAX_NODES)
+}
+
+/// The same for a body of so many nodes at most: a larger one is refused before it takes time and memory.
+///
+/// # Errors
+/// As [`build`], and when the body is larger.
+pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody> {
     let mut notes = Vec::new();
     let (skin, bones) = match &scene.body.skin {
         Skin::File(path) => {
@@ -85,6 +93,7 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     let params = GrowthParams {
         layers: layer_specs(scene)?,
         cut_out,
+        max_nodes,
     };
     let growth =
         grow(&skin, &bones, &params).map_err(|error| with_bone_name(error, &scene.body.bones))?;

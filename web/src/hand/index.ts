@@ -70,7 +70,9 @@ export class HandControl {
     canvas.addEventListener('pointermove', (e) => this.move(e), { signal });
     for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) canvas.addEventListener(type, (e) => this.up(e), { signal });
     canvas.addEventListener('keydown', (e) => this.key(e), { signal });
-    canvas.addEventListener('blur', () => this.lift(), { signal });
+    // What keys hold stays held while something else on the page is looked at or changed; Escape lifts from anywhere.
+    canvas.addEventListener('blur', () => this.isHeldByKeys || this.lift(), { signal });
+    window.addEventListener('keydown', (e) => e.key === 'Escape' && this.isHeldByKeys && this.lift(), { signal });
     window.addEventListener('blur', () => this.lift(), { signal });
     document.addEventListener('visibilitychange', () => document.hidden && this.lift(), { signal });
     this.gamepads = new Gamepads((dx, dy, pull, dt) => this.gamepad(dx, dy, pull, dt));

@@ -1,7 +1,7 @@
 // What stands over everything: a lost connection.
 
 import { t } from '../i18n';
-import { status, wasOpen } from '../store';
+import { isRefused, status, wasOpen } from '../store';
 
 export function Banner() {
   const isLost = wasOpen.value && status.value !== 'open';
@@ -11,7 +11,7 @@ export function Banner() {
       {(isLost || isUnreachable) && (
         <div class="banner" data-testid="connection-lost">
           <span class="spinner" aria-hidden="true" />
-          {t(isLost ? 'connection.lost_banner' : 'connection.none_banner')}
+          {t(isRefused.value ? 'connection.token_banner' : isLost ? 'connection.lost_banner' : 'connection.none_banner')}
         </div>
       )}
     </div>

@@ -3,7 +3,7 @@
 import type { FunctionComponent } from 'preact';
 import { useRef } from 'preact/hooks';
 import { t } from '../i18n';
-import { state } from '../store';
+import { isHiding, state } from '../store';
 import { Icon } from './icons';
 import { DevicePanel } from './panels/DevicePanel';
 import { EnginePanel } from './panels/EnginePanel';
@@ -98,7 +98,7 @@ export function Rail() {
 function hasNews(name: Tab): boolean {
   const now = state.value;
   if (now === null) return false;
-  if (name === 'record') return now.recording.is_recording || now.recording.is_replaying;
+  if (name === 'record') return now.recording.is_recording;
   if (name === 'motion') return now.is_motion_running;
-  return name === 'game' && now.game != null;
+  return name === 'game' && isHiding.value;
 }

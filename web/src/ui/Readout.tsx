@@ -101,11 +101,13 @@ function ForceNumber() {
       </div>
       <div class="gauge-scale" aria-hidden="true"><span>0</span><span ref={scale} /></div>
       <p class="depth-line">
-        <span>{t('readout.depth')}</span>
+        <span>
+          {t('readout.depth')}
+          <span role="status">{isDeepest.value && <em data-testid="deepest">{t('readout.deepest')}</em>}</span>
+        </span>
         <span ref={depth} class="depth-number" data-testid="depth-number">–</span>
       </p>
       {gain.value < 100 && <p class="held-back" role="status">{t('readout.held_back')}</p>}
-      {isDeepest.value && <p class="held-back" role="status" data-testid="deepest">{t('readout.deepest')}</p>}
       <p class="sr-only" role="status" aria-live="polite">{spoken}</p>
     </section>
   );

@@ -10,6 +10,9 @@ import { Icon } from './icons';
 /** The moment that is shown, s. */
 const time = signal(0);
 const SEEK_PERIOD = 50;
+/** What an arrow key moves, s: more than a frame, or it would fall back to the one that is shown. */
+const KEY_STEP = 0.05;
+const ARROWS: Record<string, number> = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
 export function ReplayBar() {
   const recording = state.value?.recording;
@@ -61,6 +64,12 @@ export function ReplayBar() {
         value={shown}
         disabled={cannot}
         aria-valuetext={`${shown.toFixed(1)} s`}
+        onKeyDown={(event) => {
+          const step = ARROWS[event.key];
+          if (step === undefined) return;
+          event.preventDefault();
+          seek(Math.min(Math.max((wanted.current ?? shown) + step * KEY_STEP, 0), recording.duration));
+        }}
         onPointerDown={() => (isDragging.current = true)}
         onInput={(event) => seek(event.currentTarget.valueAsNumber)}
         onChange={() => (isDragging.current = false)}

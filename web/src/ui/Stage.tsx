@@ -83,7 +83,7 @@ export function Stage() {
       <div class="stage-top">
         <GameBar />
         <PickingHint />
-        {isWatching.value && <p class="chip">{t('control.watching_chip')}</p>}
+        {isWatching.value && <p class="chip">{t(state.value?.controller == null ? 'control.nobody_chip' : 'control.watching_chip')}</p>}
       </div>
       <div class="stage-bottom">
         {problem === 'none' && <LegendBox />}

@@ -30,7 +30,7 @@ use core::RigidCore;
 const LEAST_FILL_SHARE: f64 = 0.2;
 
 /// Larger bodies are refused: their bars and factors would not fit into memory. nodes
-const MAX_NODES: usize = 2_000_000;
+pub const MAX_NODES: usize = 2_000_000;
 
 /// What one layer asks for.
 #[derive(Debug, Clone)]
@@ -52,6 +52,8 @@ pub struct GrowthParams {
     pub layers: Vec<LayerSpec>,
     /// Keep only the part within this distance of a point: `(centre, radius)`, in metres.
     pub cut_out: Option<(Vec3, f64)>,
+    /// A body of more nodes is refused before it is grown; at most [`MAX_NODES`].
+    pub max_nodes: usize,
 }
 
 /// A grown body with what a user should know about it.
@@ -135,7 +137,7 @@ pub enum GrowthError {
     },
     /// More nodes than can be handled.
     #[error(
-        "{n_vertices} skin vertices with {n_levels} levels are {} nodes, more than the {MAX_NODES} that are handled; \
+        "{n_vertices} skin vertices with {n_levels} levels are {} nodes, more than the {max_nodes} that are handled; \
          take a coarser skin, fewer levels, or cut out a part with cutout_radius", n_vertices * n_levels
     )]
     TooLarge {
@@ -143,6 +145,8 @@ pub enum GrowthError {
         n_vertices: usize,
         /// Nodes per column.
         n_levels: usize,
+        /// What is handled.
+        max_nodes: usize,
     },
     /// Nothing of the skin is left in a cut-out.
     #[error("no skin triangle lies whole within {:.1} mm of the cut-out's centre; choose a larger cutout_radius", radius * 1e3)]
@@ -209,10 +213,12 @@ pub fn grow(
         }
     }
     let n_levels = 1 + params.layers.iter().map(|l| l.n_levels).sum::<usize>();
-    if skin.points.len().saturating_mul(n_levels) > MAX_NODES {
+    let max_nodes = params.max_nodes.min(MAX_NODES);
+    if skin.points.len().saturating_mul(n_levels) > max_nodes {
         return Err(GrowthError::TooLarge {
             n_vertices: skin.points.len(),
             n_levels,
+            max_nodes,
         });
     }
     let cuts = cut::find_cut_faces(&skin);

@@ -32,6 +32,7 @@ fn params(layers: Vec<LayerSpec>) -> GrowthParams {
     GrowthParams {
         layers,
         cut_out: None,
+        max_nodes: palpa_mesh::growth::MAX_NODES,
     }
 }
 
@@ -264,6 +265,7 @@ fn a_cut_out_keeps_the_part_round_its_centre() {
         &GrowthParams {
             layers: layers.clone(),
             cut_out: Some((centre, 0.04)),
+            max_nodes: palpa_mesh::growth::MAX_NODES,
         },
     )
     .unwrap();
@@ -511,6 +513,7 @@ fn a_cut_out_has_the_core_of_the_whole() {
     let cut = GrowthParams {
         layers: limb_layers(),
         cut_out: Some((centre, 0.035)),
+        max_nodes: palpa_mesh::growth::MAX_NODES,
     };
     let part = grow(&skin, &bones, &cut).unwrap();
     let base = |growth: &Growth| {
@@ -525,4 +528,22 @@ fn a_cut_out_has_the_core_of_the_whole() {
     };
     let apart = (base(&whole) - base(&part)).norm();
     assert!(apart < 1.5e-3, "{apart} m");
+}
+
+#[test]
+fn a_body_of_more_nodes_than_are_wanted_is_refused() {
+    let (skin, bones) = forearm(0.01, 1.0);
+    let mut few = params(limb_layers());
+    let n_nodes = grow(&skin, &bones, &few).unwrap().body.n_nodes();
+    few.max_nodes = n_nodes;
+    assert!(grow(&skin, &bones, &few).is_ok());
+    few.max_nodes = n_nodes - 1;
+    let error = grow(&skin, &bones, &few).unwrap_err().to_string();
+    assert!(
+        error.contains(&format!(
+            "are {n_nodes} nodes, more than the {}",
+            n_nodes - 1
+        )),
+        "{error}"
+    );
 }

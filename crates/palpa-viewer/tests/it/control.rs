@@ -66,7 +66,7 @@ async fn one_controls_the_others_watch_and_hand_over() {
     assert_eq!(second.ask(Request::Lift).await, None);
     assert!(first.ask(Request::Lift).await.is_some());
 
-    // Who controls leaves; of two that are left nobody controls, and of one that is left it does.
+    // Who controls leaves; of two that are left nobody controls, and of one that is left it does after a while.
     let mut third = Page::open(&server).await;
     drop(second);
     let state = first
@@ -89,6 +89,7 @@ async fn one_controls_the_others_watch_and_hand_over() {
         (3, Some(2)),
         (2, None),
         (2, Some(3)),
+        (1, None),
         (1, Some(1)),
     ];
     let expected = expected.map(|(n, controller)| Clients { n, controller });
@@ -110,4 +111,21 @@ async fn a_page_that_is_loaded_again_controls_again() {
             .await;
         page.socket.close(None).await.unwrap();
     }
+}
+
+#[tokio::test]
+async fn a_page_that_is_loaded_again_does_not_lose_control_to_one_that_watches() {
+    let (_session, server) = Session::start(None);
+    let first = Page::open(&server).await;
+    let mut watching = Page::open(&server).await;
+    watching.state_where(|s| s.n_clients == 2).await;
+    drop(first);
+    watching.state_where(|s| s.n_clients == 1).await;
+    let mut again = Page::open(&server).await;
+    let me = again.client;
+    again
+        .state_where(|s| s.controller == Some(me) && s.n_clients == 2)
+        .await;
+    assert_eq!(again.ask(Request::Lift).await, None);
+    assert!(watching.ask(Request::Lift).await.is_some());
 }

@@ -194,6 +194,7 @@ impl Shape {
                 let params = GrowthParams {
                     layers,
                     cut_out: None,
+                    max_nodes: palpa_mesh::growth::MAX_NODES,
                 };
                 grow(&skin, &[bone], &params)
                     .expect("a limb made by formula can be grown")

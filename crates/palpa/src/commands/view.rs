@@ -1,6 +1,6 @@
 //! `palpa view`: the body under one's own hand, in a browser.
 
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -54,6 +54,8 @@ fn address(text: &str) -> Result<IpAddr, String> {
 #[derive(Debug, Serialize)]
 struct Started {
     url: String,
+    /// The same for other machines, where the server listens to them.
+    url_elsewhere: Option<String>,
     port: u16,
 }
 
@@ -92,8 +94,13 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let handle = session.start(server.publisher())?;
     let url = server.url();
     context.say(format!("the viewer is at {url}  (Ctrl-C ends it)"))?;
+    let url_elsewhere = url_elsewhere(args.bind, &url);
+    if let Some(url) = &url_elsewhere {
+        context.say(format!("from other machines: {url}"))?;
+    }
     context.json(&Started {
         url: url.clone(),
+        url_elsewhere,
         port: server.address().port(),
     })?;
     if !args.no_open
@@ -118,6 +125,26 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     drop(handle);
     drop(server);
     Ok(Outcome::Done)
+}
+
+/// The address for other machines, if the server listens at all of this one's: the one by which this machine goes out.
+fn url_elsewhere(bind: IpAddr, url: &str) -> Option<String> {
+    if !bind.is_unspecified() {
+        return None;
+    }
+    // Nothing is sent: a socket is asked which address it would send from. These are addresses for examples.
+    let (example, here) = match bind {
+        IpAddr::V4(_) => ("192.0.2.1:9", Ipv4Addr::LOCALHOST.to_string()),
+        IpAddr::V6(_) => ("[2001:db8::1]:9", "[::1]".to_owned()),
+    };
+    let socket = UdpSocket::bind((bind, 0)).ok()?;
+    socket.connect(example).ok()?;
+    let out = socket.local_addr().ok()?.ip();
+    let out = match out {
+        IpAddr::V4(ip) => ip.to_string(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
+    };
+    Some(url.replacen(&here, &out, 1)).filter(|elsewhere| elsewhere != url)
 }
 
 fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {

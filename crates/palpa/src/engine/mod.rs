@@ -26,7 +26,7 @@ pub use watch::{Look, Seen, Watch};
 
 use std::sync::Arc;
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
 use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
@@ -34,7 +34,7 @@ use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_servo::Pose;
 use palpa_tissue::{Scene, Tool};
 
-use crate::build::{BuiltBody, build, in_mm, nearest};
+use crate::build::{BuiltBody, build_within, in_mm, nearest};
 use crate::press::column_length;
 use crate::press::mesh::along_skin;
 use crate::press::tissue::Indentation;
@@ -88,7 +88,8 @@ impl LiveScene {
             );
         }
         let scene = &coarser(scene);
-        let built = Arc::new(build(scene)?);
+        let built = build_within(scene, MOST_NODES).context("in real time")?;
+        let built = Arc::new(built);
         let moves = scene.mesh.moves;
         if moves && !scene.mesh.refine {
             bail!(
@@ -191,6 +192,9 @@ fn coarser(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     let usual = scene.mesh.near_tool_of(&scene.tool);
     scene.mesh.near_tool = scene.mesh.near_tool.or(usual.map(|h| COARSER * h));
+    // One more than there may be: what is too fine is refused, and not made a little coarser.
+    let n_levels = 1 + scene.layers.iter().map(|l| l.levels).sum::<usize>();
+    scene.mesh.max_vertices = scene.mesh.max_vertices.min(MOST_NODES / n_levels + 1);
     scene
 }
 

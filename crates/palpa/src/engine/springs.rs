@@ -7,8 +7,8 @@ use palpa_springs::{Outcome, SpringModel, SpringState, StepParams, Workspace, st
 use palpa_tissue::{ContactShape, ContactTool, Scene};
 use std::sync::Arc;
 
-use super::Watch;
-use crate::build::{BuiltBody, build, nearest};
+use super::{MOST_NODES, Watch};
+use crate::build::{BuiltBody, build_within, nearest};
 use crate::continuum;
 use crate::press::{Place, reference};
 
@@ -49,7 +49,7 @@ impl SpringScene {
     /// When the scene has what the reference method has not, or its body cannot be grown.
     pub fn build(scene: &Scene) -> anyhow::Result<Self> {
         reference::check_reference(scene)?;
-        let built = Arc::new(build(scene)?);
+        let built = Arc::new(build_within(scene, MOST_NODES)?);
         let body = &built.growth.body;
         let place = Place::find(scene, body, built.press_vertex, &mut Vec::new())?;
         let point = ContactTool {

@@ -275,6 +275,7 @@ mod tests {
         let params = palpa_mesh::GrowthParams {
             layers: vec![layer],
             cut_out: None,
+            max_nodes: palpa_mesh::growth::MAX_NODES,
         };
         palpa_mesh::grow(&skin, &[], &params).unwrap().body
     }

@@ -189,7 +189,10 @@ mod tests {
         assert!(words("/layer/9/levels", json!(1)).contains("no item 9"));
         assert!(words("/layer/0/levels/x", json!(1)).contains("has no keys"));
         let apples = words("/layer/0/tissue/young", json!("12 apples"));
-        assert!(apples.contains("apples") && apples.contains("scene: layer[0]"), "{apples}");
+        assert!(
+            apples.contains("apples") && apples.contains("scene: layer[0]"),
+            "{apples}"
+        );
         assert!(words("/nonsense", json!(1)).contains("nonsense"));
     }
 }

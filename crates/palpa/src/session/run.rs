@@ -387,7 +387,10 @@ impl Body {
             bail!("the scene stays as it is while it is recorded; stop the recording first");
         }
         self.close_replay();
-        self.motion = None;
+        if self.motion.take().is_some() {
+            let text = "the motion ended: the scene was changed";
+            self.notice(NoticeLevel::Info, text.to_owned());
+        }
         self.wanted = Wanted { scene, key };
         self.build();
         Ok(())

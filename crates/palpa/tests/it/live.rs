@@ -177,6 +177,17 @@ fn what_cannot_be_felt_in_time_is_told() {
         code == 2 && stderr.contains("[motion] depth"),
         "{code} {stderr}"
     );
+    // So fine that no step would be in time: refused before it is grown.
+    fs::write(
+        folder.path().join("fine.toml"),
+        SCENE.replace("spacing = \"8 mm\"", "spacing = \"0.25 mm\""),
+    )
+    .unwrap();
+    let (code, _, stderr) = seen(&mut palpa(folder.path(), &args("fine.toml")));
+    assert!(
+        code == 2 && stderr.contains("nodes, more than the 80000"),
+        "{code} {stderr}"
+    );
     // So slow that it never touches.
     fs::write(
         folder.path().join("slow.toml"),

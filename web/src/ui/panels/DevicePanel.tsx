@@ -28,6 +28,7 @@ export function DevicePanel() {
             options={GRIPS.map((value) => ({ value, label: t(`grip.${value}`) }))}
             onChange={(grip) => aloud(edit(['/device/grip', grip]))}
           />
+          {device.preset !== 'ideal' && <p class="hint">{t('device.friction_hint')}</p>}
         </Section>
       </Controlled>
       <Section title={t('device.hand')}>

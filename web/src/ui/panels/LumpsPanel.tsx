@@ -3,10 +3,13 @@
 import { signal } from '@preact/signals';
 import { named, t } from '../../i18n';
 import { edit, isHiding, scene, state } from '../../store';
-import { aloud, Button, Controlled, QuantityField, Section, Select } from '../controls';
+import { aloud, Button, Controlled, QuantityField, Section, Select, Toggle } from '../controls';
 import { formatQuantity, withUnit, writtenPoint, writtenQuantity } from '../quantity';
 import { stiffnessKey, type LumpTable, type Point } from '../scene_table';
-import { lastTouched, picking } from '../settings';
+import { lastTouched, picking, show, wanted } from '../settings';
+
+/** Share of the light that a layer stops which is seen through. */
+const CLEAR = 0.3;
 
 /** What the next lump is to be; a firm nodule a little under the skin. */
 const next = signal({ depth: '10 mm', radius: '6 mm', young: '150 kPa' });
@@ -18,6 +21,7 @@ export function LumpsPanel() {
     <Controlled>
       <Section title={t('lumps.add')}>
         <NewLump lumps={lumps} />
+        <SeeThrough />
       </Section>
       <ul class="plain" data-testid="lump-list" aria-label={t('tab.lumps')}>
         {lumps.map((lump, index) => (
@@ -28,6 +32,20 @@ export function LumpsPanel() {
       </ul>
       {lumps.length === 0 && <p class="empty">{t('lumps.none')}</p>}
     </Controlled>
+  );
+}
+
+/** Lumps lie inside: what is over them is made clear, or full again. */
+function SeeThrough() {
+  const layers = state.value?.layers ?? [];
+  const isClear = wanted.value.layers.some((layer) => layer.opacity < 1);
+  return (
+    <Toggle
+      label={t('lumps.see_through')}
+      on={isClear}
+      onChange={(on) => show({ layers: layers.map(() => ({ visible: true, opacity: on ? CLEAR : 1 })) })}
+      testid="see-through"
+    />
   );
 }
 
