@@ -180,7 +180,9 @@ fn what_cannot_be_felt_in_time_is_told() {
     // So fine that no step would be in time: refused before it is grown.
     fs::write(
         folder.path().join("fine.toml"),
-        SCENE.replace("spacing = \"8 mm\"", "spacing = \"0.25 mm\""),
+        SCENE
+            .replace("spacing = \"8 mm\"", "spacing = \"0.5 mm\"")
+            .replace("levels = 2", "levels = 8"),
     )
     .unwrap();
     let (code, _, stderr) = seen(&mut palpa(folder.path(), &args("fine.toml")));
