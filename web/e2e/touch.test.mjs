@@ -36,10 +36,13 @@ test('the wheel presses deeper, and the force grows', async () => {
   await palpa.press();
   const before = await palpa.steady();
   for (let k = 0; k < 4; k++) await palpa.page.mouse.wheel(0, -100);
-  const otherWay = await palpa.reads('another depth', ({ metres }) => Math.abs(metres - before.metres) > 0.5e-3);
+  await palpa.reads('another depth', ({ metres }) => Math.abs(metres - before.metres) > 0.5e-3);
+  // A machine that stops for a moment lets the hand sink in, too: what counts is where it comes to rest.
   const after = await palpa.steady();
   await palpa.release();
-  assert.equal(Math.sign(after.newtons - before.newtons), Math.sign(otherWay.metres - before.metres), 'deeper is harder');
+  const deeper = after.metres - before.metres;
+  assert.ok(Math.abs(deeper) > 0.3e-3, `${deeper} m deeper`);
+  assert.equal(Math.sign(after.newtons - before.newtons), Math.sign(deeper), 'deeper is harder');
   await palpa.atRest();
 });
 
