@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
-import { pause, until } from './viewer.mjs';
+import { until } from './viewer.mjs';
 import { extent, readBody, sliceAreas } from './vtu.mjs';
 
 const AXES = /** @type {const} */ (['x', 'y', 'z']);
@@ -46,15 +46,14 @@ async function compared(palpa, axis) {
 
 /** The page draws a section some frames after it was asked for. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis @param {string} when */
 async function assertSameArea(palpa, axis, when) {
-  const end = performance.now() + SECTION_WAIT;
-  for (;;) {
+  let words = '';
+  const look = async () => {
     const found = await compared(palpa, axis);
     const { shown, slice, off, worstLayer } = found;
-    if (off < 0.01 && worstLayer < 0.01) return found;
-    const words = `${when}: shown ${shown.total} m², slice of the file ${slice} m²: ${(100 * off).toFixed(3)} % apart, a layer ${(100 * worstLayer).toFixed(3)} %`;
-    assert.ok(performance.now() < end, words);
-    await pause(100);
-  }
+    words = `${when}: shown ${shown.total} m², slice of the file ${slice} m²: ${(100 * off).toFixed(3)} % apart, a layer ${(100 * worstLayer).toFixed(3)} %`;
+    return off < 0.01 && worstLayer < 0.01 && found;
+  };
+  return until('the section is the slice', look, SECTION_WAIT).catch((error) => assert.fail(`${error.message}; ${words}`));
 }
 
 test('the section has the area of the slice of the exported body, at rest and pressed', async (t) => {

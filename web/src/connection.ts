@@ -23,6 +23,12 @@ const LONGEST_WAIT = 5000;
 const SILENCE = 6000;
 const REPLY_WAIT = 35_000;
 
+/** An address of the engine's, with the token that the page was opened with. */
+export function apiUrl(path: string): string {
+  const token = new URLSearchParams(location.search).get('token');
+  return token === null ? path : `${path}?token=${encodeURIComponent(token)}`;
+}
+
 export class Connection {
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
@@ -68,11 +74,8 @@ export class Connection {
 
   private open(): void {
     this.listener.onStatus('connecting');
-    const url = new URL('ws', location.href);
+    const url = new URL(apiUrl('ws'), location.href);
     url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
-    url.search = '';
-    const token = new URLSearchParams(location.search).get('token');
-    if (token !== null) url.searchParams.set('token', token);
     const socket = new WebSocket(url);
     let isOpened = false;
     socket.binaryType = 'arraybuffer';
@@ -96,9 +99,7 @@ export class Connection {
 
   /** A WebSocket does not tell why it did not open. */
   private async askWhy(): Promise<void> {
-    const url = new URL('api/state', location.href);
-    url.search = location.search;
-    const status = await fetch(url, { method: 'HEAD' }).then((response) => response.status, () => 0);
+    const status = await fetch(apiUrl('api/state'), { method: 'HEAD' }).then((response) => response.status, () => 0);
     if (status === 401 && !this.closed) this.listener.onRefused();
   }
 

@@ -154,11 +154,15 @@ impl Server {
 
     /// Address to open in a browser, with the token if there is one.
     pub fn url(&self) -> String {
-        let ip = match self.address.ip() {
+        self.url_at(match self.address.ip() {
             IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
             IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
             ip => ip,
-        };
+        })
+    }
+
+    /// The same for who reaches this machine at that address.
+    pub fn url_at(&self, ip: IpAddr) -> String {
         let mut url = format!("http://{}/", SocketAddr::new(ip, self.address.port()));
         if let Some(token) = &self.token {
             url.push_str("?token=");

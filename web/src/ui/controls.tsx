@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from 'preact';
 import { useEffect, useId, useRef, useState } from 'preact/hooks';
+import { apiUrl } from '../connection';
 import { t } from '../i18n';
 import { askAloud, isWatching, notify, state, status } from '../store';
 import { defaultUnit, formatQuantity, parseQuantity, tidied, withUnit, type Dimension } from './quantity';
@@ -381,12 +382,6 @@ function FieldError({ id, text }: { id: string; text: string }) {
 /** Says what was refused as a notice: for buttons, which have no place of their own for it. */
 export function aloud(commit: Promise<string | null>): void {
   void commit.then((error) => error !== null && notify('warning', error));
-}
-
-/** An address of the engine's, with the token that the page was opened with. */
-export function apiUrl(path: string): string {
-  const token = new URLSearchParams(location.search).get('token');
-  return token === null ? path : `${path}?token=${encodeURIComponent(token)}`;
 }
 
 export function Download(props: { path: string; name: string; children: ComponentChildren; disabled?: boolean; testid?: string }) {

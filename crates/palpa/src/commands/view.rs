@@ -54,7 +54,7 @@ fn address(text: &str) -> Result<IpAddr, String> {
 #[derive(Debug, Serialize)]
 struct Started {
     url: String,
-    /// The same for other machines, where the server listens to them.
+    /// The same for other machines, if the server listens at all of this one's addresses.
     url_elsewhere: Option<String>,
     port: u16,
 }
@@ -94,7 +94,8 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let handle = session.start(server.publisher())?;
     let url = server.url();
     context.say(format!("the viewer is at {url}  (Ctrl-C ends it)"))?;
-    let url_elsewhere = url_elsewhere(args.bind, &url);
+    let elsewhere = args.bind.is_unspecified().then(|| outward(args.bind));
+    let url_elsewhere = elsewhere.flatten().map(|ip| server.url_at(ip));
     if let Some(url) = &url_elsewhere {
         context.say(format!("from other machines: {url}"))?;
     }
@@ -127,24 +128,17 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The address for other machines, if the server listens at all of this one's: the one by which this machine goes out.
-fn url_elsewhere(bind: IpAddr, url: &str) -> Option<String> {
-    if !bind.is_unspecified() {
-        return None;
-    }
+/// The address by which this machine goes out, and others reach it.
+fn outward(bind: IpAddr) -> Option<IpAddr> {
     // Nothing is sent: a socket is asked which address it would send from. These are addresses for examples.
-    let (example, here) = match bind {
-        IpAddr::V4(_) => ("192.0.2.1:9", Ipv4Addr::LOCALHOST.to_string()),
-        IpAddr::V6(_) => ("[2001:db8::1]:9", "[::1]".to_owned()),
+    let example = match bind {
+        IpAddr::V4(_) => "192.0.2.1:9",
+        IpAddr::V6(_) => "[2001:db8::1]:9",
     };
     let socket = UdpSocket::bind((bind, 0)).ok()?;
     socket.connect(example).ok()?;
-    let out = socket.local_addr().ok()?.ip();
-    let out = match out {
-        IpAddr::V4(ip) => ip.to_string(),
-        IpAddr::V6(ip) => format!("[{ip}]"),
-    };
-    Some(url.replacen(&here, &out, 1)).filter(|elsewhere| elsewhere != url)
+    let ip = socket.local_addr().ok()?.ip();
+    (!ip.is_loopback()).then_some(ip)
 }
 
 fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {

@@ -112,6 +112,20 @@ fn check_limits(log: &Log, spec: &DeviceSpec) {
     }
 }
 
+/// Without a tissue, or a device, nothing presses on.
+fn check_let_go(log: &Log, usual: f64) {
+    for (text, after) in [
+        ("reading not a number", 0.09),
+        ("device lost", 0.09),
+        ("the tissue pauses", 0.28),
+    ] {
+        let event = log.events.iter().find(|e| e.text.contains(text)).unwrap();
+        let k = (log.ticks).partition_point(|t| t.tick.now < event.time + after);
+        let there = log.ticks[k].devices[0].force[2];
+        assert!(there.abs() < 0.7 * usual, "{text}: {there} N");
+    }
+}
+
 fn check_said(log: &Log) {
     let said: Vec<&str> = log.events.iter().map(|e| e.text.as_str()).collect();
     for text in [
@@ -224,6 +238,7 @@ fn faults_while_real_tissue_is_pressed() {
             "after {after}: {mean} N, {usual} N before"
         );
     }
+    check_let_go(&log, usual.unwrap());
     check_said(&log);
     let again = replay(&log, live.tissue().unwrap(), &ReplayParams::default());
     assert_eq!(again.verdict, Verdict::Same, "{again:?}");
