@@ -18,7 +18,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 .PHONY: run test test-page test-data shared lint docs bench loop dist
 
 run: $(PAGE)
-	cargo run --release --package palpa -- view
+	cargo run --release --package palpa-cli -- view
 
 # The page is put into the binary, so it is built first.
 $(PAGE): web/package-lock.json web/index.html web/tsconfig.json web/vite.config.ts $(shell find web/src web/public -type f)
@@ -43,8 +43,8 @@ dist: $(PAGE)
 
 test-data: shared $(VENV)/ready
 	rm -rf "$(RESULTS)"
-	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa --test data --test it
-	cargo run --release --package palpa -- press --out "$(RESULTS)/press"
+	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa-cli --package palpa-plot --tests
+	cargo run --release --package palpa-cli -- press --out "$(RESULTS)/press"
 	"$(VENV)/bin/python" tools/check_vtu.py "$(RESULTS)"
 
 shared:
@@ -73,9 +73,9 @@ docs:
 	RUSTDOCFLAGS="--deny warnings" cargo doc --workspace --no-deps
 
 bench:
-	cargo run --release --package palpa -- reproduce
-	cargo run --release --package palpa -- bench
+	cargo run --release --package palpa-cli -- reproduce
+	cargo run --release --package palpa-cli -- bench
 
 loop:
-	cargo run --release --package palpa -- loop-report
-	cargo run --release --package palpa -- replay out/loop-report/log.mcap
+	cargo run --release --package palpa-cli -- loop-report
+	cargo run --release --package palpa-cli -- replay out/loop-report/log.mcap

@@ -9,7 +9,7 @@ use palpa_mesh::{
     Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface,
     SurfaceIndex, Vec3, grow, read_surface, repair,
 };
-use palpa_tissue::{
+use palpa_scene::{
     Generator, LengthUnit, LumpPlace, Scene, Skin, Target, Thickness, read_thickness,
 };
 

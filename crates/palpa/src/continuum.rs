@@ -12,7 +12,7 @@ use palpa_fem::shape::{
 };
 use palpa_fem::{Mat3, Supports};
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
-use palpa_tissue::{
+use palpa_scene::{
     ContactShape, ContactTool, CutFaces, Elastic, Energy, LumpPlace, Scene, Tissue, Volume,
 };
 
@@ -57,8 +57,8 @@ pub fn material(tissue: &Tissue, prestress: f64) -> anyhow::Result<Material> {
     if let Some(prony) = &tissue.prony {
         let terms = prony.terms.iter().map(|t| PronyTerm { g: t.g, tau: t.tau });
         let moduli = match prony.moduli {
-            palpa_tissue::Moduli::LongTerm => Moduli::LongTerm,
-            palpa_tissue::Moduli::Instantaneous => Moduli::Instantaneous,
+            palpa_scene::Moduli::LongTerm => Moduli::LongTerm,
+            palpa_scene::Moduli::Instantaneous => Moduli::Instantaneous,
         };
         let prony = Prony::new(terms.collect(), moduli, prony.relaxes_volume);
         material.prony = Some(prony.with_context(in_tissue)?);
@@ -172,10 +172,10 @@ fn check_place(
 
 fn lump_shape(
     scene: &Scene,
-    shape: &palpa_tissue::LumpShape,
+    shape: &palpa_scene::LumpShape,
     notes: &mut Vec<String>,
 ) -> anyhow::Result<LumpShape> {
-    use palpa_tissue::LumpShape as Given;
+    use palpa_scene::LumpShape as Given;
     Ok(match shape {
         Given::Sphere { radius } => LumpShape::Sphere(Sphere::new(*radius)?),
         Given::Ellipsoid { radii } => LumpShape::Ellipsoid(Ellipsoid::new(Vec3::from(*radii))?),

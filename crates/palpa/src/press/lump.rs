@@ -2,7 +2,7 @@
 
 use palpa_fem::lump::{Lump, LumpShape};
 use palpa_mesh::{LayeredBody, Surface, Vec3};
-use palpa_tissue::Scene;
+use palpa_scene::Scene;
 
 use crate::build::{mended, read_in_metres};
 
@@ -109,10 +109,10 @@ fn points_inside(lump: &Lump) -> Vec<Vec3> {
 /// When the file of a mesh cannot be read any more.
 pub fn lump_surface(
     scene: &Scene,
-    given: &palpa_tissue::Lump,
+    given: &palpa_scene::Lump,
     lump: &Lump,
 ) -> anyhow::Result<Surface> {
-    if let (palpa_tissue::LumpShape::Mesh(path), LumpShape::Mesh(mesh)) =
+    if let (palpa_scene::LumpShape::Mesh(path), LumpShape::Mesh(mesh)) =
         (&given.shape, lump.shape())
     {
         // What there is to note was noted when the lump was made.

@@ -7,7 +7,7 @@ use palpa_mesh::refine::{
     parts_for, refine, split_levels,
 };
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
-use palpa_tissue::{ContactShape, Scene, Target, Tool};
+use palpa_scene::{ContactShape, Scene, Target, Tool};
 
 use super::place::mesh_size_near;
 use super::{Place, nodes_under_disc};

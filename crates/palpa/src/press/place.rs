@@ -3,7 +3,7 @@
 use anyhow::bail;
 use nalgebra::Unit;
 use palpa_mesh::{LayeredBody, Vec3};
-use palpa_tissue::Scene;
+use palpa_scene::Scene;
 
 use crate::build::in_mm;
 

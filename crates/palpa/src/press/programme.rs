@@ -1,6 +1,6 @@
 //! When the tool is where.
 
-use palpa_tissue::Press;
+use palpa_scene::Press;
 use serde::Serialize;
 
 /// The parts of an indentation.
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn cycles_join_and_time_goes_on() {
-        let mut press = palpa_tissue::Scene::embedded().press;
+        let mut press = palpa_scene::Scene::embedded().press;
         (press.depth, press.step, press.hold) = (3e-3, 0.7e-3, 0.5);
         press.cycles = 2;
         let path = waypoints(&press, 0.01, &[0.1, 1.0]);

@@ -3,11 +3,11 @@
 use anyhow::bail;
 use palpa_mesh::quality::prism_shapes;
 use palpa_mesh::{LayeredBody, Vec3};
+use palpa_scene::{CutFaces, InPlane, Law, Scene, Tool};
 use palpa_springs::{
     Constraints, Corrections, EulerParams, InterfaceBars, LayerStiffness, Method, Outcome, Solver,
     SpringModel, SpringParams, SpringState, StepParams, Workspace, step,
 };
-use palpa_tissue::{CutFaces, InPlane, Law, Scene, Tool};
 use serde::Serialize;
 
 use super::place::mesh_size_near;
@@ -264,8 +264,8 @@ pub(crate) fn spring_params(scene: &Scene) -> SpringParams {
             InPlane::Mean => InterfaceBars::Mean,
         },
         solver: match scene.reference.solver {
-            palpa_tissue::Solver::DenseInverse => Solver::HistoricalInverse,
-            palpa_tissue::Solver::Sparse | palpa_tissue::Solver::Euler => Solver::Auto,
+            palpa_scene::Solver::DenseInverse => Solver::HistoricalInverse,
+            palpa_scene::Solver::Sparse | palpa_scene::Solver::Euler => Solver::Auto,
         },
         ..SpringParams::new(layers)
     }
@@ -279,7 +279,7 @@ pub(crate) fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
     StepParams {
         substeps: reference.substeps as usize,
         method: match reference.solver {
-            palpa_tissue::Solver::Euler => {
+            palpa_scene::Solver::Euler => {
                 Method::Euler(EulerParams::of_stable(model, EULER_FRACTION))
             }
             _ => Method::FiniteElements,

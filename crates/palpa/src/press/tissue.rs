@@ -8,7 +8,7 @@ use palpa_fem::{
     StepReport, Workspace, advance, equilibrate, prism_fields,
 };
 use palpa_mesh::{LayeredBody, Vec3};
-use palpa_tissue::{CutFaces, Scene, Tool};
+use palpa_scene::{CutFaces, Scene, Tool};
 use serde::Serialize;
 
 use super::lump::lump_shares;
@@ -61,7 +61,7 @@ pub struct Indentation {
     touch: f64,
     params: SolveParams,
     dynamics: Option<Dynamics>,
-    press: palpa_tissue::Press,
+    press: palpa_scene::Press,
 }
 
 /// How the tool holds the skin.
@@ -311,8 +311,8 @@ impl Indentation {
             speeds => speeds.to_vec(),
         };
         let dynamics = match scene.model.dynamics {
-            palpa_tissue::Dynamics::QuasiStatic => None,
-            palpa_tissue::Dynamics::Implicit(damping) => Some(Dynamics {
+            palpa_scene::Dynamics::QuasiStatic => None,
+            palpa_scene::Dynamics::Implicit(damping) => Some(Dynamics {
                 mass_damping: damping.mass,
                 stiffness_damping: damping.stiffness,
             }),

@@ -1,0 +1,262 @@
+//! `palpa check`: what is wrong with a surface or a scene, and a repaired copy.
+
+mod report;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail, ensure};
+use palpa_mesh::check::{Examination, Severity};
+use palpa_mesh::growth::GrowthReport;
+use palpa_mesh::read::FileCounts;
+use palpa_mesh::{Format, RepairOptions, SurfaceFile, Verdict, read_surface, write_surface};
+use palpa_scene::{LengthUnit, Scene, Skin};
+use serde::Serialize;
+
+use crate::cli::Context;
+use crate::commands::Outcome;
+use palpa::build::build;
+use palpa::one_paragraph;
+
+/// Check surfaces and scenes: what is wrong, where, and what to do
+///
+/// Reads OBJ, STL, PLY, OFF, GLB and glTF, and scenes with the surfaces that they name and the body that grows from them. Exit code 0: usable as it is; 1:
+/// has defects, and the report says whether repair removes them; 2: cannot be read.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Surfaces, or scenes (.toml)
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Unit of the coordinates of surfaces: m, cm, mm or in. A scene says its own
+    #[arg(long, default_value = "m", value_parser = unit)]
+    unit: LengthUnit,
+    /// Write the repaired copy of a single surface here (.obj, .ply, .off, .stl), in metres
+    #[arg(long, value_name = "FILE")]
+    repaired: Option<PathBuf>,
+    /// Move the middle of the repaired copy to the origin
+    #[arg(long)]
+    recentre: bool,
+    /// Weld vertices nearer than this share of the size of the surface, in the repaired copy
+    #[arg(long, value_name = "SHARE", default_value_t = RepairOptions::default().weld_tolerance, value_parser = share)]
+    weld: f64,
+}
+
+fn unit(word: &str) -> Result<LengthUnit, String> {
+    match word {
+        "m" => Ok(LengthUnit::M),
+        "cm" => Ok(LengthUnit::Cm),
+        "mm" => Ok(LengthUnit::Mm),
+        "in" => Ok(LengthUnit::In),
+        _ => Err("possible are m, cm, mm and in".to_owned()),
+    }
+}
+
+fn share(word: &str) -> Result<f64, String> {
+    match word.parse() {
+        Ok(share) if (0.0..0.1).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 up to 0.1".to_owned()),
+    }
+}
+
+/// What is known about one file of the command line.
+#[derive(Debug, Serialize)]
+struct FileResult {
+    file: PathBuf,
+    /// None where it could not be read.
+    verdict: Option<Verdict>,
+    /// Why it could not be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+    /// The surface itself, or those that a scene names.
+    surfaces: Vec<SurfaceResult>,
+    /// The body that a scene grows, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    body: Option<GrowthReport>,
+    /// Why a scene's surfaces, sound each, make no body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refusal: Option<String>,
+}
+
+/// What is known about one surface.
+#[derive(Debug, Serialize)]
+struct SurfaceResult {
+    file: PathBuf,
+    format: Format,
+    counts: FileCounts,
+    notes: Vec<NoteResult>,
+    #[serde(flatten)]
+    examination: Examination,
+    /// Where the repaired copy is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    written: Option<PathBuf>,
+}
+
+#[derive(Debug, Serialize)]
+struct NoteResult {
+    severity: Severity,
+    message: String,
+}
+
+/// Checks all files, and tells about each.
+///
+/// # Errors
+/// When a file cannot be read, or a repaired copy cannot be written. The other files are reported before.
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    ensure!(
+        args.repaired.is_none() || args.files.len() == 1,
+        "--repaired names one file, but {} are checked; give --out DIR instead",
+        args.files.len()
+    );
+    let mut results = Vec::new();
+    for file in &args.files {
+        if context.is_interrupted() {
+            return Ok(Outcome::Interrupted);
+        }
+        let result = check_file(file, args, context)?;
+        report::say(&result, context)?;
+        results.push(result);
+    }
+    context.json(&results)?;
+
+    let errors: Vec<&String> = results.iter().filter_map(|r| r.error.as_ref()).collect();
+    match errors[..] {
+        [] => {}
+        [error] => bail!("{error}"),
+        [first, ..] => bail!(
+            "{} of {} files cannot be read, the first: {first}",
+            errors.len(),
+            results.len()
+        ),
+    }
+    let is_good = results.iter().all(|r| r.verdict == Some(Verdict::Good));
+    Ok(if is_good {
+        Outcome::Done
+    } else {
+        Outcome::NotGood
+    })
+}
+
+/// Checks one file. That it cannot be read is a result; that a copy of it cannot be written is an error.
+fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<FileResult> {
+    let mut result = FileResult {
+        file: file.into(),
+        verdict: None,
+        error: None,
+        surfaces: vec![],
+        body: None,
+        refusal: None,
+    };
+    let surfaces = match surfaces_of(file, args.unit) {
+        Ok(surfaces) => surfaces,
+        Err(error) => {
+            result.error = Some(one_paragraph(&error));
+            return Ok(result);
+        }
+    };
+    let mut verdict = Verdict::Good;
+    for Named {
+        path,
+        surface,
+        unit,
+    } in surfaces
+    {
+        let options = RepairOptions {
+            weld_tolerance: args.weld,
+            recentre: args.recentre,
+        };
+        let examination = surface.examine(unit.metres(), &options);
+        verdict = verdict.max(examination.verdict);
+        let notes = surface.notes.iter().map(|note| NoteResult {
+            severity: note.severity(),
+            message: note.to_string(),
+        });
+        let written = write_repaired(&path, &examination, args, context)?;
+        result.surfaces.push(SurfaceResult {
+            format: surface.format,
+            counts: surface.counts,
+            notes: notes.collect(),
+            examination,
+            written,
+            file: path,
+        });
+    }
+    if is_scene(file) && verdict < Verdict::Bad {
+        match build(&Scene::load(file)?) {
+            Ok(built) => result.body = Some(built.growth.report),
+            Err(error) => {
+                result.refusal = Some(one_paragraph(&error));
+                verdict = Verdict::Bad;
+            }
+        }
+    }
+    result.verdict = Some(verdict);
+    Ok(result)
+}
+
+fn is_scene(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// A surface that was read, with what is needed to understand its coordinates.
+struct Named {
+    path: PathBuf,
+    surface: SurfaceFile,
+    unit: LengthUnit,
+}
+
+/// The surface of a file, or those that a scene names.
+fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
+    let read = |path: &Path, unit: LengthUnit| -> anyhow::Result<Named> {
+        Ok(Named {
+            surface: read_surface(path)?,
+            path: path.into(),
+            unit,
+        })
+    };
+    if !is_scene(file) {
+        return Ok(vec![read(file, unit)?]);
+    }
+    let scene = Scene::load(file)?;
+    let skin = match &scene.body.skin {
+        Skin::File(path) => Some(path),
+        Skin::Generated(_) => None,
+    };
+    skin.into_iter()
+        .chain(&scene.body.bones)
+        .map(|path| {
+            read(path, scene.body.unit).with_context(|| format!("scene {}", file.display()))
+        })
+        .collect()
+}
+
+/// Writes the repaired copy, if one was asked for and there is something in it; returns where.
+fn write_repaired(
+    path: &Path,
+    examination: &Examination,
+    args: &Args,
+    context: &Context,
+) -> anyhow::Result<Option<PathBuf>> {
+    let Some(repaired) = &examination.repaired else {
+        return Ok(None);
+    };
+    let target = match &args.repaired {
+        Some(target) => target.clone(),
+        None if context.is_out_given() => context.out_dir()?.path().join(name_of_copy(path)),
+        None => return Ok(None),
+    };
+    if repaired.surface.triangles.is_empty() {
+        return Ok(None);
+    }
+    write_surface(&target, &repaired.surface)?;
+    Ok(Some(target))
+}
+
+/// `skin.obj` → `skin_repaired.obj`; what cannot be written in its own format becomes PLY.
+fn name_of_copy(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let extension = extension.filter(|e| ["obj", "stl", "off"].contains(&e.as_str()));
+    format!("{stem}_repaired.{}", extension.as_deref().unwrap_or("ply"))
+}

@@ -1,0 +1,207 @@
+//! `palpa export`: a scene as an input deck for CalculiX.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use palpa_scene::Scene;
+use palpa_scene::units::Length;
+use serde::Serialize;
+
+use super::Outcome;
+use crate::cli::Context;
+use palpa::build::{build, in_mm};
+use palpa::continuum;
+use palpa::press::mesh::PressedBody;
+use palpa_lab::export::{self, Deck, Export, Section};
+
+/// Write a scene as an input deck for CalculiX, to check its forces with another solver
+///
+/// Without a SCENE, a forearm made by formula is exported. Writes body.inp, in millimetres, newtons and megapascals; run
+/// it with `ccx body` in its folder. Mesh, patch and way are those of `palpa press`. The forces on the way down are then in body.dat, the deformed body in body.frd.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scene file (TOML); the embedded forearm if none is given
+    scene: Option<PathBuf>,
+    /// The element that each prism becomes
+    #[arg(long, value_enum, default_value_t)]
+    element: Element,
+    /// How deep, with its unit: "8 mm"
+    #[arg(long)]
+    depth: Option<Length>,
+    /// Write the nearest that CalculiX knows where it does not know what the scene says
+    #[arg(long)]
+    approximate: bool,
+}
+
+/// What was written.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    scene: &'a str,
+    deck: String,
+    units: &'static str,
+    element: &'static str,
+    n_nodes: usize,
+    n_elements: usize,
+    /// Nodes that move with the tool.
+    n_patch_nodes: usize,
+    /// Radius of the circle that has the area of the skin between these nodes. mm
+    patch_radius_mm: f64,
+    depth_mm: f64,
+    /// Where the tool goes.
+    direction: [f64; 3],
+    materials: Vec<Section>,
+    notes: &'a [String],
+}
+
+/// The elements of CalculiX that a prism can become.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+enum Element {
+    /// Quadratic, 15 nodes: CalculiX's own answer at its best
+    #[default]
+    C3d15,
+    /// Linear, 6 nodes: small, but much too stiff where tissue keeps its volume
+    C3d6,
+}
+
+impl From<Element> for export::Element {
+    fn from(element: Element) -> Self {
+        match element {
+            Element::C3d15 => Self::C3d15,
+            Element::C3d6 => Self::C3d6,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// On a bad scene or body, on what CalculiX cannot say, and when the deck cannot be written.
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    let mut scene = match &args.scene {
+        Some(path) => Scene::load(path)?,
+        None => Scene::embedded(),
+    };
+    if let Some(depth) = args.depth {
+        scene.press.step *= depth.si() / scene.press.depth;
+        scene.press.depth = depth.si();
+        if let Err(problem) = scene.press.check() {
+            bail!("{problem}; see --depth");
+        }
+    }
+    let out = context.out_dir()?;
+    let spinner = context.progress(0, "growing the body");
+    let built = build(&scene)?;
+    drop(spinner);
+    let mut notes = built.notes.clone();
+    let materials = continuum::materials(&scene)?;
+    let lumps = continuum::lumps(&scene, &built, &mut notes)?;
+    if scene.tool.contact().is_some() {
+        bail!(
+            "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
+             \"disc\" or \"node\"",
+            scene.tool
+        );
+    }
+    let pressed = PressedBody::build(&scene, &built, &lumps, &[], &mut notes)?;
+    let (body, place) = (&pressed.body, &pressed.place);
+    let supports = continuum::supports(scene.body.cut_faces, body, &mut notes);
+    let patch = patch(&pressed);
+    let scene_name = args
+        .scene
+        .as_deref()
+        .map_or("embedded forearm".to_owned(), |p| p.display().to_string());
+    let title = [
+        format!(
+            "palpa {}: {}",
+            env!("CARGO_PKG_VERSION"),
+            one_line(&scene_name)
+        ),
+        format!(
+            "tool: {}, at ({}) mm, {:.3} mm deep",
+            scene.tool,
+            in_mm(place.at),
+            scene.press.depth * 1e3
+        ),
+    ];
+    let deck = Deck::build(&Export {
+        body,
+        materials: &materials,
+        lumps: &lumps,
+        supports: &supports,
+        patch: &patch,
+        travel: place.direction.into_inner() * scene.press.depth,
+        n_results: (scene.press.depth / scene.press.step - 1e-9)
+            .ceil()
+            .max(1.0) as usize,
+        element: args.element.into(),
+        is_approximate: args.approximate,
+        title: &title,
+    })?;
+    notes.extend(deck.notes.iter().cloned());
+    out.write_with("body.inp", |w| deck.write(w))?;
+    let report = Report {
+        scene: &scene_name,
+        deck: out.path().join("body.inp").display().to_string(),
+        units: "mm, N, MPa",
+        element: match args.element {
+            Element::C3d15 => "C3D15",
+            Element::C3d6 => "C3D6",
+        },
+        n_nodes: deck.n_nodes(),
+        n_elements: deck.n_elements(),
+        n_patch_nodes: deck.n_patch_nodes(),
+        patch_radius_mm: pressed
+            .patch
+            .as_ref()
+            .map_or(0.0, |patch| patch.radius * 1e3),
+        depth_mm: scene.press.depth * 1e3,
+        direction: place.direction.into_inner().into(),
+        materials: deck.sections(),
+        notes: &notes,
+    };
+    context.json(&report)?;
+    conclude(context, out.path(), &report)?;
+    Ok(Outcome::Done)
+}
+
+fn conclude(context: &Context, out: &Path, report: &Report<'_>) -> anyhow::Result<()> {
+    context.say(format!(
+        "{}: {} nodes, {} elements {}",
+        report.scene, report.n_nodes, report.n_elements, report.element
+    ))?;
+    for material in &report.materials {
+        context.say(format!(
+            "  {:<24} {:>8} elements  {}",
+            material.name, material.n_elements, material.law
+        ))?;
+    }
+    context.say(match report.n_patch_nodes {
+        1 => format!("  one node moves {:.2} mm with the tool", report.depth_mm),
+        n => format!(
+            "  {n} nodes move {:.2} mm with the tool, a patch as large as a disc of radius {:.2} mm",
+            report.depth_mm, report.patch_radius_mm
+        ),
+    })?;
+    for note in report.notes {
+        context.say(format!("  note: {note}"))?;
+    }
+    context.say(format!(
+        "written to {}; run it with: cd {} && ccx body",
+        report.deck,
+        out.display()
+    ))
+}
+
+/// The nodes that move with the tool.
+fn patch(pressed: &PressedBody) -> Vec<usize> {
+    let body = &pressed.body;
+    match &pressed.patch {
+        Some(patch) => (patch.vertices.iter()).map(|&v| body.node(v, 0)).collect(),
+        None => vec![body.node(pressed.place.vertex, 0)],
+    }
+}
+
+/// Without what would end a comment.
+fn one_line(text: &str) -> String {
+    text.replace(['\n', '\r'], " ")
+}

@@ -1,0 +1,461 @@
+//! The figures of a run.
+
+use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus};
+use palpa_servo::{Faults, Limits};
+use serde::Serialize;
+
+use crate::cli::Context;
+use crate::table::Table;
+use palpa::live::{GOOD_TRAVEL, LiveScene};
+
+/// What a run must keep, as the project promises it: thread-CPU time of a tick, s; change of force where a patch comes,
+/// N; and force between 20 and 400 Hz with the hand still, N.
+const MOST_TICK: f64 = 200e-6;
+const MOST_ARRIVAL: f64 = 0.02;
+const MOST_RMS: f64 = 0.02;
+/// Share of the steps with contact in which the tissue may be behind the tool.
+const MOST_BEHIND: f64 = 0.01;
+/// Ticks without a force because the tissue was late: as many as one hiccup of the machine makes.
+const MOST_STALE: f64 = 1e-3;
+/// The hand is still where the tool goes no farther than this in the last seconds, m and s.
+const STILL: [f64; 2] = [0.5e-3, 2.0];
+
+/// What is written to loop.json.
+#[derive(Debug, Serialize)]
+pub(super) struct Figures {
+    seconds: f64,
+    nodes: usize,
+    mesh_size_mm: f64,
+    zone_radius_mm: f64,
+    ticks: u64,
+    /// Ticks left out because the one before was too late.
+    misses: u64,
+    tick_cpu_us: Times,
+    wake_up_lateness_us: Times,
+    #[serde(skip)]
+    pub(super) cpu_histogram: Vec<(f64, f64, u64)>,
+    #[serde(skip)]
+    pub(super) lateness_histogram: Vec<(f64, f64, u64)>,
+    tissue: TissueFigures,
+    devices: Vec<ForceFigures>,
+    /// Ticks with each fault and each limit.
+    faults: Vec<(String, u64)>,
+    limits: Vec<(String, u64)>,
+    n_active_max: u32,
+    lost_ticks: u64,
+    lost_steps: u64,
+    has_log_failed: bool,
+    threads: Vec<String>,
+    memory: String,
+    events: Vec<String>,
+}
+
+/// Quantiles in microseconds.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Times {
+    mean: f64,
+    p50: f64,
+    p99: f64,
+    p999: f64,
+    max: f64,
+}
+
+impl From<Quantiles> for Times {
+    fn from(q: Quantiles) -> Self {
+        let us = |s: f64| (s * 1e9).round() / 1e3;
+        Self {
+            mean: us(q.mean),
+            p50: us(q.p50),
+            p99: us(q.p99),
+            p999: us(q.p999),
+            max: us(q.max),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct TissueFigures {
+    steps: u64,
+    steps_per_s: f64,
+    /// Up to which speed of the tool the force keeps its accuracy: steps are short enough, and zones are there in time.
+    fastest_tool_mm_per_s: f64,
+    /// The same by steps alone.
+    fastest_by_steps_mm_per_s: f64,
+    /// How fast the hand goes.
+    motion_mm_per_s: f64,
+    step_cpu_us: Times,
+    step_wall_us: Times,
+    held_back: u64,
+    unfinished: u64,
+    /// Steps that did not come as far as the tool, and their share of those with contact.
+    behind: u64,
+    behind_share: f64,
+    /// Share of the ticks without a force because the tissue was late.
+    stale_share: f64,
+    jobs: u64,
+    job_cpu_us: Times,
+    /// From where a zone is asked for to where it is taken over, ms: 90 of 100 are shorter.
+    zone_wall_p90_ms: Option<f64>,
+    background_cpu_share: f64,
+    zones: u64,
+    /// Meshes that the body was on.
+    meshes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct ForceFigures {
+    max_force_n: f64,
+    /// 20 to 400 Hz, last 2 s; none where the tool was not still then.
+    rms_still_n: Option<f64>,
+    rms_worst_n: f64,
+    arrival_max_n: f64,
+    arrival_p999_n: f64,
+    /// Beyond what the device's own displacement makes with the tissue's stiffness.
+    arrival_alone_max_n: f64,
+    other_p999_n: f64,
+    other_max_n: f64,
+    /// By the law's own count.
+    energy_in_mj: f64,
+    energy_out_mj: f64,
+    /// The most that was ever given out beyond what was taken in, since the last fault.
+    energy_deficit_mj: f64,
+    energy_budget_mj: f64,
+    softening_max: f64,
+}
+
+impl Figures {
+    pub(super) fn new(
+        report: &Report,
+        forces: &[ForceReport],
+        log: &Log,
+        live: &LiveScene,
+        motion_speed: f64,
+        seconds: f64,
+    ) -> Self {
+        let ticks = || log.ticks.iter().filter(|t| t.tick.now <= seconds);
+        let mut faults = Vec::new();
+        let mut limits = Vec::new();
+        for tick in ticks() {
+            let bits = u16::try_from(tick.tick.faults).unwrap_or(0);
+            Faults::from_bits(bits).for_each_name(|name| count(&mut faults, name));
+            let bits = u16::try_from(tick.tick.limits).unwrap_or(0);
+            Limits::from_bits(bits).for_each_name(|name| count(&mut limits, name));
+        }
+        let devices = forces.iter().enumerate().map(|(k, force)| {
+            let records = || ticks().map(move |t| &t.devices[k]);
+            let last = records().next_back();
+            ForceFigures {
+                max_force_n: force.max_force,
+                rms_still_n: is_still(log, k, seconds.min(report.duration))
+                    .then_some(force.rms_band),
+                rms_worst_n: force.rms_band_worst,
+                arrival_max_n: force.arrival_max,
+                arrival_p999_n: force.arrival_p999,
+                arrival_alone_max_n: force.arrival_alone_max,
+                other_p999_n: force.other_p999,
+                other_max_n: force.other_max,
+                energy_in_mj: last.map_or(0.0, |d| d.energy_in * 1e3),
+                energy_out_mj: last.map_or(0.0, |d| d.energy_out * 1e3),
+                energy_deficit_mj: force.max_work.max(0.0) * 1e3,
+                energy_budget_mj: ticks()
+                    .next_back()
+                    .map_or(0.0, |t| t.tick.energy_budget * 1e3),
+                softening_max: records().map(|d| d.softening).fold(0.0, f64::max),
+            }
+        });
+        let status = |wanted: StepStatus| {
+            let steps = log.steps.iter();
+            steps.filter(|s| s.status == wanted as u8).count() as u64
+        };
+        let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
+        let behind = status(StepStatus::Behind);
+        let stale = ticks().filter(|t| {
+            let bits = u16::try_from(t.tick.faults).unwrap_or(0);
+            Faults::from_bits(bits).contains(Faults::STALE_PATCH)
+        });
+        let by_steps = fastest_by_steps(report);
+        let zone_wall = zone_wall(log);
+        // It leaves the middle of a zone while the next is being made.
+        let by_zones = zone_wall.map(|time| live.params.longest_way() / time);
+        Self {
+            seconds: report.duration,
+            nodes: live.model.n_nodes(),
+            mesh_size_mm: live.mesh_size * 1e3,
+            zone_radius_mm: live.params.zone_radius * 1e3,
+            ticks: report.ticks,
+            misses: report.skipped,
+            tick_cpu_us: report.tick_cpu.into(),
+            wake_up_lateness_us: report.lateness.into(),
+            cpu_histogram: report.tick_cpu_histogram.clone(),
+            lateness_histogram: report.lateness_histogram.clone(),
+            tissue: TissueFigures {
+                steps: report.steps,
+                steps_per_s: report.step_rate,
+                fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
+                fastest_by_steps_mm_per_s: 1e3 * by_steps,
+                motion_mm_per_s: 1e3 * motion_speed,
+                step_cpu_us: report.step_cpu.into(),
+                step_wall_us: report.step_wall.into(),
+                held_back: report.held_back,
+                unfinished: status(StepStatus::Unfinished),
+                behind,
+                behind_share: behind as f64 / touching.max(1) as f64,
+                stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
+                jobs: report.jobs.count,
+                job_cpu_us: report.jobs.into(),
+                zone_wall_p90_ms: zone_wall.map(|s| s * 1e3),
+                background_cpu_share: report.background_cpu_share,
+                zones: log.steps.iter().map(|s| s.zone).max().unwrap_or(0),
+                meshes: log.steps.iter().map(|s| s.mesh).max().unwrap_or(0),
+            },
+            devices: devices.collect(),
+            faults,
+            limits,
+            n_active_max: ticks().map(|t| t.tick.n_active).max().unwrap_or(0),
+            lost_ticks: report.lost_records[0],
+            lost_steps: report.lost_records[1],
+            has_log_failed: report.has_log_failed,
+            threads: report.granted.iter().map(ToString::to_string).collect(),
+            memory: match &report.memory_locked {
+                Ok(()) => "locked".to_owned(),
+                Err(why) => format!("not locked ({why})"),
+            },
+            events: report
+                .events
+                .iter()
+                .map(|e| format!("{:.3} s: {}", e.time, e.text))
+                .collect(),
+        }
+    }
+
+    /// What is not as it must be; nothing of this speaks of the machine's own lateness.
+    fn failures(&self) -> Vec<String> {
+        let mut failures = Vec::new();
+        if self.tick_cpu_us.p999 > MOST_TICK * 1e6 {
+            failures.push(format!(
+                "p99.9 of a tick's CPU time is {:.0} µs, more than {:.0}",
+                self.tick_cpu_us.p999,
+                MOST_TICK * 1e6
+            ));
+        }
+        let t = &self.tissue;
+        if t.behind_share > MOST_BEHIND {
+            failures.push(format!(
+                "in {:.1} % of the steps with contact the tissue was behind the tool, since zones or meshes came too late: forces there \
+                 are wrong; run less beside it, move more slowly, or make the mesh coarser with [mesh] near_tool",
+                100.0 * t.behind_share
+            ));
+        }
+        if t.stale_share > MOST_STALE {
+            failures.push(format!(
+                "{:.1} % of the ticks had no force, since no fresh patch came ({} steps failed, {:.0} steps/s on {} nodes)",
+                100.0 * t.stale_share, t.held_back, t.steps_per_s, self.nodes
+            ));
+        }
+        if t.held_back as f64 > MOST_BEHIND * t.steps as f64 {
+            failures.push(format!(
+                "{} of {} steps of the tissue failed and were not felt; press less deep, or make the mesh finer there",
+                t.held_back, t.steps
+            ));
+        }
+        // Zones that come too late are seen above.
+        if t.motion_mm_per_s > t.fastest_by_steps_mm_per_s {
+            failures.push(format!(
+                "the hand goes at {:.0} mm/s, and steps are short enough for {:.0} mm/s: move more slowly, or make the \
+                 mesh coarser with [mesh] near_tool",
+                t.motion_mm_per_s, t.fastest_by_steps_mm_per_s
+            ));
+        }
+        for d in &self.devices {
+            if d.max_force_n == 0.0 {
+                failures.push(
+                    "nothing was felt: the tool never touched the skin, or the run ended before"
+                        .to_owned(),
+                );
+            }
+            // A device that goes by 45 µm from tick to tick changes the force by 0.02 N wherever it is.
+            if d.arrival_alone_max_n > MOST_ARRIVAL {
+                failures.push(format!(
+                    "force changes by {:.4} N more than by the device's own displacement where a patch arrives, which is more \
+                     than {MOST_ARRIVAL}",
+                    d.arrival_alone_max_n
+                ));
+            }
+            if d.arrival_max_n > 2.0 * d.other_p999_n {
+                failures.push(format!(
+                    "force changes by {:.4} N where a patch arrives, more than twice the p99.9 of other ticks, {:.4}",
+                    d.arrival_max_n, d.other_p999_n
+                ));
+            }
+            if let Some(rms) = d.rms_still_n
+                && rms > MOST_RMS
+            {
+                failures.push(format!(
+                    "force between 20 and 400 Hz is {rms:.4} N with the hand still, more than {MOST_RMS}"
+                ));
+            }
+            if d.energy_deficit_mj > d.energy_budget_mj {
+                failures.push(format!(
+                    "{:.2} mJ given out beyond what was taken in, more than {:.2}",
+                    d.energy_deficit_mj, d.energy_budget_mj
+                ));
+            }
+        }
+        failures
+    }
+
+    pub(super) fn is_good(&self) -> bool {
+        self.failures().is_empty()
+    }
+
+    pub(super) fn say(&self, context: &Context) -> anyhow::Result<()> {
+        let mut table = Table::new(["", "p50", "p99", "p99.9", "max"]).with_left_names();
+        for (name, t) in [
+            ("tick, CPU µs", &self.tick_cpu_us),
+            ("wake-up late, µs", &self.wake_up_lateness_us),
+            ("tissue step, CPU µs", &self.tissue.step_cpu_us),
+            ("tissue step, wall µs", &self.tissue.step_wall_us),
+        ] {
+            let cell = |x: f64| format!("{x:.1}");
+            table.push([
+                name.to_owned(),
+                cell(t.p50),
+                cell(t.p99),
+                cell(t.p999),
+                cell(t.max),
+            ]);
+        }
+        context.say(table)?;
+        let t = &self.tissue;
+        context.say(format!(
+            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones, {} meshes), \
+             {} background jobs, {:.1} % of a core",
+            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones, t.meshes,
+            t.jobs, 100.0 * t.background_cpu_share
+        ))?;
+        context.say(format!(
+            "the hand goes at {:.0} mm/s; steps ({:.2} mm each) and zones come in time for up to {:.0} mm/s",
+            t.motion_mm_per_s,
+            GOOD_TRAVEL * 1e3,
+            t.fastest_tool_mm_per_s
+        ))?;
+        for d in &self.devices {
+            context.say(d.table())?;
+        }
+        let list = |counts: &[(String, u64)]| {
+            let all: Vec<String> = counts
+                .iter()
+                .map(|(name, n)| format!("{name} {n}"))
+                .collect();
+            if all.is_empty() {
+                "none".to_owned()
+            } else {
+                all.join(", ")
+            }
+        };
+        context.say(format!(
+            "ticks with faults: {}; at limits: {}",
+            list(&self.faults),
+            list(&self.limits)
+        ))?;
+        for thread in &self.threads {
+            context.say(thread)?;
+        }
+        context.say(format!("memory {}", self.memory))?;
+        for failure in self.failures() {
+            context.say(format!("NOT GOOD: {failure}"))?;
+        }
+        Ok(())
+    }
+}
+
+impl ForceFigures {
+    fn table(&self) -> Table<3> {
+        let mut table = Table::new(["force", "found", "allowed"]).with_left_names();
+        let mut row = |name: &str, found: String, allowed: String| {
+            table.push([name.to_owned(), found, allowed]);
+        };
+        let newtons = |x: f64| format!("{x:.4} N");
+        row("largest", newtons(self.max_force_n), String::new());
+        row(
+            "20 to 400 Hz, the hand still at the end",
+            self.rms_still_n
+                .map_or_else(|| "not still".to_owned(), newtons),
+            newtons(MOST_RMS),
+        );
+        row(
+            "largest change where a patch arrives",
+            newtons(self.arrival_max_n),
+            newtons(2.0 * self.other_p999_n),
+        );
+        row(
+            "the same without the device's displacement",
+            newtons(self.arrival_alone_max_n),
+            newtons(MOST_ARRIVAL),
+        );
+        let joules = |x: f64| format!("{x:.2} mJ");
+        row("energy taken in", joules(self.energy_in_mj), String::new());
+        row(
+            "energy given out",
+            joules(self.energy_out_mj),
+            String::new(),
+        );
+        row(
+            "the most given out beyond that",
+            joules(self.energy_deficit_mj),
+            joules(self.energy_budget_mj),
+        );
+        let softened = format!("{:.1} %", 100.0 * self.softening_max);
+        row("tissue softened for the device", softened, String::new());
+        table
+    }
+}
+
+/// Whether the tool was still in the last seconds.
+fn is_still(log: &Log, device: usize, end: f64) -> bool {
+    let [most, time] = STILL;
+    let last = log
+        .ticks
+        .iter()
+        .filter(|t| (end - time..=end).contains(&t.tick.now));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for place in last.map(|t| t.devices[device].position) {
+        for c in 0..3 {
+            low[c] = low[c].min(place[c]);
+            high[c] = high[c].max(place[c]);
+        }
+    }
+    (0..3).all(|c| high[c] - low[c] < most) && end > time
+}
+
+/// From the end of the step that asks for a zone to the step that takes it over, s: 90 of 100 are shorter.
+fn zone_wall(log: &Log) -> Option<f64> {
+    let (mut asked, mut times) = (None, Vec::new());
+    let mut last: Option<&StepRecord> = None;
+    for step in &log.steps {
+        let is_zone = last.is_some_and(|l| l.zone != step.zone && l.mesh == step.mesh);
+        if let (true, Some(asked)) = (step.installed, asked)
+            && is_zone
+        {
+            times.push(step.now - asked);
+        }
+        if step.job_taken {
+            asked = Some(step.now + step.wall);
+        }
+        last = Some(step);
+    }
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() * 9 / 10).copied()
+}
+
+/// Speed at which a tool goes [`GOOD_TRAVEL`] in a step, m/s.
+fn fastest_by_steps(report: &Report) -> f64 {
+    GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50)
+}
+
+fn count(counts: &mut Vec<(String, u64)>, name: &str) {
+    match counts.iter_mut().find(|(n, _)| n == name) {
+        Some((_, n)) => *n += 1,
+        None => counts.push((name.to_owned(), 1)),
+    }
+}

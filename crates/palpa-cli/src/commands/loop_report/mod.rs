@@ -1,0 +1,173 @@
+//! `palpa loop-report`: the whole engine in real time, and how it fared.
+
+mod figures;
+mod picture;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use palpa_device::{HapticDevice, SimulatedDevice};
+use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
+use palpa_scene::Scene;
+use palpa_servo::ServoParams;
+
+use self::figures::Figures;
+use super::Outcome;
+use crate::cli::Context;
+use palpa::live::{LiveScene, device_model, grip, notes_of, path};
+use palpa_plot::output::OutDir;
+
+/// The scene that is pressed when none is named.
+const EMBEDDED: &str = include_str!("../../../scenes/forearm_lump.toml");
+/// Shorter runs say nothing of rare ticks, and the RMS of the force needs two seconds. s
+const LEAST_SECONDS: f64 = 5.0;
+const MOST_SECONDS: f64 = 3600.0;
+
+/// Run the engine in real time and report deadlines, smoothness and energy
+///
+/// A simulated hand holds the scene's haptic device and moves it as its motion section says; the tissue answers with finite elements,
+/// the force comes at 1 kHz. Without a SCENE, a forearm with a lump is stroked. Writes the log (log.mcap, for `palpa replay`),
+/// the figures (loop.json), histograms of the tick's times, and force against time and depth (SVG and PNG).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scene file (TOML); a forearm with a lump if none is given
+    scene: Option<PathBuf>,
+    /// How long, in seconds: 5 to 3600
+    #[arg(
+        long,
+        default_value_t = 60.0,
+        value_name = "S",
+        allow_negative_numbers = true
+    )]
+    seconds: f64,
+    /// Spin so many µs before each tick instead of sleeping, 0 to 1000: less lateness for more CPU
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "µS",
+        allow_negative_numbers = true
+    )]
+    spin_us: f64,
+    /// Print the scene, to be changed and run, and run nothing
+    #[arg(long)]
+    print_scene: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// On a scene that is not fit for real time, when a thread cannot be started, and when a result cannot be written.
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    anyhow::ensure!(
+        (LEAST_SECONDS..=MOST_SECONDS).contains(&args.seconds),
+        "--seconds {} is outside the allowed range {LEAST_SECONDS} to {MOST_SECONDS}",
+        args.seconds
+    );
+    anyhow::ensure!(
+        (0.0..=1000.0).contains(&args.spin_us),
+        "--spin-us {} is outside the allowed range 0 to 1000",
+        args.spin_us
+    );
+    let scene = match &args.scene {
+        Some(path) => Scene::load(path)?,
+        None => Scene::parse(EMBEDDED, std::path::Path::new("")).context("the embedded scene")?,
+    };
+    if args.print_scene {
+        let text = match &args.scene {
+            Some(_) => scene.to_toml(),
+            None => EMBEDDED.to_owned(),
+        };
+        context.say(text.trim_end())?;
+        return Ok(Outcome::Done);
+    }
+    let out = context.out_dir()?;
+    let live = LiveScene::build(&scene)?;
+    for note in &live.notes {
+        context.note(note);
+    }
+    let tissue = live.tissue()?;
+    context.say(format!(
+        "{} nodes; skin edges of {:.1} mm near the tool, zone of {} columns in a ring of {}",
+        live.model.n_nodes(),
+        live.mesh_size * 1e3,
+        tissue.live().n_columns()[0],
+        tissue.live().n_columns()[1],
+    ))?;
+    let log = out.path().join("log.mcap");
+    let (forces, report) = run_engine(args, context, &scene, &live, tissue, log)?;
+    let log = Log::open(out.path().join("log.mcap"))?;
+    let speed = scene.motion.speed;
+    let figures = Figures::new(&report, &forces, &log, &live, speed, args.seconds);
+    let subtitle = format!(
+        "{} at up to {:.0} mm/s; {} in a {} hand",
+        scene.motion.kind.name(),
+        1e3 * scene.motion.speed,
+        scene.device.preset.name(),
+        scene.device.grip.name()
+    );
+    write(&figures, &log, &scene, &subtitle, out)?;
+    figures.say(context)?;
+    context.say(format!("written to {}", out.path().display()))?;
+    context.json(&figures)?;
+    Ok(if context.is_interrupted() {
+        Outcome::Interrupted
+    } else if figures.is_good() {
+        Outcome::Done
+    } else {
+        Outcome::NotGood
+    })
+}
+
+/// Runs for the time asked for, or until Ctrl-C; the forces' report from before the ramp down at the end.
+fn run_engine(
+    args: &Args,
+    context: &Context,
+    scene: &Scene,
+    live: &LiveScene,
+    tissue: palpa::live::LiveTissue,
+    log: PathBuf,
+) -> anyhow::Result<(Vec<palpa_rt::ForceReport>, Report)> {
+    let model = device_model(scene.device.preset);
+    let way = path(scene, &live.scene_from_device, args.seconds);
+    let device = SimulatedDevice::new(model, grip(scene.device.grip), way);
+    let devices: Vec<Box<dyn HapticDevice>> = vec![Box::new(device)];
+    let params = EngineParams {
+        servo: ServoParams {
+            resolution: model.resolution.max(1e-6),
+            ..ServoParams::default()
+        },
+        spin: args.spin_us * 1e-6,
+        ..EngineParams::default()
+    };
+    let recorder = RecorderParams {
+        path: Some(log),
+        scene: scene.to_toml(),
+        notes: notes_of(scene)?,
+    };
+    context.begin_recording();
+    let bar = context.progress(args.seconds.ceil() as usize, "real time");
+    let engine = Engine::start(tissue, devices, &params, &recorder)?;
+    while engine.now() < args.seconds && !context.is_interrupted() {
+        std::thread::sleep(Duration::from_millis(20));
+        bar.set_position(engine.now() as u64);
+    }
+    bar.finish_and_clear();
+    // The ramp down at the end is no force that was asked for.
+    let forces = engine.report().forces;
+    Ok((forces, engine.stop()))
+}
+
+fn write(
+    figures: &Figures,
+    log: &Log,
+    scene: &Scene,
+    subtitle: &str,
+    out: &OutDir,
+) -> anyhow::Result<()> {
+    out.write_json("loop.json", figures)?;
+    picture::times(figures).save(out, "loop_times")?;
+    picture::forces(log, subtitle).save(out, "force_time")?;
+    picture::depth(log, scene.motion.above, subtitle).save(out, "force_depth")?;
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! The pictures of a run.
+
+use palpa_rt::{Log, StepStatus, TickEntry};
+use palpa_servo::Faults;
+
+use super::figures::Figures;
+use palpa_plot::{Axis, Band, Chart, Color, Guide, Picture, Series, panels};
+
+/// Most points of a curve: more than there are pixels.
+const MOST_POINTS: usize = 6000;
+/// Buckets of a histogram in a doubling of time.
+const PER_DOUBLING: f64 = 4.0;
+/// Of what is less to the point.
+const FAINT: Color = Color::rgb(0xc4, 0xc8, 0xcc);
+
+/// Histograms of a tick's CPU time and of its lateness.
+pub(super) fn times(figures: &Figures) -> Picture {
+    // Wide enough to show how far it is to the guide, µs.
+    let chart = |title: &str, label: &str, filled: &[(f64, f64, u64)], guide: f64| {
+        let points = steps(filled);
+        let ends = points.iter().map(|p| p[0]);
+        let (low, high) = ends.fold((guide / 2.0, 1.3 * guide), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        Chart::new(Axis::log(label).with_range(low, high), Axis::log("ticks"))
+            .title(title)
+            .series(Series::new("", points))
+    };
+    let cpu = chart(
+        "compute",
+        "thread-CPU time of a tick [µs]",
+        &figures.cpu_histogram,
+        200.0,
+    )
+    .guide(Guide::x(200.0, "at most"));
+    let late = chart(
+        "wake-up",
+        "lateness of a tick, wall time [µs]",
+        &figures.lateness_histogram,
+        1000.0,
+    )
+    .guide(Guide::x(1000.0, "a period"));
+    panels("Ticks of the 1 kHz loop", &[cpu, late], 2)
+}
+
+/// The outline of a histogram, in µs and ticks; empty buckets count as a tenth of a tick, which a logarithm can show.
+fn steps(filled: &[(f64, f64, u64)]) -> Vec<[f64; 2]> {
+    let bucket = |seconds: f64| ((seconds * 1e6).max(0.01).log2() * PER_DOUBLING).floor() as i32;
+    let mut counts = std::collections::BTreeMap::new();
+    for &(lower, upper, n) in filled {
+        *counts.entry(bucket(0.5 * (lower + upper))).or_insert(0_u64) += n;
+    }
+    let (Some((&first, _)), Some((&last, _))) = (counts.first_key_value(), counts.last_key_value())
+    else {
+        return Vec::new();
+    };
+    let edge = |b: i32| (f64::from(b) / PER_DOUBLING).exp2();
+    let mut points = vec![[edge(first), 0.5]];
+    for b in first..=last {
+        let n = counts.get(&b).map_or(0.5, |n| *n as f64);
+        points.extend([[edge(b), n], [edge(b + 1), n]]);
+    }
+    points.push([edge(last + 1), 0.5]);
+    points
+}
+
+/// Force and height against time; shaded where the tissue was behind the tool or gave no force.
+pub(super) fn forces(log: &Log, subtitle: &str) -> Picture {
+    let force = Chart::new(Axis::linear("time [s]"), Axis::linear("force [N]"))
+        .title("Force on the hand")
+        .subtitle(subtitle)
+        .line("along the press", curve(log, |d| d.force[2]))
+        .line("across", curve(log, |d| d.force[0].hypot(d.force[1])));
+    let force = missing(log).into_iter().fold(force, |chart, [from, to]| {
+        chart.band(Band::x(from, to, "", FAINT))
+    });
+    let place = Chart::new(
+        Axis::linear("time [s]"),
+        Axis::linear("height of the tool [mm]"),
+    )
+    .title("The tool's tip")
+    .line("height", curve(log, |d| d.position[2] * 1e3));
+    panels("Force while moving", &[force, place], 1)
+}
+
+/// Times in which patches were of a place that the tool had left, or none was fresh, s.
+fn missing(log: &Log) -> Vec<[f64; 2]> {
+    /// What is nearer to each other than this is one, s.
+    const GAP: f64 = 0.05;
+    let behind = log
+        .steps
+        .iter()
+        .filter(|s| s.n_contacts > 0 && (s.status == StepStatus::Behind as u8 || !s.published));
+    let behind = behind.map(|s| [s.now, s.now + s.wall]);
+    let stale = log.ticks.iter().filter(|t| {
+        let bits = u16::try_from(t.tick.faults).unwrap_or(0);
+        Faults::from_bits(bits).contains(Faults::STALE_PATCH)
+    });
+    let mut times: Vec<[f64; 2]> = behind
+        .chain(stale.map(|t| [t.tick.now, t.tick.now + log.header.period]))
+        .collect();
+    times.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut merged: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in times {
+        match merged.last_mut() {
+            Some(last) if from <= last[1] + GAP => last[1] = last[1].max(to),
+            _ => merged.push([from, to]),
+        }
+    }
+    merged
+}
+
+/// Force against depth below where the tool, which hangs `above` it (m), first touches.
+pub(super) fn depth(log: &Log, above: f64, subtitle: &str) -> Picture {
+    let point = |t: &TickEntry| {
+        let device = &t.devices[0];
+        [(-device.position[2] - above) * 1e3, device.force[2]]
+    };
+    let entries: Vec<&TickEntry> = thinned(log).collect();
+    let is_off = |t: &&TickEntry| t.devices[0].force[2] == 0.0;
+    let last = entries.iter().rposition(is_off).unwrap_or(0);
+    let points = |of: &[&TickEntry]| of.iter().map(|t| point(t)).collect();
+    Chart::new(
+        Axis::linear("depth below the first touch [mm]"),
+        Axis::linear("force along the press [N]"),
+    )
+    .title("Force against depth")
+    .subtitle(subtitle)
+    .series(Series::new("on the way", points(&entries[..last])).with_color(FAINT))
+    .line("the last press", points(&entries[last..]))
+    .draw()
+}
+
+fn curve(log: &Log, value: impl Fn(&palpa_rt::DeviceRecord) -> f64) -> Vec<[f64; 2]> {
+    thinned(log)
+        .map(|t| [t.tick.now, value(&t.devices[0])])
+        .collect()
+}
+
+fn thinned(log: &Log) -> impl Iterator<Item = &TickEntry> {
+    let step = (log.ticks.len() / MOST_POINTS).max(1);
+    log.ticks
+        .iter()
+        .step_by(step)
+        .filter(|t| t.devices[0].is_there)
+}

@@ -1,0 +1,81 @@
+//! A press with the continuum model.
+
+mod fields;
+mod pictures;
+mod record;
+mod report;
+mod result;
+
+use palpa_scene::Scene;
+
+use self::pictures::draw_pictures;
+use self::record::record;
+use self::report::{PressReport, announce, conclude, facts};
+use self::result::result_of;
+use super::Job;
+use super::files::remove_older;
+use crate::commands::Outcome;
+use palpa::build::build;
+use palpa::press::tissue::Indentation;
+
+/// Runs the press.
+pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
+    let Job {
+        context,
+        out,
+        scene,
+        ..
+    } = *job;
+    let spinner = context.progress(0, "growing the body");
+    let built = build(scene)?;
+    spinner.set_message("setting up the model");
+    let indentation = Indentation::build(scene, &built)?;
+    drop(spinner);
+    let materials: Vec<_> = materials_of(scene);
+    announce(job, &built, &indentation, &materials)?;
+
+    context.begin_recording();
+    remove_older(out.path())?;
+    let recorded = record(job, &built, &indentation)?;
+    let result = result_of(
+        &indentation,
+        &recorded,
+        &materials,
+        context.is_interrupted(),
+    );
+    let notes: Vec<String> = (built.notes.iter())
+        .chain(&indentation.notes)
+        .chain(&result.notes)
+        .cloned()
+        .collect();
+    let report = PressReport {
+        model: "tissue",
+        scene: job.scene_name,
+        body: &built.growth.report,
+        materials: &materials,
+        press: facts(scene, &indentation),
+        result,
+        notes: &notes,
+        samples: &recorded.samples,
+    };
+    out.write_json("press.json", &report)?;
+    let pictures = if recorded.samples.len() > 1 {
+        draw_pictures(job, &built, &indentation, &recorded, &report.result)?
+    } else {
+        Vec::new()
+    };
+    context.json(&report)?;
+    conclude(job, &indentation, &report, &pictures)?;
+    Ok(match (context.is_interrupted(), report.result.outcome) {
+        (true, _) => Outcome::Interrupted,
+        (_, "converged") => Outcome::Done,
+        _ => Outcome::NotGood,
+    })
+}
+
+/// What the layers and then the lumps are made of.
+fn materials_of(scene: &Scene) -> Vec<palpa_scene::MaterialStatus> {
+    let mut materials = scene.material_status();
+    materials.extend(scene.lump_status());
+    materials
+}

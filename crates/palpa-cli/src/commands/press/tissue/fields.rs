@@ -1,0 +1,37 @@
+//! One frame of the series: the deformed body with what goes on inside.
+
+use palpa_fem::{PrismField, prism_fields};
+
+use super::super::files::with_making;
+use palpa::press::tissue::{Indentation, Run};
+use palpa_plot::vtu::Grid;
+
+/// Point arrays: `displacement` (m), `force` that holds a node (N), `contact_pressure` on the skin (Pa), and how the body was
+/// made. Cell arrays, each a mean over the prism: `cauchy`, `von_mises` and `pressure` (Pa), `stretch_min` and `stretch_max`,
+/// `volume_ratio`, `strain_energy` (J/m³), `lump` (the share of it that is lump, by volume).
+pub(super) fn grid(indentation: &Indentation, run: &Run<'_>) -> Grid {
+    let (model, mesh) = (&indentation.model, &indentation.mesh);
+    let body = &mesh.body;
+    let fields = prism_fields(model, &run.state, &run.workspace);
+    let scalar = |of: fn(&PrismField) -> f64| fields.iter().map(of).collect::<Vec<f64>>();
+    let cauchy: Vec<_> = fields.iter().map(|field| field.cauchy).collect();
+    let mut pressure = vec![0.0; body.n_nodes()];
+    for (v, p) in indentation.skin_pressure(run).into_iter().enumerate() {
+        pressure[body.node(v, 0)] = p;
+    }
+    let mut grid = Grid::of_body(body, &run.state.positions(model))
+        .with_point_vectors("displacement", &run.state.displacements)
+        .with_point_vectors("force", run.workspace.reactions())
+        .with_point_scalars("contact_pressure", pressure)
+        .with_cell_tensors("cauchy", &cauchy)
+        .with_cell_scalars("von_mises", scalar(PrismField::von_mises))
+        .with_cell_scalars("pressure", scalar(PrismField::pressure))
+        .with_cell_scalars("stretch_min", scalar(|field| field.stretches[0]))
+        .with_cell_scalars("stretch_max", scalar(|field| field.stretches[2]))
+        .with_cell_scalars("volume_ratio", scalar(|field| field.volume_ratio))
+        .with_cell_scalars("strain_energy", scalar(|field| field.energy));
+    if !indentation.lump_shares.is_empty() {
+        grid = grid.with_cell_scalars("lump", indentation.lump_shares.clone());
+    }
+    with_making(grid, body, &mesh.thinning, &mesh.stand_off)
+}

@@ -1,0 +1,290 @@
+//! The pictures of a press: force against depth and time, relaxation, layers, and the section through the press point.
+
+use std::path::PathBuf;
+
+use palpa_fem::PosedTool;
+use palpa_mesh::{Surface, Vec3};
+use palpa_scene::{Scene, Tool};
+
+use super::super::{Job, cut};
+use super::record::Recorded;
+use super::result::PressResult;
+use palpa::build::{BuiltBody, in_mm};
+use palpa::press::Phase;
+use palpa::press::lump::{Embedded, lump_surface};
+use palpa::press::tissue::{Indentation, Sample};
+use palpa_plot::section::{Panel, Plane, Shades, ToolOutline, cut_body, draw};
+use palpa_plot::{Axis, Chart, PALETTE, Picture, Series};
+
+pub(super) fn draw_pictures(
+    job: &Job<'_>,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    recorded: &Recorded,
+    result: &PressResult,
+) -> anyhow::Result<Vec<PathBuf>> {
+    let out = job.out;
+    let samples: Vec<&Sample> = (recorded.samples.iter())
+        .filter(|s| s.outcome == "converged")
+        .collect();
+    let subtitle = format!(
+        "{}; skin edges {:.1} mm near it; {}",
+        job.scene.tool,
+        indentation.mesh.mesh_size * 1e3,
+        result.material_status
+    );
+    let mut paths = Vec::new();
+    let depth = force_depth(&samples, indentation)
+        .subtitle(&subtitle)
+        .draw();
+    // The PNG first: the command ends with its path.
+    paths.extend(depth.save(out, "force_depth")?.into_iter().rev());
+    let time = force_time(&samples, indentation).subtitle(&subtitle).draw();
+    paths.extend(time.save(out, "force_time")?);
+    let layers = layers(&samples, indentation).subtitle(&subtitle).draw();
+    paths.extend(layers.save(out, "layers")?);
+    if indentation.is_viscous && samples.iter().any(|s| s.phase == Phase::Hold) {
+        let relaxation = relaxation(&samples, indentation).subtitle(&subtitle).draw();
+        paths.extend(relaxation.save(out, "relaxation")?);
+    }
+    if let Some([section, stress]) = sections(job, built, indentation, recorded)? {
+        paths.extend(section.save(out, "section")?);
+        paths.extend(stress.save(out, "stress")?);
+    }
+    Ok(paths)
+}
+
+/// The body cut through the press point, at rest and at the deepest sample: its layers and lumps, and its stress.
+fn sections(
+    job: &Job<'_>,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    recorded: &Recorded,
+) -> anyhow::Result<Option<[Picture; 2]>> {
+    let body = &indentation.mesh.body;
+    let place = &indentation.place;
+    let deepest = &recorded.deepest;
+    let Some(plane) = cut::plane(body, place) else {
+        return Ok(None);
+    };
+    let mut at_rest: Vec<Surface> = Vec::new();
+    for (given, lump) in job.scene.lumps.iter().zip(&indentation.lumps) {
+        at_rest.push(lump_surface(job.scene, given, lump)?);
+    }
+    let moved: Vec<Surface> = (at_rest.iter())
+        .map(|surface| {
+            let embedded = Embedded::new(body, &surface.points);
+            let steps = embedded.displacements(&deepest.displacements);
+            let points = surface.points.iter().zip(steps).map(|(p, u)| p + u);
+            Surface {
+                points: points.collect(),
+                triangles: surface.triangles.clone(),
+            }
+        })
+        .collect();
+    let positions: Vec<Vec3> = (body.positions.iter().zip(&deepest.displacements))
+        .map(|(p, u)| p + u)
+        .collect();
+    let bones = cut::lines(&built.bones, &plane);
+    let [rest_lumps, pressed_lumps] = [&at_rest, &moved].map(|s| cut::lines(s, &plane));
+    let [rest, pressed] =
+        [&body.positions, &positions].map(|positions| cut_body(body, positions, &plane));
+    let tool = |depth: f64| tool_outline(job.scene, indentation, &plane, depth);
+    let title = format!("pressed {:.1} mm", deepest.depth_mm);
+    let panels = [
+        Panel {
+            title: "at rest",
+            section: &rest,
+            bones: &bones,
+            lumps: &rest_lumps,
+            shades: None,
+            tool: Some(tool(0.0)),
+        },
+        Panel {
+            title: &title,
+            section: &pressed,
+            bones: &bones,
+            lumps: &pressed_lumps,
+            shades: None,
+            tool: Some(tool(deepest.depth_mm * 1e-3)),
+        },
+    ];
+    let through = format!(
+        "through ({}) mm, the press direction downward",
+        in_mm(place.at)
+    );
+    let layers = draw("Section through the press point", &through, &panels);
+    let kpa: Vec<f64> = deepest.von_mises.iter().map(|s| s * 1e-3).collect();
+    let most = shown_most(&kpa, &pressed.prisms);
+    let shades = Shades {
+        name: "von Mises stress, kPa",
+        values: &kpa,
+        most,
+    };
+    let [_, panel] = panels;
+    let stressed = Panel {
+        shades: Some(shades),
+        ..panel
+    };
+    Ok(Some([
+        layers,
+        draw("Stress under the tool", &through, &[stressed]),
+    ]))
+}
+
+/// The largest value that shades tell apart: a few prisms at a sharp edge would take the contrast from all others.
+fn shown_most(values: &[f64], prisms: &[usize]) -> f64 {
+    let mut cut: Vec<f64> = prisms
+        .iter()
+        .filter_map(|&p| values.get(p).copied())
+        .collect();
+    cut.sort_by(f64::total_cmp);
+    let most = cut.get((cut.len() * 98) / 100).copied().unwrap_or(0.0);
+    if most > 0.0 { most } else { 1.0 }
+}
+
+/// The tool where it is at a depth (m).
+fn tool_outline(
+    scene: &Scene,
+    indentation: &Indentation,
+    plane: &Plane,
+    depth: f64,
+) -> ToolOutline {
+    let direction = indentation.place.direction.into_inner();
+    let at = indentation.place.at + direction * depth;
+    let Some(PosedTool { tool, pose }) = indentation.tool_at(depth) else {
+        return match scene.tool {
+            Tool::Disc { radius } => ToolOutline::disc(plane, &at, &direction, radius),
+            _ => ToolOutline::node(plane, &at),
+        };
+    };
+    let size = tool.shape().footprint_radius();
+    let distance = |p: &Vec3| tool.distance_at(&pose, p).distance;
+    // The place on the axis that is farthest inside.
+    let tip = pose.translation.vector;
+    let on_axis = (1..=40).map(|i| tip - direction * (size * f64::from(i) / 20.0));
+    let inside = on_axis
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(tip);
+    ToolOutline::shape(plane, &inside, 1.5 * size, distance)
+}
+
+/// The name of a run, where there are several.
+fn speed_name(indentation: &Indentation, index: usize) -> String {
+    format!("{} mm/s", indentation.speeds[index] * 1e3)
+}
+
+/// Loops of force against depth, a colour for each speed; the way back is dashed.
+fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
+    let mut chart = Chart::new(
+        Axis::linear("depth, mm").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against depth");
+    let n_runs = indentation.speeds.len();
+    for index in 0..n_runs {
+        let of_run: Vec<&Sample> = samples.iter().copied().filter(|s| s.run == index).collect();
+        let last_cycle = of_run.iter().map(|s| s.cycle).max().unwrap_or(0);
+        for cycle in 0..=last_cycle {
+            let points = |phases: &[Phase]| -> Vec<[f64; 2]> {
+                (of_run.iter())
+                    .filter(|s| s.cycle == cycle && phases.contains(&s.phase))
+                    .map(|s| [s.depth_mm, s.force_n])
+                    .collect()
+            };
+            let color = PALETTE[if n_runs > 1 { index } else { 0 } % PALETTE.len()];
+            let name = match (cycle, n_runs) {
+                (0, 1) => "loading".to_owned(),
+                (0, _) => speed_name(indentation, index),
+                _ => String::new(),
+            };
+            let mut down = points(&[Phase::Load, Phase::Hold]);
+            if cycle > 0 {
+                // It begins where the last cycle has ended.
+                let before = of_run.iter().rfind(|s| s.cycle + 1 == cycle);
+                down.splice(0..0, before.map(|s| [s.depth_mm, s.force_n]));
+            }
+            let mut back = points(&[Phase::Retract]);
+            chart = chart.series(Series::new(name, down.clone()).with_color(color));
+            if !back.is_empty() {
+                back.splice(0..0, down.last().copied());
+                let name = if (cycle, n_runs) == (0, 1) {
+                    "retracting"
+                } else {
+                    ""
+                };
+                chart = chart.series(Series::new(name, back).with_color(color).dashed());
+            }
+        }
+    }
+    chart
+}
+
+fn force_time(samples: &[&Sample], indentation: &Indentation) -> Chart {
+    let mut chart = Chart::new(
+        Axis::linear("time, s").with_zero(),
+        Axis::linear("force, N").with_zero(),
+    )
+    .title("Force against time");
+    for index in 0..indentation.speeds.len() {
+        let of_run = samples.iter().filter(|s| s.run == index);
+        let points = of_run.map(|s| [s.time_s, s.force_n]).collect();
+        let name = match indentation.speeds.len() {
+            1 => "force".to_owned(),
+            _ => speed_name(indentation, index),
+        };
+        chart = chart.line(name, points);
+    }
+    chart
+}
+
+/// Force during the first rest, as a share of that at its beginning, over the logarithm of time.
+fn relaxation(samples: &[&Sample], indentation: &Indentation) -> Chart {
+    let mut chart = Chart::new(
+        Axis::log("time since the tool rests, s"),
+        Axis::linear("force over that at the beginning"),
+    )
+    .title("Relaxation");
+    for index in 0..indentation.speeds.len() {
+        let of_run = || {
+            samples
+                .iter()
+                .filter(move |s| s.run == index && s.cycle == 0)
+        };
+        let Some(top) = of_run().rfind(|s| s.phase == Phase::Load) else {
+            continue;
+        };
+        let points = of_run()
+            .filter(|s| s.phase == Phase::Hold)
+            .map(|s| [s.time_s - top.time_s, s.force_n / top.force_n])
+            .collect();
+        let name = speed_name(indentation, index);
+        chart = chart.series(Series::new(name, points).with_markers());
+    }
+    chart
+}
+
+/// Thickness of each layer along the pressed column on the first way down, as a share of that at rest.
+fn layers(samples: &[&Sample], indentation: &Indentation) -> Chart {
+    let mut chart = Chart::new(
+        Axis::linear("depth, mm").with_zero(),
+        Axis::linear("thickness over that at rest, %"),
+    )
+    .title("Layers under the tool");
+    let down: Vec<&&Sample> = (samples.iter())
+        .filter(|s| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load)
+        .collect();
+    let Some(rest) = down.first() else {
+        return chart;
+    };
+    let names = &indentation.mesh.body.layer_names;
+    for (i, name) in names.iter().enumerate() {
+        let at_rest = rest.layer_thickness_mm[i];
+        let points = down
+            .iter()
+            .map(|s| [s.depth_mm, 100.0 * s.layer_thickness_mm[i] / at_rest])
+            .collect();
+        chart = chart.line(format!("{name}, {at_rest:.1} mm"), points);
+    }
+    chart
+}

@@ -1,0 +1,143 @@
+//! The runs themselves: every sample to the table, some of the bodies to the series for ParaView.
+
+use palpa_fem::{level_forces, prism_fields};
+use palpa_mesh::quality::prism_shapes;
+use palpa_mesh::{LayeredBody, Vec3};
+
+use super::super::Job;
+use super::super::files::Series;
+use super::fields::grid;
+use palpa::build::BuiltBody;
+use palpa::press::tissue::{Failure, Indentation, Run, Sample};
+use palpa_plot::output::{CsvTable, OutDir};
+
+/// What came out of the runs.
+pub(super) struct Recorded {
+    pub(super) samples: Vec<Sample>,
+    pub(super) failures: Vec<Failure>,
+    /// At the deepest sample of the first run.
+    pub(super) deepest: Deepest,
+}
+
+/// The body where it is pressed deepest.
+pub(super) struct Deepest {
+    /// Its number among the samples.
+    pub(super) sample: usize,
+    pub(super) depth_mm: f64,
+    pub(super) displacements: Vec<Vec3>,
+    /// For each level the force on it of the tissue below. N `[n_levels]`
+    pub(super) level_forces: Vec<Vec3>,
+    /// Von Mises stress of every prism. Pa `[n_prisms]`
+    pub(super) von_mises: Vec<f64>,
+    /// Prisms of which a corner is turned inside out.
+    pub(super) turned: Option<Turned>,
+}
+
+/// Prisms that are not valid where they are, though there is volume left at every point of integration.
+pub(super) struct Turned {
+    pub(super) n: usize,
+    /// The middle of the worst. m
+    pub(super) at: Vec3,
+}
+
+/// Runs the script at every speed; each sample goes to the table at once, so that an interrupted run leaves a valid one.
+pub(super) fn record(
+    job: &Job<'_>,
+    built: &BuiltBody,
+    indentation: &Indentation,
+) -> anyhow::Result<Recorded> {
+    let Job {
+        args,
+        context,
+        out,
+        scene,
+        ..
+    } = *job;
+    let names = scene.layers.iter().map(|layer| layer.tissue.name.as_str());
+    let mut table = table(out, names)?;
+    let n_samples = indentation.n_samples();
+    let mut series = Series::new(args.frames, n_samples, indentation.deepest());
+    let mut recorded = Recorded {
+        samples: Vec::new(),
+        failures: Vec::new(),
+        deepest: Deepest {
+            sample: 0,
+            depth_mm: 0.0,
+            displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
+            level_forces: Vec::new(),
+            von_mises: vec![0.0; indentation.mesh.body.n_prisms()],
+            turned: None,
+        },
+    };
+    let n_runs = indentation.speeds.len();
+    let progress = context.progress(n_samples * n_runs, "pressing");
+    'runs: for index in 0..n_runs {
+        let mut run = indentation.start(index);
+        let mut number = 0;
+        while let Some(sample) = run.advance() {
+            table.push(&sample)?;
+            if run.failure.is_none() && index == 0 {
+                if series.wants(number) {
+                    series.push(out, sample.time_s, &grid(indentation, &run))?;
+                }
+                if sample.depth_mm > recorded.deepest.depth_mm {
+                    recorded.deepest = deepest(indentation, &run, number, sample.depth_mm);
+                }
+            }
+            recorded.samples.push(sample);
+            number += 1;
+            progress.inc(1);
+            if context.is_interrupted() {
+                break 'runs;
+            }
+        }
+        recorded.failures.extend(run.failure);
+    }
+    table.finish()?;
+    series.finish(out, &built.bones)?;
+    Ok(recorded)
+}
+
+fn deepest(indentation: &Indentation, run: &Run<'_>, sample: usize, depth_mm: f64) -> Deepest {
+    let (model, state, ws) = (&indentation.model, &run.state, &run.workspace);
+    Deepest {
+        sample,
+        depth_mm,
+        displacements: state.displacements.clone(),
+        level_forces: level_forces(model, state, ws),
+        von_mises: prism_fields(model, state, ws)
+            .iter()
+            .map(palpa_fem::PrismField::von_mises)
+            .collect(),
+        turned: turned(&indentation.mesh.body, &state.positions(model)),
+    }
+}
+
+fn turned(body: &LayeredBody, positions: &[Vec3]) -> Option<Turned> {
+    let shapes = prism_shapes(body, positions);
+    let invalid = || shapes.iter().enumerate().filter(|(_, s)| !s.is_valid());
+    let (p, _) = invalid().min_by(|a, b| a.1.scaled_jacobian.total_cmp(&b.1.scaled_jacobian))?;
+    let n_intervals = body.n_levels - 1;
+    let corners = body.prism(p / n_intervals, p % n_intervals);
+    Some(Turned {
+        n: invalid().count(),
+        at: corners.iter().map(|&node| positions[node]).sum::<Vec3>() / 6.0,
+    })
+}
+
+/// The table: the fields of [`Sample`], and at the end a column for the thickness of each layer.
+fn table<'a>(
+    out: &OutDir,
+    layers: impl Iterator<Item = &'a str>,
+) -> anyhow::Result<CsvTable<Sample>> {
+    let mut header = Sample::COLUMNS.map(str::to_owned).to_vec();
+    for (i, layer) in layers.enumerate() {
+        // Two layers may be of one tissue.
+        let word: String = layer
+            .chars()
+            .map(|c| if c.is_alphanumeric() { c } else { '_' })
+            .collect();
+        header.push(format!("layer_{i}_{word}_mm"));
+    }
+    out.table_under("press.csv", &header)
+}

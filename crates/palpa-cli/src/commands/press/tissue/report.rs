@@ -1,0 +1,256 @@
+//! What is said of a press with the continuum: to machines, and to people.
+
+use std::path::PathBuf;
+
+use palpa_mesh::growth::GrowthReport;
+use palpa_scene::{MaterialStatus, Scene};
+use serde::Serialize;
+
+use super::super::Job;
+use super::super::words::{say_layers, status_word};
+use super::result::{PressResult, RunResult};
+use crate::table::Table;
+use palpa::build::{BuiltBody, in_mm};
+use palpa::press::Phase;
+use palpa::press::tissue::{Indentation, Sample};
+
+/// What `--json` prints and press.json holds.
+#[derive(Debug, Serialize)]
+pub(super) struct PressReport<'a> {
+    pub(super) model: &'static str,
+    pub(super) scene: &'a str,
+    /// The body as it was grown, before it was refined.
+    pub(super) body: &'a GrowthReport,
+    /// Of the layers, then of the lumps.
+    pub(super) materials: &'a [MaterialStatus],
+    pub(super) press: PressFacts,
+    pub(super) result: PressResult,
+    pub(super) notes: &'a [String],
+    pub(super) samples: &'a [Sample],
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct PressFacts {
+    pub(super) vertex: usize,
+    pub(super) at_m: [f64; 3],
+    pub(super) direction: [f64; 3],
+    pub(super) tool: String,
+    /// Skin vertices that are bonded to the tool; 0 for one that touches.
+    pub(super) n_operated_nodes: usize,
+    /// Radius of the circle with the area of the skin that is bonded; none for another tool.
+    pub(super) effective_radius_mm: Option<f64>,
+    pub(super) mesh_size_near_tool_mm: f64,
+    pub(super) tissue_depth_mm: f64,
+    pub(super) n_vertices: usize,
+    pub(super) n_levels: usize,
+    pub(super) n_nodes: usize,
+    pub(super) n_free_nodes: usize,
+    pub(super) n_prisms: usize,
+    pub(super) n_single_triangles: usize,
+    pub(super) is_resolved: bool,
+    pub(super) alpha: f64,
+    pub(super) is_viscous: bool,
+    pub(super) is_dynamic: bool,
+}
+
+pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
+    let (model, mesh, place) = (&indentation.model, &indentation.mesh, &indentation.place);
+    PressFacts {
+        vertex: place.vertex,
+        at_m: place.at.into(),
+        direction: place.direction.into_inner().into(),
+        tool: scene.tool.to_string(),
+        n_operated_nodes: indentation.n_bonded(),
+        effective_radius_mm: mesh.patch.as_ref().map(|patch| patch.radius * 1e3),
+        mesh_size_near_tool_mm: mesh.mesh_size * 1e3,
+        tissue_depth_mm: place.tissue_depth * 1e3,
+        n_vertices: mesh.body.n_vertices(),
+        n_levels: mesh.body.n_levels,
+        n_nodes: model.n_nodes(),
+        n_free_nodes: model.n_free_nodes(),
+        n_prisms: mesh.body.n_prisms(),
+        n_single_triangles: model.n_single_triangles(),
+        is_resolved: mesh.is_resolved,
+        alpha: scene.model.alpha,
+        is_viscous: indentation.is_viscous,
+        is_dynamic: indentation.is_dynamic(),
+    }
+}
+
+pub(super) fn announce(
+    job: &Job<'_>,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    materials: &[MaterialStatus],
+) -> anyhow::Result<()> {
+    let Job {
+        context,
+        scene,
+        scene_name,
+        ..
+    } = *job;
+    let grown = &built.growth.report;
+    let facts = facts(scene, indentation);
+    context.say(format!(
+        "{scene_name}: grown to {} skin vertices × {} levels; refined to {} × {} = {} nodes, {} prisms",
+        grown.n_vertices,
+        grown.n_levels,
+        facts.n_vertices,
+        facts.n_levels,
+        facts.n_nodes,
+        facts.n_prisms
+    ))?;
+    say_layers(context, scene, grown, materials)?;
+    for (lump, material) in scene.lumps.iter().zip(&materials[scene.layers.len()..]) {
+        context.say(format!(
+            "lump \"{}\": {}; {}",
+            lump.name,
+            material.summary,
+            status_word(material.status)
+        ))?;
+    }
+    let hold = match facts.effective_radius_mm {
+        Some(radius) => format!(
+            " (effective radius {radius:.2} mm, {} vertices)",
+            facts.n_operated_nodes
+        ),
+        None => String::new(),
+    };
+    context.say(format!(
+        "continuum model; {}{hold} at ({}) mm, where the tissue is {:.1} mm deep; skin edges near the tool {:.1} mm",
+        facts.tool,
+        in_mm(indentation.place.at),
+        facts.tissue_depth_mm,
+        facts.mesh_size_near_tool_mm
+    ))
+}
+
+pub(super) fn conclude(
+    job: &Job<'_>,
+    indentation: &Indentation,
+    report: &PressReport<'_>,
+    pictures: &[PathBuf],
+) -> anyhow::Result<()> {
+    let context = job.context;
+    say_table(job, indentation, report.samples)?;
+    let r = &report.result;
+    for run in &r.runs {
+        context.say(run_in_words(run))?;
+    }
+    say_forces(job, r)?;
+    let w = &r.worst;
+    if !indentation.is_bonded() {
+        context.say(format!(
+            "contact: gaps up to {} µm, penetration {} µm, pull {} N, beyond the friction cone {} N",
+            scientific(w.gap_um),
+            scientific(w.penetration_um),
+            scientific(w.tension_n),
+            scientific(w.cone_n)
+        ))?;
+    }
+    context.say(format!(
+        "prisms keep {:.1} to {:.1} % of their volume; {}",
+        100.0 * w.volume_ratio_min,
+        100.0 * w.volume_ratio_max,
+        r.material_status
+    ))?;
+    for note in report.notes {
+        context.say(format!("note: {note}"))?;
+    }
+    context.say(format!(
+        "table, series and pictures in {}",
+        job.out.path().display()
+    ))?;
+    if let Some(picture) = pictures.first() {
+        context.say(format!("force against depth: {}", picture.display()))?;
+    }
+    Ok(())
+}
+
+/// To two digits; nothing is 0.
+fn scientific(x: f64) -> String {
+    if x == 0.0 {
+        "0".to_owned()
+    } else {
+        format!("{x:.1e}")
+    }
+}
+
+/// What came out at one speed.
+fn run_in_words(run: &RunResult) -> String {
+    let mut parts = vec![format!(
+        "{} mm/s: largest force {:.3} N at {:.2} mm{}",
+        run.speed_mm_s,
+        run.max_force_n,
+        run.at_depth_mm,
+        run.secant_stiffness_n_per_mm
+            .map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
+    )];
+    parts
+        .extend((run.relaxation).map(|share| format!("relaxes by {:.1} % at rest", 100.0 * share)));
+    parts.extend(run.hysteresis.first().map(|share| {
+        let percent = (1000.0 * share).round() / 10.0 + 0.0;
+        format!("{percent:.1} % of the work is lost on the way back")
+    }));
+    let left = run.force_after_retract_n;
+    parts.extend(
+        left.filter(|f| f.abs() > 0.02 * run.max_force_n)
+            .map(|left| {
+                let why = if left < 0.0 {
+                    ", the pull of bonded skin that has not come back yet"
+                } else {
+                    ""
+                };
+                format!("back at the start {left:.3} N{why}")
+            }),
+    );
+    parts.join("; ")
+}
+
+/// The way down of the first run.
+fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> anyhow::Result<()> {
+    const ROWS: usize = 12;
+    let is_down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
+    let loading: Vec<&Sample> = samples.iter().filter(is_down).collect();
+    let names = indentation.mesh.body.layer_names.join(", ");
+    let mut table = Table::new([
+        "depth mm",
+        "force N",
+        "contact mm²",
+        "max kPa",
+        &format!("thickness mm: {names}"),
+    ]);
+    let stride = loading.len().div_ceil(ROWS).max(1);
+    for (i, sample) in loading.iter().enumerate() {
+        if i % stride != 0 && i + 1 != loading.len() {
+            continue;
+        }
+        let thicknesses: Vec<String> = (sample.layer_thickness_mm.iter())
+            .map(|t| format!("{t:6.2}"))
+            .collect();
+        table.push([
+            format!("{:.2}", sample.depth_mm),
+            format!("{:.4}", (sample.force_n * 1e4).round() / 1e4 + 0.0),
+            format!("{:.0}", sample.contact_area_mm2),
+            sample
+                .max_pressure_kpa
+                .map_or(String::new(), |p| format!("{:.2}", p + 0.0)),
+            thicknesses.join(" "),
+        ]);
+    }
+    job.context.say(table)
+}
+
+/// Which layer gives, and what force each hands on.
+fn say_forces(job: &Job<'_>, r: &PressResult) -> anyhow::Result<()> {
+    if let Some(name) = &r.gives_most {
+        job.context.say(format!(
+            "under the tool \"{name}\" gives most; along the press the layers hand on {}",
+            (r.layers.iter())
+                .map(|layer| format!("{:.3} N below {}", layer.force_below_n, layer.name))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,249 @@
+//! What the samples say together.
+
+use palpa_scene::MaterialStatus;
+use serde::Serialize;
+
+use super::super::words::status_line;
+use super::record::Recorded;
+use palpa::build::in_mm;
+use palpa::press::Phase;
+use palpa::press::tissue::{Failure, Indentation, Sample, told};
+
+/// A contact whose radius is fewer edges than this is worth a note.
+const FEWEST_EDGES: f64 = 3.0;
+
+/// What came out.
+#[derive(Debug, Serialize)]
+pub(super) struct PressResult {
+    /// `converged`, or how the first step that failed ended.
+    pub(super) outcome: &'static str,
+    /// Whether the whole script was run; not after Ctrl-C or a step that failed.
+    pub(super) is_complete: bool,
+    /// Of the first run, as in `runs`.
+    pub(super) max_force_n: f64,
+    pub(super) at_depth_mm: f64,
+    pub(super) secant_stiffness_n_per_mm: Option<f64>,
+    pub(super) force_after_retract_n: Option<f64>,
+    /// One for each speed.
+    pub(super) runs: Vec<RunResult>,
+    /// The layers along the pressed column, where the first run is deepest.
+    pub(super) layers: Vec<LayerResult>,
+    /// The layer whose thickness changes most there.
+    pub(super) gives_most: Option<String>,
+    /// Prisms with corners turned inside out where the first run is deepest.
+    pub(super) n_turned_prisms: usize,
+    /// Of all samples that converged.
+    pub(super) worst: Worst,
+    pub(super) failures: Vec<Failure>,
+    pub(super) material_status: String,
+    #[serde(skip)]
+    pub(super) notes: Vec<String>,
+}
+
+/// What came out at one speed.
+#[derive(Debug, Serialize)]
+pub(super) struct RunResult {
+    pub(super) speed_mm_s: f64,
+    pub(super) max_force_n: f64,
+    pub(super) at_depth_mm: f64,
+    pub(super) secant_stiffness_n_per_mm: Option<f64>,
+    /// Share of the work of going down that does not come back, for each cycle that was finished.
+    pub(super) hysteresis: Vec<f64>,
+    /// Share of the force that is lost during the first rest.
+    pub(super) relaxation: Option<f64>,
+    pub(super) force_after_retract_n: Option<f64>,
+}
+
+/// A layer along the pressed column.
+#[derive(Debug, Serialize)]
+pub(super) struct LayerResult {
+    pub(super) name: String,
+    pub(super) thickness_at_rest_mm: f64,
+    pub(super) thickness_pressed_mm: f64,
+    /// Force that the layer hands on to what lies below it, along the press; below the deepest layer, the bone's.
+    pub(super) force_below_n: f64,
+}
+
+/// The largest departures.
+#[derive(Debug, Serialize)]
+pub(super) struct Worst {
+    pub(super) gap_um: f64,
+    pub(super) penetration_um: f64,
+    pub(super) tension_n: f64,
+    pub(super) cone_n: f64,
+    pub(super) slip: f64,
+    pub(super) friction_smoothing_um: f64,
+    /// Not of the body at rest before it is pressed, which may have no forces to compare with.
+    pub(super) residual: f64,
+    pub(super) volume_ratio_min: f64,
+    pub(super) volume_ratio_max: f64,
+}
+
+pub(super) fn result_of(
+    indentation: &Indentation,
+    recorded: &Recorded,
+    materials: &[MaterialStatus],
+    is_interrupted: bool,
+) -> PressResult {
+    let good: Vec<&Sample> = (recorded.samples.iter())
+        .filter(|s| s.outcome == "converged")
+        .collect();
+    let runs: Vec<RunResult> = (0..indentation.speeds.len())
+        .filter_map(|index| {
+            let samples: Vec<&Sample> = good.iter().copied().filter(|s| s.run == index).collect();
+            run_result(&samples, indentation.is_viscous)
+        })
+        .collect();
+    let layers = layers(indentation, recorded);
+    let change = |l: &LayerResult| (l.thickness_at_rest_mm - l.thickness_pressed_mm).abs();
+    let most = layers.iter().max_by(|a, b| change(a).total_cmp(&change(b)));
+    let first = runs.first();
+    let failed = (recorded.samples.iter()).find(|s| s.outcome != "converged");
+    PressResult {
+        outcome: failed.map_or("converged", |s| s.outcome),
+        is_complete: !is_interrupted && failed.is_none(),
+        max_force_n: first.map_or(0.0, |run| run.max_force_n),
+        at_depth_mm: first.map_or(0.0, |run| run.at_depth_mm),
+        secant_stiffness_n_per_mm: first.and_then(|run| run.secant_stiffness_n_per_mm),
+        force_after_retract_n: first.and_then(|run| run.force_after_retract_n),
+        gives_most: most.filter(|l| change(l) > 0.0).map(|l| l.name.clone()),
+        n_turned_prisms: recorded
+            .deepest
+            .turned
+            .as_ref()
+            .map_or(0, |turned| turned.n),
+        worst: worst(&good),
+        notes: notes(indentation, recorded, &good),
+        runs,
+        layers,
+        failures: recorded.failures.clone(),
+        material_status: status_line(materials),
+    }
+}
+
+fn run_result(samples: &[&Sample], is_viscous: bool) -> Option<RunResult> {
+    let peak = (samples.iter()).max_by(|a, b| a.force_n.total_cmp(&b.force_n))?;
+    let n_cycles = samples.last()?.cycle + 1;
+    let first: Vec<&&Sample> = samples.iter().filter(|s| s.cycle == 0).collect();
+    let end = |phase: Phase| first.iter().rfind(|s| s.phase == phase);
+    let relaxation = end(Phase::Load).zip(end(Phase::Hold));
+    let last = samples.last()?;
+    Some(RunResult {
+        speed_mm_s: peak.speed_mm_s,
+        max_force_n: peak.force_n,
+        at_depth_mm: peak.depth_mm,
+        secant_stiffness_n_per_mm: (peak.depth_mm > 0.0).then(|| peak.force_n / peak.depth_mm),
+        hysteresis: (0..n_cycles)
+            .filter_map(|cycle| loss(samples, cycle))
+            .collect(),
+        relaxation: (relaxation.filter(|_| is_viscous))
+            .map(|(top, rested)| 1.0 - rested.force_n / top.force_n),
+        force_after_retract_n: is_back(last).then_some(last.force_n),
+    })
+}
+
+fn is_back(sample: &Sample) -> bool {
+    sample.phase == Phase::Retract && sample.depth_mm == 0.0
+}
+
+/// Share of the work of going down in a cycle that does not come back.
+fn loss(samples: &[&Sample], cycle: u32) -> Option<f64> {
+    let of_cycle = || samples.iter().filter(move |s| s.cycle == cycle);
+    let back = of_cycle().find(|s| is_back(s))?;
+    let deepest = of_cycle().rfind(|s| s.phase == Phase::Load)?;
+    // A cycle begins where the last one has ended.
+    let begin = cycle.checked_sub(1).map_or(0.0, |before| {
+        let mut ends = samples.iter().filter(|s| s.cycle == before && is_back(s));
+        ends.next_back().map_or(0.0, |s| s.work_mj)
+    });
+    let (down, lost) = (deepest.work_mj - begin, back.work_mj - begin);
+    (down > 0.0).then(|| lost / down)
+}
+
+fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
+    let deepest = &recorded.deepest;
+    let samples = &recorded.samples;
+    let (Some(rest), Some(pressed)) = (samples.first(), samples.get(deepest.sample)) else {
+        return Vec::new();
+    };
+    let direction = &indentation.place.direction;
+    let thicknesses = rest
+        .layer_thickness_mm
+        .iter()
+        .zip(&pressed.layer_thickness_mm);
+    let names = &indentation.mesh.body.layer_names;
+    (names.iter().zip(thicknesses).zip(&indentation.borders[1..]))
+        .map(|((name, (at_rest, pressed)), &below)| LayerResult {
+            name: name.clone(),
+            thickness_at_rest_mm: *at_rest,
+            thickness_pressed_mm: *pressed,
+            force_below_n: (deepest.level_forces.get(below)).map_or(0.0, |f| -f.dot(direction)),
+        })
+        .collect()
+}
+
+/// Whether nothing has pressed yet: there may be no force of which a share could be out of balance.
+fn is_unloaded(sample: &Sample) -> bool {
+    sample.phase == Phase::Load && sample.cycle == 0 && sample.depth_mm == 0.0
+}
+
+fn worst(good: &[&Sample]) -> Worst {
+    let largest = |of: fn(&Sample) -> f64| good.iter().map(|s| of(s)).fold(0.0, f64::max);
+    Worst {
+        gap_um: largest(|s| s.gap_um),
+        penetration_um: largest(|s| s.penetration_um),
+        tension_n: largest(|s| s.tension_n),
+        cone_n: largest(|s| s.cone_n),
+        slip: largest(|s| s.slip),
+        friction_smoothing_um: largest(|s| s.friction_smoothing_um),
+        residual: largest(|s| if is_unloaded(s) { 0.0 } else { s.residual }),
+        volume_ratio_min: (good.iter().map(|s| s.volume_ratio_min)).fold(f64::INFINITY, f64::min),
+        volume_ratio_max: largest(|s| s.volume_ratio_max),
+    }
+}
+
+fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Vec<String> {
+    let mut notes: Vec<String> = (recorded.failures.iter())
+        .map(|failure| {
+            format!(
+                "at {} mm/s the step to {:.2} mm FAILED: {}; results end before it. Press less deep, refine the mesh there, or make [model] alpha smaller",
+                failure.speed_mm_s,
+                failure.depth_mm,
+                told(&failure.outcome)
+            )
+        })
+        .collect();
+    if let Some(turned) = &recorded.deepest.turned {
+        notes.push(format!(
+            "prisms with a corner turned inside out at {:.2} mm: {}, the worst near ({}) mm; stress there means little, and the \
+             force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
+            recorded.deepest.depth_mm,
+            turned.n,
+            in_mm(turned.at)
+        ));
+    }
+    let smoothed = (good.iter())
+        .filter(|s| s.friction_smoothing_um > 0.0)
+        .count();
+    if smoothed > 0 {
+        notes.push(format!(
+            "friction had to be smoothed in {smoothed} of {} steps, over a slip of up to {:.0} µm: what would be held creeps by \
+             about as much",
+            good.len(),
+            worst(good).friction_smoothing_um
+        ));
+    }
+    let widest = (good.iter()).max_by(|a, b| a.contact_area_mm2.total_cmp(&b.contact_area_mm2));
+    if let Some(widest) = widest.filter(|_| !indentation.is_bonded()) {
+        let radius = (widest.contact_area_mm2 / std::f64::consts::PI).sqrt();
+        let edge = indentation.mesh.mesh_size * 1e3;
+        if radius < FEWEST_EDGES * edge {
+            notes.push(format!(
+                "only {} skin vertices touch the tool at most, over a circle of {radius:.1} mm radius with edges of \
+                 {edge:.1} mm: the force depends on the mesh; press deeper, or refine it with [mesh] near_tool",
+                widest.n_touching
+            ));
+        }
+    }
+    notes
+}

@@ -1,0 +1,218 @@
+//! `palpa replay`: a log run again.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use palpa_rt::{Ending, Log, ReplayParams, ReplayReport, Table, Tissue, Verdict, replay_watched};
+use palpa_scene::{ModelKind, Scene};
+use serde::Serialize;
+
+use super::Outcome;
+use crate::cli::Context;
+use palpa::live::{LiveScene, SpringScene, changed_files, scene_of};
+
+/// Run a log again and compare, or export it as tables
+///
+/// Makes the body anew from the scene in the log, runs the tissue's steps and the 1 kHz law from what was logged, in one
+/// thread, and compares all forces and patches: to the bit on the same kind of processor, within a tolerance on another.
+/// Exits with 1 when they differ.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The log (MCAP), as `palpa loop-report` writes it
+    log: PathBuf,
+    /// Make the body from this scene instead of the one in the log
+    #[arg(long)]
+    scene: Option<PathBuf>,
+    /// Write the log as tables into the output folder, and do not run it again
+    #[arg(long, value_enum)]
+    export: Option<Format>,
+}
+
+/// The kinds of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// Text, comma-separated
+    Csv,
+    /// Apache Parquet
+    Parquet,
+}
+
+/// What is printed with `--json`.
+#[derive(Debug, Serialize)]
+struct Found {
+    verdict: &'static str,
+    is_same_cpu: bool,
+    ticks: u64,
+    steps: u64,
+    jobs: u64,
+    patches_differing: u64,
+    first_patch_differing: Option<u64>,
+    first_tick_differing: Option<u64>,
+    max_force_difference_n: f64,
+    stopped: Option<String>,
+    /// Whether the log was closed properly, and what is damaged in it.
+    is_whole: bool,
+    damage: Option<String>,
+    changed_files: Vec<String>,
+}
+
+/// What is printed with `--export` and `--json`.
+#[derive(Debug, Serialize)]
+struct Tables {
+    files: Vec<PathBuf>,
+    is_whole: bool,
+    damage: Option<String>,
+}
+
+/// Runs the log again on its tissue, until the end or Ctrl-C.
+fn again(log: &Log, tissue: impl Tissue, context: &Context) -> ReplayReport {
+    context.begin_recording();
+    let bar = context.progress(log.ticks.len(), "ticks run again");
+    let report = replay_watched(log, tissue, &ReplayParams::default(), |tick| {
+        if tick.is_multiple_of(100) {
+            bar.set_position(tick as u64);
+        }
+        !context.is_interrupted()
+    });
+    bar.finish_and_clear();
+    report
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the log cannot be read, its scene not be built, or a table not be written.
+pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    if let Some(format) = args.export {
+        return export(args, format, context);
+    }
+    let log = Log::open(&args.log)?;
+    note_ending(&log.ending, context);
+    let scene = match &args.scene {
+        Some(path) => Scene::load(path)?,
+        None => scene_of(&log.header)?,
+    };
+    let changed = match args.scene {
+        Some(_) => Vec::new(),
+        None => changed_files(&log.header, &scene),
+    };
+    for file in &changed {
+        context.note(format!("{}: {}", file.path.display(), file.problem));
+    }
+    let of_log = || "the body of the log";
+    let report = match scene.model.kind {
+        ModelKind::Tissue => {
+            let live = LiveScene::build(&scene).with_context(of_log)?;
+            again(&log, live.tissue()?, context)
+        }
+        ModelKind::Reference => {
+            let springs = SpringScene::build(&scene).with_context(of_log)?;
+            again(&log, springs.tissue(springs.beginning(), None)?, context)
+        }
+    };
+    let damage = damage(&log.ending);
+    let found = Found {
+        verdict: match report.verdict {
+            Verdict::Same if log.ending != Ending::Whole => "same_as_far_as_read",
+            Verdict::Same => "same",
+            Verdict::WithinTolerance => "within_tolerance",
+            Verdict::Different => "different",
+            Verdict::Incomplete => "incomplete",
+        },
+        is_same_cpu: report.is_same_cpu,
+        ticks: report.ticks,
+        steps: report.steps,
+        jobs: report.jobs,
+        patches_differing: report.patches_differing,
+        first_patch_differing: report.first_patch,
+        first_tick_differing: report.first_force.map(|f| f.tick),
+        max_force_difference_n: report.max_force_difference,
+        stopped: report.stopped.clone(),
+        is_whole: log.ending == Ending::Whole,
+        damage: damage.clone(),
+        changed_files: changed
+            .iter()
+            .map(|f| f.path.display().to_string())
+            .collect(),
+    };
+    context.say(format!(
+        "{} ticks, {} steps of the tissue and {} background jobs run again",
+        report.ticks, report.steps, report.jobs
+    ))?;
+    context.say(match report.verdict {
+        Verdict::Same if log.ending == Ending::Whole => {
+            "every force and every patch is the same to the bit".to_owned()
+        }
+        Verdict::Same => {
+            "every force and every patch that could be read is the same to the bit".to_owned()
+        }
+        Verdict::WithinTolerance => format!(
+            "made on another kind of processor; forces differ by {:.2e} N at most, which is within the tolerance",
+            report.max_force_difference
+        ),
+        Verdict::Different => format!(
+            "{} patches differ{}; forces differ by {:.2e} N at most{}",
+            report.patches_differing,
+            report.first_patch.map_or(String::new(), |s| format!(", first that of step {s}")),
+            report.max_force_difference,
+            report.first_force.map_or(String::new(), |f| format!(
+                ", first at tick {}: {:?} N in the log, {:?} N now",
+                f.tick, f.logged, f.replayed
+            )),
+        ),
+        Verdict::Incomplete => "what could be run again is the same".to_owned(),
+    })?;
+    if let Some(why) = &report.stopped {
+        context.say(format!("it had to stop early: {why}"))?;
+    }
+    context.json(&found)?;
+    Ok(match report.verdict {
+        _ if context.is_interrupted() => Outcome::Interrupted,
+        _ if damage.is_some() => Outcome::NotGood,
+        Verdict::Same | Verdict::WithinTolerance => Outcome::Done,
+        Verdict::Different | Verdict::Incomplete => Outcome::NotGood,
+    })
+}
+
+/// Says that a log is not whole.
+fn note_ending(ending: &Ending, context: &Context) {
+    match ending {
+        Ending::Whole => {}
+        Ending::CutOff => context.note("the log ends early, as after a crash; what is there is used"),
+        Ending::Damaged(why) => context.note(format!(
+            "the log is damaged, or was still being written when it was copied ({why}); what comes before that is used"
+        )),
+    }
+}
+
+fn damage(ending: &Ending) -> Option<String> {
+    match ending {
+        Ending::Damaged(why) => Some(why.clone()),
+        Ending::Whole | Ending::CutOff => None,
+    }
+}
+
+fn export(args: &Args, format: Format, context: &Context) -> anyhow::Result<Outcome> {
+    let table = match format {
+        Format::Csv => Table::Csv,
+        Format::Parquet => Table::Parquet,
+    };
+    let out = context.out_dir()?;
+    let tables = palpa_rt::export(&args.log, out.path(), table)?;
+    note_ending(&tables.ending, context);
+    for file in &tables.files {
+        context.say(file.display())?;
+    }
+    let damage = damage(&tables.ending);
+    let is_damaged = damage.is_some();
+    context.json(&Tables {
+        files: tables.files,
+        is_whole: tables.ending == Ending::Whole,
+        damage,
+    })?;
+    Ok(if is_damaged {
+        Outcome::NotGood
+    } else {
+        Outcome::Done
+    })
+}

@@ -1,0 +1,21 @@
+//! `palpa schema`: the JSON Schema of scene files.
+
+use crate::cli::Context;
+use crate::commands::Outcome;
+
+/// Print the JSON Schema of scene files
+///
+/// An editor that knows it completes keys and shows what each one means, with its unit and default.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Prints the schema on standard output. It is JSON with or without `--json`.
+///
+/// # Errors
+/// When standard output is closed.
+pub fn run(_: &Args, context: &Context) -> anyhow::Result<Outcome> {
+    let schema = palpa_scene::scene_schema();
+    context.json(&schema)?;
+    context.say(format_args!("{schema:#}"))?;
+    Ok(Outcome::Done)
+}

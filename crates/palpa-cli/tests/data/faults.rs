@@ -1,0 +1,245 @@
+//! Faults of device, tissue and clock while the finite elements are pressed, through the real threads, mailboxes and device: the
+//! force stays finite and limited in size and slew and comes back, the log is whole, says what happened, and runs again to the bit.
+
+use std::path::Path;
+use std::time::Duration;
+
+use palpa::live::{LiveScene, device_model, grip};
+use palpa_device::{Fault, FaultSwitch, Faulty, HapticDevice, LiveTarget, SimulatedDevice, Vec3};
+use palpa_rt::{
+    Engine, EngineParams, Log, RecorderParams, ReplayParams, TickEntry, Verdict, replay,
+};
+use palpa_scene::Scene;
+use palpa_servo::{DeviceSpec, ServoParams};
+
+const GEL: &str = r#"
+[body]
+generator = { kind = "block", size = ["60 mm", "60 mm", "30 mm"], spacing = "8 mm" }
+[[layer]]
+tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
+levels = 3
+[tool]
+shape = "sphere"
+radius = "8 mm"
+[press]
+at = ["0 mm", "0 mm", "0 mm"]
+depth = "4 mm"
+[mesh]
+near_tool = "4 mm"
+# Without dry friction, so that there is one place where hand and tissue are in balance.
+[device]
+preset = "ideal"
+[motion]
+kind = "press"
+depth = "4 mm"
+above = "3 mm"
+"#;
+/// Time without a fault after which the force is all back, s: it is let in slowly, in half a second.
+const BACK: f64 = 1.0;
+/// Forces within which it is the same again, as a share.
+const SAME: f64 = 0.01;
+
+/// A run that is disturbed step by step: each fault comes when the force has settled after the one before. A machine that stands
+/// still for some milliseconds (a virtual one does) is one more fault, which the law answers as the others: it is waited for.
+struct Run {
+    engine: Engine,
+}
+
+impl Run {
+    fn until(&mut self, what: &str, mut is_so: impl FnMut(&TickEntry) -> bool) -> f64 {
+        let begin = self.engine.now();
+        loop {
+            let tick = self.engine.snapshot().tick;
+            if is_so(&tick) {
+                return tick.tick.now;
+            }
+            assert!(
+                self.engine.now() < begin + 60.0,
+                "60 s and still not so: {what}"
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits until the force was steady and without a fault for a while, and tells the moment.
+    fn settle(&mut self) -> f64 {
+        let (mut since, mut last) = (self.engine.now(), f64::NAN);
+        self.until("the force is steady", |tick| {
+            let force = tick.devices[0].force[2];
+            let is_steady = tick.devices[0].faults == 0 && (force - last).abs() < 1e-3;
+            last = force;
+            if !is_steady {
+                since = tick.tick.now;
+            }
+            tick.tick.now > since + BACK
+        })
+    }
+
+    /// Waits until nothing presses on.
+    fn let_go(&mut self) {
+        self.until("the force is zero", |tick| {
+            size(tick.devices[0].force) < 1e-9
+        });
+    }
+
+    /// A fault of the device that lets the force go.
+    fn lose(&mut self, fault: &FaultSwitch) {
+        fault.set(true);
+        self.let_go();
+        fault.set(false);
+    }
+}
+
+fn size(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Every force is within the device's own limits.
+fn check_limits(log: &Log, spec: &DeviceSpec) {
+    for pair in log.ticks.windows(2) {
+        let [a, b]: [&TickEntry; 2] = [&pair[0], &pair[1]];
+        let (now, force) = (b.tick.now, b.devices[0].force);
+        assert!(
+            size(force) <= spec.max_force * (1.0 + 1e-9),
+            "{now} s: {force:?}"
+        );
+        let change = size(std::array::from_fn(|i| force[i] - a.devices[0].force[i]));
+        let longest = (now - a.tick.now).max(1e-3);
+        assert!(
+            change <= spec.max_slew * longest + 1e-9,
+            "{now} s: {change} N"
+        );
+    }
+}
+
+/// Without a tissue, or a device, nothing presses on.
+fn check_let_go(log: &Log, usual: f64) {
+    for (text, after) in [
+        ("reading not a number", 0.09),
+        ("device lost", 0.09),
+        ("the tissue pauses", 0.28),
+    ] {
+        let event = log.events.iter().find(|e| e.text.contains(text)).unwrap();
+        let k = (log.ticks).partition_point(|t| t.tick.now < event.time + after);
+        let there = log.ticks[k].devices[0].force[2];
+        assert!(there.abs() < 0.7 * usual, "{text}: {there} N");
+    }
+}
+
+fn check_said(log: &Log) {
+    let said: Vec<&str> = log.events.iter().map(|e| e.text.as_str()).collect();
+    for text in [
+        "the tissue pauses",
+        "stale patch",
+        "patch is late",
+        "a patch with NaN",
+        "no fault any more",
+    ] {
+        assert!(
+            said.iter().any(|s| s.contains(text)),
+            "{text:?} is not said: {said:#?}"
+        );
+    }
+}
+
+#[test]
+fn faults_while_real_tissue_is_pressed() {
+    if super::data().is_none() {
+        return;
+    }
+    let scene = Scene::parse(GEL, Path::new("")).unwrap();
+    let live = LiveScene::build(&scene).unwrap();
+    let model = device_model(scene.device.preset);
+    let [above, deep] = [30e-3, -7e-3].map(|z| Vec3::z() * z);
+    let hand = LiveTarget::new(above);
+    let device = SimulatedDevice::live(model, grip(scene.device.grip), hand.clone());
+    let spec = device.spec();
+    let [jumped, not_a_number, stalled, unplugged]: [FaultSwitch; 4] = Default::default();
+    let device = Faulty::new(device)
+        .with_switch(&jumped, Fault::Jump(Vec3::z() * -20e-3))
+        .with_switch(&not_a_number, Fault::NotANumber)
+        .with_switch(&stalled, Fault::Stall)
+        .with_switch(&unplugged, Fault::Unplug);
+    let params = EngineParams {
+        servo: ServoParams {
+            resolution: model.resolution.max(1e-6),
+            ..ServoParams::default()
+        },
+        ..EngineParams::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mcap");
+    let recorder = RecorderParams {
+        path: Some(path.clone()),
+        scene: scene.to_toml(),
+        notes: palpa::live::notes_of(&scene).unwrap(),
+    };
+    let engine = Engine::start(
+        live.tissue().unwrap(),
+        vec![Box::new(device)],
+        &params,
+        &recorder,
+    )
+    .unwrap();
+
+    let wait = |ms| std::thread::sleep(Duration::from_millis(ms));
+    let mut run = Run { engine };
+    hand.set(deep);
+    run.until("the gel is felt", |tick| tick.devices[0].force[2] > 0.1);
+    let mut settled = vec![("the first press", run.settle())];
+    // 20 mm deeper for a tenth of a second, as it seems: the tissue is pressed there, and must find back.
+    jumped.set(true);
+    wait(100);
+    jumped.set(false);
+    settled.push(("a jump", run.settle()));
+    run.lose(&not_a_number);
+    settled.push(("no number", run.settle()));
+    run.lose(&stalled);
+    settled.push(("a stall", run.settle()));
+    run.lose(&unplugged);
+    settled.push(("an unplugged device", run.settle()));
+    run.engine.faults().pause_tissue(true);
+    run.let_go();
+    wait(200);
+    run.engine.faults().pause_tissue(false);
+    settled.push(("a tissue that paused", run.settle()));
+    run.engine.faults().delay_tissue(0.1);
+    wait(150);
+    settled.push(("a late patch", run.settle()));
+    run.engine.faults().spoil_patches(20);
+    wait(150);
+    settled.push(("spoilt patches", run.settle()));
+    run.engine.faults().delay_loop(0.05);
+    wait(150);
+    settled.push(("a loop that slept", run.settle()));
+    // The hand's own: out and in at 1 m/s.
+    hand.set(above);
+    run.let_go();
+    hand.set(deep);
+    run.until("the gel is felt", |tick| tick.devices[0].force[2] > 0.1);
+    settled.push(("a hand out and in", run.settle()));
+    let report = run.engine.stop();
+    let log = Log::open(&path).unwrap();
+
+    assert!(log.ending == palpa_rt::Ending::Whole && !report.has_log_failed);
+    assert_eq!(report.lost_records, [0, 0]);
+    assert_eq!(log.ticks.len() as u64, report.ticks);
+    check_limits(&log, &spec);
+    let mut usual = None;
+    for (after, moment) in settled {
+        let last = moment - 0.2..=moment;
+        let forces = (log.ticks.iter()).filter(|t| last.contains(&t.tick.now));
+        let forces: Vec<f64> = forces.map(|t| t.devices[0].force[2]).collect();
+        let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+        let usual = *usual.get_or_insert(mean);
+        println!("{moment:6.3} s, after {after}: {mean:.4} N");
+        assert!(
+            mean > 0.1 && forces.iter().all(|f| (f / usual - 1.0).abs() < SAME),
+            "after {after}: {mean} N, {usual} N before"
+        );
+    }
+    check_let_go(&log, usual.unwrap());
+    check_said(&log);
+    let again = replay(&log, live.tissue().unwrap(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+}

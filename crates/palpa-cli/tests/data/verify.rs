@@ -1,0 +1,72 @@
+//! Every case of `palpa verify`, the slow ones and those that compare with reference tables among them.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Instant;
+
+use palpa_lab::verify::{Options, Row, cases, tolerance};
+
+/// The tolerances that a case may use.
+fn promised(case: &str) -> &'static [f64] {
+    use tolerance::*;
+    match case {
+        "patch" | "V patch" => &[PATCH],
+        "columns" => &[COLUMN],
+        "prony" => &[PRONY],
+        "lame" | "cook" => &[NEARLY_INCOMPRESSIBLE],
+        "A1" | "A2" | "A3" => &[SMALL_STRAIN],
+        "A4" => &[LUMP],
+        "B1" | "B2" | "B4" => &[BLOCK, PROFILE],
+        "B3c" => &[BLOCK_LUMP],
+        "B5" => &[BONDED, BONDED_DEEP],
+        "small lump" => &[SMALL_LUMP],
+        _ => &[],
+    }
+}
+
+#[test]
+fn slow_every_figure_is_within_its_tolerance() {
+    let Some(reference) = crate::data().map(|data| data.join("../reference")) else {
+        return;
+    };
+    let options = Options {
+        reference: Some(reference),
+    };
+    let next = AtomicUsize::new(0);
+    let rows: Mutex<Vec<Row>> = Mutex::default();
+    let n_threads = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..n_threads.min(cases().len()) {
+            scope.spawn(|| {
+                while let Some(case) = cases().get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let began = Instant::now();
+                    let found = case.run(&options).unwrap();
+                    println!(
+                        "{}: {} figures in {:.1?}",
+                        case.name,
+                        found.rows.len(),
+                        began.elapsed()
+                    );
+                    assert!(!found.rows.is_empty(), "{}", case.name);
+                    rows.lock().unwrap().extend(found.rows);
+                }
+            });
+        }
+    });
+    let rows = rows.into_inner().unwrap();
+    for row in &rows {
+        let allowed = promised(row.case);
+        assert!(
+            allowed.is_empty() || allowed.contains(&row.tolerance),
+            "{row:#?} is not among {allowed:?}"
+        );
+    }
+    let failed: Vec<&Row> = rows.iter().filter(|row| !row.pass).collect();
+    assert!(
+        failed.is_empty(),
+        "{} of {} out of tolerance: {failed:#?}",
+        failed.len(),
+        rows.len()
+    );
+}

@@ -1,0 +1,533 @@
+//! `palpa press` with the continuum model: physics that any body must show, and everything that is written.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use palpa::press::tissue::{Indentation, Sample};
+use palpa_scene::{Scene, Skin};
+use serde_json::Value;
+use vtkio::Vtk;
+use vtkio::model::{Attribute, DataSet, Piece};
+
+use crate::press::Bench;
+
+/// A small block, a fraction of a second a step.
+const BLOCK: &str = r#"
+[body]
+generator = { kind = "block", size = ["60 mm", "60 mm", "24 mm"], spacing = "8 mm" }
+[[layer]]
+tissue = { name = "soft", young = "10 kPa", poisson = 0.45 }
+thickness = "8 mm"
+levels = 2
+[[layer]]
+tissue = { name = "stiff", young = "40 kPa", poisson = 0.45 }
+levels = 2
+[tool]
+shape = "disc"
+radius = "10 mm"
+[press]
+at = ["0 mm", "0 mm", "0 mm"]
+depth = "2 mm"
+step = "0.5 mm"
+speed = "10 mm/s"
+hold = "0 s"
+[mesh]
+near_tool = "5 mm"
+"#;
+
+const PRONY: &str = "poisson = 0.45, prony = { terms = [{ g = 0.4, tau = \"0.2 s\" }] }";
+
+fn tissue_bench() -> Bench {
+    Bench::of("tissue")
+}
+
+fn report(bench: &Bench, scene: &str) -> Value {
+    bench.file("scene.toml", scene);
+    bench.report(&["scene.toml", "--json", "--frames", "0"])
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn column(report: &Value, name: &str) -> Vec<f64> {
+    let samples = report["samples"].as_array().unwrap();
+    samples.iter().map(|s| number(&s[name])).collect()
+}
+
+fn peak(report: &Value) -> f64 {
+    number(&report["result"]["max_force_n"])
+}
+
+#[test]
+fn an_elastic_block_comes_back_and_every_file_is_there() {
+    let bench = tissue_bench();
+    bench.file("block.toml", BLOCK);
+    let report = bench.report(&["block.toml", "--json", "--frames", "3"]);
+    assert_eq!(report["model"], "tissue");
+    assert_eq!(report["result"]["outcome"], "converged");
+    assert_eq!(report["result"]["is_complete"], true);
+    let force = column(&report, "force_n");
+    assert_eq!(force.len(), 9);
+    assert!(force[..5].windows(2).all(|f| f[1] > f[0]), "{force:?}");
+    // There and back by the same way, and nothing is left.
+    for (down, back) in force[..4].iter().zip(force[5..].iter().rev()) {
+        assert!((down - back).abs() < 1e-6 * force[4], "{force:?}");
+    }
+    let run = &report["result"]["runs"][0];
+    assert!(number(&run["hysteresis"][0]).abs() < 1e-6, "{run}");
+    assert_eq!(run["relaxation"], Value::Null);
+    // The work of the tool is in the tissue; the trapezoidal rule takes a little more of a stiffening curve.
+    let (energy, work) = (
+        column(&report, "energy_mj")[4],
+        column(&report, "work_mj")[4],
+    );
+    assert!((work / energy - 1.0).abs() < 0.02, "{work} and {energy}");
+    // The patch has the disc's area.
+    let radius = number(&report["press"]["effective_radius_mm"]);
+    assert!((radius - 10.0).abs() < 0.01, "{radius}");
+    // What the tool presses with, every layer hands on, and the base bears.
+    for layer in report["result"]["layers"].as_array().unwrap() {
+        let handed_on = number(&layer["force_below_n"]);
+        assert!((handed_on / force[4] - 1.0).abs() < 1e-6, "{layer}");
+    }
+    assert_eq!(report["result"]["gives_most"], "soft");
+    let thickness = |i: usize| -> Vec<f64> {
+        let samples = report["samples"].as_array().unwrap().iter();
+        samples
+            .map(|s| number(&s["layer_thickness_mm"][i]))
+            .collect()
+    };
+    let (soft, stiff) = (thickness(0), thickness(1));
+    assert!((soft[0] - 8.0).abs() < 1e-9 && (stiff[0] - 16.0).abs() < 1e-9);
+    // The patch goes down by 2 mm, of which both layers together give all.
+    assert!(
+        (soft[4] + stiff[4] - 22.0).abs() < 1e-6,
+        "{soft:?} {stiff:?}"
+    );
+
+    let out = bench.folder.path().join("out/press");
+    for stem in ["force_depth", "force_time", "layers", "section", "stress"] {
+        for end in ["svg", "png"] {
+            assert!(out.join(format!("{stem}.{end}")).is_file(), "{stem}.{end}");
+        }
+    }
+    assert!(!out.join("relaxation.png").exists());
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("press.json")).unwrap()).unwrap();
+    assert_eq!(json, report);
+    check_table(&fs::read_to_string(out.join("press.csv")).unwrap(), &report);
+    check_series(&out.join("series"));
+}
+
+/// The table has the fields of the samples and their values.
+fn check_table(table: &str, report: &Value) {
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let (fields, layers) = header.split_at(Sample::COLUMNS.len());
+    assert_eq!(fields, Sample::COLUMNS);
+    assert_eq!(layers, ["layer_0_soft_mm", "layer_1_stiff_mm"]);
+    let samples = report["samples"].as_array().unwrap();
+    let keys: BTreeSet<&str> = samples[0]
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
+    let expected: BTreeSet<&str> = (fields.iter().copied())
+        .chain(["layer_thickness_mm"])
+        .collect();
+    assert_eq!(keys, expected);
+    let mut n = 0;
+    for (line, sample) in lines.zip(samples) {
+        let row: Vec<&str> = line.split(',').collect();
+        assert_eq!(row.len(), header.len(), "{line}");
+        let at = |name: &str| row[header.iter().position(|h| *h == name).unwrap()];
+        for name in ["depth_mm", "force_n", "volume_ratio_min"] {
+            let (row, sample) = (at(name).parse::<f64>().unwrap(), number(&sample[name]));
+            assert!(
+                (row - sample).abs() <= 1e-12 * sample.abs(),
+                "{name}: {row}, {sample}"
+            );
+        }
+        assert_eq!(at("phase"), sample["phase"].as_str().unwrap());
+        let thickness = number(&sample["layer_thickness_mm"][1]);
+        let column: f64 = at("layer_1_stiff_mm").parse().unwrap();
+        assert!((column - thickness).abs() < 1e-9);
+        n += 1;
+    }
+    assert_eq!(n, samples.len());
+}
+
+/// Names and numbers of the arrays in the deepest frame of a series.
+fn check_series(folder: &std::path::Path) {
+    assert_eq!(fs::read_dir(folder).unwrap().count(), 3);
+    let vtk = Vtk::import(folder.join("body_001.vtu")).unwrap();
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
+        panic!("no unstructured grid");
+    };
+    let Some(Piece::Inline(piece)) = pieces.into_iter().next() else {
+        panic!("no piece");
+    };
+    let array = |attributes: &[Attribute], name: &str| -> Vec<f64> {
+        let found = attributes.iter().find_map(|a| match a {
+            Attribute::DataArray(array) if array.name == name => Some(array),
+            _ => None,
+        });
+        found
+            .unwrap_or_else(|| panic!("no {name}"))
+            .data
+            .cast_into()
+            .unwrap()
+    };
+    let cells = |name: &str| array(&piece.data.cell, name);
+    let points = |name: &str| array(&piece.data.point, name);
+    let von_mises = cells("von_mises");
+    let cauchy = cells("cauchy");
+    assert_eq!(cauchy.len(), 9 * von_mises.len());
+    let pressure = cells("pressure");
+    for (s, p) in cauchy.chunks(9).zip(&pressure) {
+        assert!(((s[0] + s[4] + s[8]) / 3.0 + p).abs() < 1e-6 * (1.0 + p.abs()));
+    }
+    assert!(von_mises.iter().all(|s| *s >= 0.0) && von_mises.iter().any(|s| *s > 500.0));
+    let (least, most) = (cells("stretch_min"), cells("stretch_max"));
+    assert!(
+        least
+            .iter()
+            .zip(&most)
+            .all(|(a, b)| *a <= *b && *a > 0.3 && *b < 3.0)
+    );
+    assert!(cells("volume_ratio").iter().all(|j| (0.5..1.5).contains(j)));
+    assert!(cells("strain_energy").iter().all(|w| *w >= -1e-9));
+    let is_layer = |l: &f64| [0.0, 1.0].contains(l);
+    assert!(cells("layer").iter().all(is_layer));
+    // The pressure on the skin is the force, as far as skin is under the disc.
+    let contact = points("contact_pressure");
+    assert!(contact.iter().any(|p| *p > 500.0));
+    let displacement = points("displacement");
+    let deepest = displacement.iter().copied().fold(0.0, f64::min);
+    assert!((deepest + 2e-3).abs() < 1e-9, "{deepest}");
+    for name in ["force", "thinning", "is_base", "cut_face"] {
+        assert!(!points(name).is_empty());
+    }
+}
+
+#[test]
+fn a_viscous_block_loses_work_relaxes_and_is_stiffer_when_it_is_pressed_fast() {
+    let bench = tissue_bench();
+    let viscous = BLOCK.replace("poisson = 0.45", PRONY).replace(
+        "speed = \"10 mm/s\"\nhold = \"0 s\"",
+        "speeds = [\"2 mm/s\", \"50 mm/s\"]\nhold = \"1 s\"\ncycles = 2",
+    );
+    let elastic = report(
+        &bench,
+        &BLOCK.replace("step = \"0.5 mm\"", "step = \"1 mm\""),
+    );
+    let viscous = report(
+        &bench,
+        &viscous.replace("step = \"0.5 mm\"", "step = \"1 mm\""),
+    );
+    let runs = viscous["result"]["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 2);
+    let of = |run: usize, name: &str| number(&runs[run][name]);
+    // At rest it is as stiff as the elastic one, at once by 1/(1 - 0.4).
+    let (slow, fast) = (
+        of(0, "max_force_n") / peak(&elastic),
+        of(1, "max_force_n") / peak(&elastic),
+    );
+    assert!(
+        1.0 < slow && slow < fast && fast < 1.0 / 0.6,
+        "{slow} {fast}"
+    );
+    // After 1 s, five time constants, the fast one has lost nearly all that it can: 0.4, less what went on the way down.
+    assert!(
+        (of(1, "relaxation") - (1.0 - 1.0 / fast)).abs() < 0.01,
+        "{runs:?}"
+    );
+    assert!(of(0, "relaxation") < of(1, "relaxation"));
+    for run in runs {
+        let losses: Vec<f64> = run["hysteresis"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(number)
+            .collect();
+        assert_eq!(losses.len(), 2);
+        assert!(
+            losses.iter().all(|loss| (0.02..1.0).contains(loss)),
+            "{losses:?}"
+        );
+    }
+    // Time passes as the script says, and starts anew in every run.
+    let time = column(&viscous, "time_s");
+    assert!((time.iter().copied().fold(0.0, f64::max) - 2.0 * (2.0 + 1.0)).abs() < 1e-9);
+    assert_eq!(time.iter().filter(|t| **t == 0.0).count(), 2);
+    assert!(
+        bench
+            .folder
+            .path()
+            .join("out/press/relaxation.png")
+            .is_file()
+    );
+}
+
+#[test]
+fn a_lump_is_felt_and_a_coarse_mesh_feels_it_as_a_fine_one_does() {
+    let bench = tissue_bench();
+    // Its own stiffness against that of the layer it lies in, on the same mesh.
+    let felt = |near_lumps: &str| {
+        let force = |young: &str| {
+            let lump = format!(
+                "[[lump]]\nshape = \"sphere\"\nradius = \"5 mm\"\nbelow = [\"0 mm\", \"0 mm\", \"0 mm\"]\n\
+                 depth = \"14 mm\"\ntissue = {{ name = \"lump\", young = \"{young}\", poisson = 0.45 }}\n\
+                 [mesh]\ngrowth = 0.3\nnear_lumps = \"{near_lumps}\""
+            );
+            let once = BLOCK.replace("step = \"0.5 mm\"", "step = \"2 mm\"\nretract = false");
+            let report = report(&bench, &once.replace("[mesh]", &lump));
+            (peak(&report), number(&report["press"]["n_nodes"]))
+        };
+        let ((soft, n), (hard, _)) = (force("40 kPa"), force("400 kPa"));
+        (hard / soft - 1.0, n)
+    };
+    let ((coarse, n_coarse), (fine, n_fine)) = (felt("12 mm"), felt("3 mm"));
+    assert!(n_fine > 1.5 * n_coarse, "{n_coarse} and {n_fine} nodes");
+    assert!(fine > 0.02, "{fine}");
+    assert!((coarse / fine - 1.0).abs() < 0.2, "{coarse} and {fine}");
+}
+
+#[test]
+fn tools_touch_push_and_never_pull() {
+    let bench = tissue_bench();
+    for tool in [
+        "shape = \"sphere\"\nradius = \"12 mm\"",
+        "shape = \"flat-punch\"\nradius = \"8 mm\"\nedge_radius = \"2 mm\"\nfriction = 0.3",
+    ] {
+        let scene = BLOCK.replace("shape = \"disc\"\nradius = \"10 mm\"", tool);
+        let report = report(&bench, &scene);
+        assert_eq!(report["result"]["outcome"], "converged", "{tool}");
+        let force = column(&report, "force_n");
+        let top = peak(&report);
+        assert!(
+            force[0] == 0.0 && force[..5].windows(2).all(|f| f[1] > f[0]),
+            "{force:?}"
+        );
+        assert!(force.iter().all(|f| *f > -1e-9 * top), "{force:?}");
+        assert!(force.last().unwrap().abs() < 1e-6 * top, "{force:?}");
+        assert!(column(&report, "gap_um").iter().all(|g| *g < 1.0), "{tool}");
+        assert!(
+            column(&report, "penetration_um").iter().all(|g| *g < 1.0),
+            "{tool}"
+        );
+        assert!(
+            column(&report, "tension_n").iter().all(|t| *t < 1e-6 * top),
+            "{tool}"
+        );
+        assert!(
+            column(&report, "cone_n").iter().all(|t| *t < 1e-6 * top),
+            "{tool}"
+        );
+        let area = column(&report, "contact_area_mm2");
+        assert!(area[4] > area[1] || tool.contains("punch"), "{area:?}");
+        assert_eq!(report["press"]["effective_radius_mm"], Value::Null);
+    }
+}
+
+#[test]
+fn tension_of_the_skin_carries_part_of_the_force() {
+    let bench = tissue_bench();
+    let fixed = BLOCK.replace("[body]", "[body]\ncut_faces = \"fixed\"");
+    let tense = fixed.replace(
+        "levels = 2\n[[layer]]",
+        "levels = 2\nprestress = \"3 kPa\"\n[[layer]]",
+    );
+    let [slack, tense] = [&fixed, &tense].map(|scene| report(&bench, scene));
+    assert!(
+        peak(&tense) > 1.03 * peak(&slack),
+        "{} and {}",
+        peak(&tense),
+        peak(&slack)
+    );
+    // It is at rest before it is pressed.
+    assert!(column(&tense, "force_n")[0].abs() < 1e-6 * peak(&tense));
+}
+
+#[test]
+fn inertia_counts_when_it_is_asked_for() {
+    let bench = tissue_bench();
+    let fast = BLOCK.replace("speed = \"10 mm/s\"", "speed = \"1 m/s\"\nretract = false");
+    let dynamic = format!(
+        "{fast}[model]\ndynamics = \"implicit\"\ndamping = {{ mass = \"20 1/s\", stiffness = \"1 ms\" }}\n"
+    );
+    let [still, moving] = [&fast, &dynamic].map(|scene| report(&bench, scene));
+    assert_eq!(moving["press"]["is_dynamic"], true);
+    assert!(
+        peak(&moving) > 1.1 * peak(&still),
+        "{} and {}",
+        peak(&moving),
+        peak(&still)
+    );
+}
+
+#[test]
+fn a_step_that_fails_is_told_and_what_was_done_is_kept() {
+    let bench = tissue_bench();
+    // The whole block under a disc, pressed flat.
+    let deep = BLOCK
+        .replace(
+            "\"60 mm\", \"60 mm\", \"24 mm\"",
+            "\"30 mm\", \"30 mm\", \"24 mm\"",
+        )
+        .replace("depth = \"2 mm\"", "depth = \"23.5 mm\"")
+        .replace("step = \"0.5 mm\"", "step = \"5 mm\"");
+    bench.file("deep.toml", &deep);
+    let output = bench.press(&["deep.toml", "--json", "--frames", "0"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", report["result"]);
+    let samples = report["samples"].as_array().unwrap();
+    assert!(samples.len() > 1);
+    let (last, before) = (&samples[samples.len() - 1], &samples[samples.len() - 2]);
+    assert_eq!(last["outcome"], report["result"]["outcome"]);
+    assert_ne!(last["outcome"], "converged");
+    assert_eq!(last["force_n"], before["force_n"]);
+    assert_eq!(report["result"]["is_complete"], false);
+    assert_eq!(
+        report["result"]["failures"][0]["depth_mm"],
+        last["depth_mm"]
+    );
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("FAILED"), "{notes}");
+}
+
+#[test]
+fn what_a_continuum_cannot_be_is_refused() {
+    let bench = tissue_bench();
+    let with = |name: &str, from: &str, to: &str| {
+        assert!(BLOCK.contains(from), "{from}");
+        bench.file(name, &BLOCK.replace(from, to))
+    };
+    let messages: Vec<String> = [
+        with(
+            "spring.toml",
+            "young = \"10 kPa\", poisson = 0.45",
+            "spring = \"90 dyn/cm\"",
+        ),
+        with(
+            "mixed.toml",
+            "young = \"10 kPa\"",
+            "law = \"linear\", young = \"10 kPa\"",
+        ),
+        with("deep.toml", "depth = \"2 mm\"", "depth = \"25 mm\""),
+        with(
+            "outward.toml",
+            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
+            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]\ndirection = [0, 0, 1]",
+        ),
+    ]
+    .iter()
+    .map(|scene| bench.refusal(&[scene]))
+    .collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+/// The notes of an indentation that is set up, or why it is not.
+fn set_up(scene: &str) -> Result<String, String> {
+    let scene = Scene::parse(scene, std::path::Path::new(".")).unwrap();
+    let built = palpa::build::build(&scene).unwrap();
+    match Indentation::build(&scene, &built) {
+        Ok(indentation) => Ok(indentation.notes.join("\n")),
+        Err(error) => Err(format!("{error:#}")),
+    }
+}
+
+#[test]
+fn a_lump_outside_the_tissue_is_refused_and_one_across_the_skin_noted() {
+    let with_lump = |z: &str| {
+        let lump = format!(
+            "[[lump]]\nname = \"stone\"\nshape = \"sphere\"\nradius = \"4 mm\"\nat = [\"0 mm\", \"0 mm\", \"{z}\"]\n\
+             tissue = {{ name = \"hard\", young = \"100 kPa\", poisson = 0.45 }}\n[mesh]\nnear_lumps = \"8 mm\""
+        );
+        set_up(&BLOCK.replace("[mesh]", &lump))
+    };
+    let refusal = with_lump("500 mm").unwrap_err();
+    for part in ["\"stone\"", "(0.0, 0.0, 500.0) mm", "outside the tissue"] {
+        assert!(refusal.contains(part), "{refusal}");
+    }
+    let half = with_lump("0 mm").unwrap();
+    assert!(half.contains("% of the lump \"stone\" at"), "{half}");
+    let inside = with_lump("-12 mm").unwrap();
+    assert!(!inside.contains("stone"), "{inside}");
+}
+
+#[test]
+fn free_cut_faces_under_tension_are_noted() {
+    let tense = BLOCK.replace(
+        "levels = 2\n[[layer]]",
+        "levels = 2\nprestress = \"3 kPa\"\n[[layer]]",
+    );
+    let says_so = |scene: &str| set_up(scene).unwrap().contains("cut faces are free");
+    assert!(says_so(&tense) && !says_so(BLOCK));
+    assert!(!says_so(
+        &tense.replace("[body]", "[body]\ncut_faces = \"fixed\"")
+    ));
+}
+
+#[test]
+fn steps_too_long_for_friction_are_noted() {
+    let pressed = |friction: &str, step: &str| {
+        let tool = format!("shape = \"sphere\"\nradius = \"12 mm\"\nfriction = {friction}");
+        let scene = BLOCK.replace("shape = \"disc\"\nradius = \"10 mm\"", &tool);
+        set_up(&scene.replace("step = \"0.5 mm\"", &format!("step = \"{step}\""))).unwrap()
+    };
+    // A twentieth of 12 mm/√2 is 0.424 mm.
+    let note = pressed("0.4", "0.5 mm");
+    assert!(note.contains("--step \"0.42 mm\""), "{note}");
+    assert!(!pressed("0.4", "0.4 mm").contains("friction"));
+    assert!(!pressed("0", "0.5 mm").contains("friction"));
+}
+
+#[test]
+fn prisms_turned_inside_out_at_a_corner_are_noted() {
+    let bench = tissue_bench();
+    let deep = BLOCK
+        .replace("\"10 mm\"\n[press]", "\"8 mm\"\n[press]")
+        .replace("depth = \"2 mm\"", "depth = \"9 mm\"\nretract = false")
+        .replace("near_tool = \"5 mm\"", "near_tool = \"2 mm\"");
+    let [deep, shallow] = [&deep, BLOCK].map(|scene| report(&bench, scene));
+    let turned = |report: &Value| {
+        let is_noted = report["notes"].to_string().contains("inside out");
+        (number(&report["result"]["n_turned_prisms"]), is_noted)
+    };
+    assert!(
+        turned(&deep).0 > 0.0 && turned(&deep).1,
+        "{:?}",
+        turned(&deep)
+    );
+    assert_eq!(turned(&shallow), (0.0, false));
+    // At rest there is no force of which a share could be out of balance.
+    let residuals = column(&shallow, "residual");
+    let worst = residuals[1..].iter().copied().fold(0.0, f64::max);
+    assert_eq!(shallow["result"]["worst"]["residual"], worst);
+}
+
+#[test]
+fn the_shipped_scenes_without_files_can_be_set_up() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let mut n = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let scene = Scene::load(&path).unwrap();
+        if !matches!(scene.body.skin, Skin::Generated(_)) {
+            continue;
+        }
+        let built = palpa::build::build(&scene).unwrap();
+        let indentation = Indentation::build(&scene, &built).unwrap();
+        let sample = indentation.start(0).advance().unwrap();
+        let is_at_rest = sample.outcome == "converged" && sample.force_n.abs() < 1e-12;
+        assert!(is_at_rest, "{}: {sample:?}", path.display());
+        assert!(indentation.mesh.is_resolved, "{}", path.display());
+        n += 1;
+    }
+    assert!(n >= 4, "{n}");
+}

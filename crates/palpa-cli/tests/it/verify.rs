@@ -1,0 +1,178 @@
+//! `palpa verify` as a process.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+fn verify(folder: &Path, args: &[&str]) -> (i32, String, String) {
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = Command::new(env!("CARGO_BIN_EXE_palpa"))
+        .arg("verify")
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (status.code().unwrap(), text(stdout), text(stderr))
+}
+
+#[test]
+fn figures_within_tolerance_are_printed_and_written() {
+    let folder = TempDir::new().unwrap();
+    let (code, stdout, stderr) = verify(folder.path(), &["patch", "LAME", "--out", "out"]);
+    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
+    assert!(stdout.starts_with("patch: uniform strain"), "{stdout}");
+    assert!(stdout.contains("\nlame: thick cylinder"), "{stdout}");
+    let last = stdout.lines().last().unwrap();
+    let n_rows = fs::read_to_string(folder.path().join("out/verify.csv"))
+        .unwrap()
+        .lines()
+        .count()
+        - 1;
+    assert_eq!(last, format!("{n_rows} of {n_rows} within tolerance"));
+    let json = fs::read_to_string(folder.path().join("out/verify.json")).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json.as_array().unwrap().len(), n_rows);
+    let svg = fs::read_to_string(folder.path().join("out/convergence.svg")).unwrap();
+    assert!(svg.contains("thick cylinder") && svg.contains("tolerance"));
+    assert!(folder.path().join("out/convergence.png").is_file());
+    let study = fs::read_to_string(folder.path().join("out/convergence.csv")).unwrap();
+    assert!(
+        study.starts_with("case,series,h,nodes,error\nlame,"),
+        "{study}"
+    );
+
+    // A later run without a study leaves no picture of an older one.
+    let (code, stdout, _) = verify(folder.path(), &["patch", "--out", "out"]);
+    assert_eq!(code, 0);
+    assert!(!stdout.contains("convergence"), "{stdout}");
+    assert!(!folder.path().join("out/convergence.png").exists());
+}
+
+#[test]
+fn the_json_is_a_list_of_figures() {
+    let folder = TempDir::new().unwrap();
+    let (code, stdout, stderr) = verify(folder.path(), &["prony", "--json"]);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    let rows: Vec<serde_json::Map<String, Value>> = serde_json::from_str(&stdout).unwrap();
+    assert!(rows.len() > 10);
+    for row in rows {
+        let keys: Vec<&str> = row.keys().map(String::as_str).collect();
+        let mut wanted = [
+            "case",
+            "quantity",
+            "reference",
+            "computed",
+            "rel_error",
+            "tolerance",
+            "nodes",
+            "pass",
+        ];
+        wanted.sort_unstable();
+        let mut sorted = keys.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, wanted);
+        assert_eq!(row["case"], "prony");
+        assert_eq!(row["pass"], true);
+        let [reference, computed, error, tolerance] =
+            ["reference", "computed", "rel_error", "tolerance"].map(|k| row[k].as_f64().unwrap());
+        assert!(
+            (computed / reference - 1.0 - error).abs() < 1e-12,
+            "{row:?}"
+        );
+        assert!(error.abs() <= tolerance && row["nodes"].as_u64().unwrap() > 0);
+    }
+}
+
+/// A patch of 16 wedges in a cube of 1 m, with stresses that no law has.
+fn wrong_patch() -> Value {
+    let mut nodes = Vec::new();
+    for level in 0..3 {
+        for j in 0..3 {
+            for i in 0..3 {
+                nodes.push([i, j, level].map(|n: i32| 0.5 * f64::from(n)));
+            }
+        }
+    }
+    let mut wedges = Vec::new();
+    for below in [0, 9] {
+        for corner in [0, 1, 3, 4] {
+            for [a, b, c] in [[0, 1, 4], [0, 4, 3]] {
+                let lower = [a, b, c].map(|n| below + corner + n);
+                wedges.push([lower, lower.map(|n| n + 9)].concat());
+            }
+        }
+    }
+    let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    json!({
+        "nodes": nodes,
+        "wedges": wedges,
+        "E": 30e3,
+        "nu": 0.45,
+        "grad_u_small": [[1e-3, 0.0, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 1e-3]],
+        "sigma_small": unit,
+        "F_large": [[1.2, 0.1, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 1.1]],
+        "PK1_large": unit,
+    })
+}
+
+#[test]
+fn a_figure_out_of_tolerance_is_exit_code_1() {
+    let folder = TempDir::new().unwrap();
+    let table = folder.path().join("V_wedge_patch_test.json");
+    fs::write(table, wrong_patch().to_string()).unwrap();
+    let (code, stdout, stderr) = verify(folder.path(), &["v-patch", "--reference", "."]);
+    assert_eq!((code, stderr.as_str()), (1, ""), "{stdout}");
+    // Two against the stresses given; the others need none.
+    assert_eq!(stdout.matches("FAIL").count(), 2, "{stdout}");
+    assert!(stdout.ends_with("4 of 6 within tolerance\n"), "{stdout}");
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line() {
+    let folder = TempDir::new().unwrap();
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    for (args, said) in [
+        (
+            &["pach"][..],
+            "there is no case \"pach\"; the cases are patch, columns, ",
+        ),
+        (
+            &["patch", "--reference", "nowhere"],
+            "there is no folder \"nowhere\"",
+        ),
+        (&["B1"], "say where they are: --reference DIR"),
+        (
+            &["B1", "--reference", "empty"],
+            "empty/B1_homogeneous_block.csv",
+        ),
+    ] {
+        let (code, stdout, stderr) = verify(folder.path(), args);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{args:?}");
+        assert!(stderr.contains(said), "{args:?}: {stderr}");
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    }
+}
+
+#[test]
+fn the_list_names_every_case() {
+    let folder = TempDir::new().unwrap();
+    let (code, stdout, _) = verify(folder.path(), &["--list"]);
+    assert_eq!(code, 0);
+    for case in palpa_lab::verify::cases() {
+        let name = case.name.replace(' ', "-");
+        assert!(stdout.contains(&name) && stdout.contains(case.title));
+    }
+    let (_, stdout, _) = verify(folder.path(), &["--list", "--json", "B2"]);
+    let listed: Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(listed.as_array().unwrap().len(), 1);
+    assert_eq!(listed[0]["name"], "B2");
+    assert_eq!(listed[0]["needs_reference"], true);
+    assert!(!folder.path().join("out").exists());
+}

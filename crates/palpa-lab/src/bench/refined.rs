@@ -1,0 +1,178 @@
+//! The same problems on refined meshes: what a mesh does to a force.
+
+use palpa_fem::Outcome;
+use serde::Serialize;
+
+use super::cases::{Case, Grading, Shape, Tissue, cases};
+use super::ride::{Known, Ride, converged};
+use palpa_fem::FemError;
+
+/// What is pressed, whatever the mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Problem {
+    /// The layered block under the sphere of 10 mm radius.
+    Layers,
+    /// The same under that of 5 mm.
+    LayersSmall,
+    /// The hardening block.
+    Ogden,
+    /// The limb.
+    Limb,
+    /// The block of one tissue.
+    OneTissue,
+}
+
+/// Depths (m) and forces (N) of a pressed body on the refined mesh.
+pub type Curve = &'static [(f64, f64)];
+
+impl Problem {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Layers,
+        Self::LayersSmall,
+        Self::Ogden,
+        Self::Limb,
+        Self::OneTissue,
+    ];
+
+    /// The force straight down (N) at the depths of a ride, recorded from [`Self::compute`] (`palpa bench --refined`,
+    /// on 9,000 to 11,000 nodes).
+    pub fn recorded(self) -> Curve {
+        match self {
+            Self::Layers => &[
+                (2e-3, 0.18854),
+                (3e-3, 0.36059),
+                (4e-3, 0.59666),
+                (5e-3, 0.89424),
+            ],
+            Self::Ogden => &[
+                (2e-3, 0.17987),
+                (3e-3, 0.34737),
+                (4e-3, 0.58419),
+                (5e-3, 0.89522),
+            ],
+            Self::OneTissue => &[
+                (2e-3, 0.48624),
+                (3e-3, 0.91328),
+                (4e-3, 1.41811),
+                (5e-3, 1.99155),
+                (6e-3, 2.62103),
+            ],
+            // On the limb's mesh halved once, 32,000 nodes.
+            Self::Limb => &[
+                (2e-3, 0.16918),
+                (3e-3, 0.30497),
+                (4e-3, 0.48379),
+                (5e-3, 0.74066),
+            ],
+            // Not recorded yet: rows have no error of the mesh.
+            Self::LayersSmall => &[],
+        }
+    }
+
+    /// The recorded force (N) at a depth (m), where there is one.
+    pub fn force_at(self, depth: f64) -> Option<f64> {
+        let known = self
+            .recorded()
+            .iter()
+            .find(|known| (known.0 - depth).abs() < 1e-9);
+        known.map(|known| known.1)
+    }
+
+    /// The refined mesh.
+    fn shape(self, centre: [f64; 2]) -> Shape {
+        let grading = |spacing, ring| Grading {
+            spacing,
+            ring,
+            growth: 0.3,
+            levels: [(0.5e-3, 0.2), (0.8e-3, 0.35), (3e-3, 0.6)],
+            centre,
+            beside: [0.5, 0.3],
+        };
+        match self {
+            Self::Layers | Self::Ogden => Shape::Graded(grading(0.7e-3, 8e-3)),
+            Self::LayersSmall => Shape::Graded(grading(0.6e-3, 5e-3)),
+            Self::OneTissue => Shape::OneTissue(Grading {
+                levels: [(0.6e-3, 0.3); 3],
+                ..grading(0.7e-3, 7e-3)
+            }),
+            Self::Limb => Shape::Limb {
+                spacing: 3.6e-3,
+                intervals: 2,
+            },
+        }
+    }
+
+    /// Forces while the tool goes straight down, and the nodes of the mesh.
+    ///
+    /// # Errors
+    /// When the body cannot be computed with, and when a step does not converge.
+    pub fn compute(self) -> Result<(Vec<Known>, usize), RefinedError> {
+        let like = cases()
+            .iter()
+            .find(|case| case.problem == self)
+            .ok_or(RefinedError::NoCase)?;
+        let centre = like.ride().at;
+        let shape = self.shape([centre.x, centre.y]);
+        let case = Case {
+            shape,
+            way: [like.way[0], 0.0],
+            tissue: if like.tissue == Tissue::Relaxing {
+                Tissue::Elastic
+            } else {
+                like.tissue
+            },
+            ..like.clone()
+        };
+        let model = case.model()?;
+        let ride = Ride {
+            stroke: 0.0,
+            ..like.ride()
+        };
+        let known = converged(&model, &ride, f64::INFINITY, 1)
+            .map_err(|(at, outcome)| RefinedError::Outcome { at, outcome })?;
+        let pressed = known.into_iter().filter(|known| known.is_press).collect();
+        Ok((pressed, model.n_nodes()))
+    }
+}
+
+/// Why there are no forces on a refined mesh.
+#[derive(Debug)]
+pub enum RefinedError {
+    /// No case presses the problem.
+    NoCase,
+    /// The body cannot be computed with.
+    Fem(FemError),
+    /// A step did not converge.
+    Outcome {
+        /// Where on the way, m.
+        at: f64,
+        /// How it ended.
+        outcome: Outcome,
+    },
+}
+
+impl From<FemError> for RefinedError {
+    fn from(error: FemError) -> Self {
+        Self::Fem(error)
+    }
+}
+
+impl std::fmt::Display for RefinedError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoCase => write!(f, "no case presses this problem"),
+            Self::Fem(error) => error.fmt(f),
+            Self::Outcome { at, outcome } => {
+                write!(
+                    f,
+                    "{:.1} mm along the way the body did not converge: {outcome:?}",
+                    at * 1e3
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for RefinedError {}

@@ -1,0 +1,206 @@
+//! Force while moving: what the 1 kHz loop renders against the body's converged force at the same place.
+
+use anyhow::bail;
+use palpa_device::{Path, Scripted};
+use palpa_fem::{Load, Outcome, PosedTool, SolveParams, State, Workspace, advance};
+use palpa_servo::Vec3;
+use serde::Serialize;
+
+use palpa::live::{LiveScene, RehearsalParams, device_model, rehearse};
+use palpa_plot::{Axis, Chart, Picture, Series, panels};
+
+/// One moment of a trace. Forces along the device's z, out of the tissue.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TraceRow {
+    /// Clock. s
+    pub time_s: f64,
+    /// How far the tip is below the first touch. mm
+    pub depth_mm: f64,
+    /// How far it is across the skin along the device's x. mm
+    pub across_mm: f64,
+    /// Speed of the device. mm/s
+    pub speed_mm_s: f64,
+    /// Force that the loop commands. N
+    pub force_n: f64,
+    /// Force of the tissue's last step, at the pose of that step. N
+    pub step_force_n: f64,
+    /// Converged quasi-static force at the device's pose. N
+    pub static_force_n: f64,
+    /// Distance of the two vectors, commanded and converged. N
+    pub error_n: f64,
+    /// Vertices that touch in the loop's contact problem.
+    pub n_active: u32,
+    /// Sweeps over them, and the change of their forces in the last one, relative.
+    pub sweeps: u32,
+    /// See `sweeps`.
+    pub residual: f64,
+    /// Vertices that press in the tissue's last step, and its candidates.
+    pub step_active: usize,
+    /// See `step_active`.
+    pub step_candidates: usize,
+}
+
+impl TraceRow {
+    /// The error as a share of the converged force.
+    pub fn share(&self) -> f64 {
+        self.error_n / self.static_force_n.abs().max(1e-9)
+    }
+
+    /// Whether the error is within a share of the converged force, or so many newtons.
+    pub fn is_within(&self, share: f64, newtons: f64) -> bool {
+        self.error_n <= newtons || self.share() <= share
+    }
+}
+
+/// Moves an ideal device along a path, and solves for the converged force at every `every`-th tick, in order, from the one
+/// before; above the first touch (`above` under the device's origin, m) there is none. The steps of the tissue take the time that `params` says.
+///
+/// # Errors
+/// When the body cannot be factored, or no converged force is found.
+pub fn force_while_moving(
+    live: &LiveScene,
+    above: f64,
+    path: &Path,
+    params: &RehearsalParams,
+    every: usize,
+) -> anyhow::Result<Vec<TraceRow>> {
+    let mut tissue = live.tissue()?;
+    let spec = device_model(palpa_scene::DevicePreset::Ideal).spec;
+    let mut device = Scripted::new(path.clone(), spec);
+    let mut step_forces = Vec::new();
+    let ticks = rehearse(&mut tissue, &mut device, params, |tissue, input, _| {
+        let last = tissue
+            .last()
+            .map_or((0, 0), |r| (r.n_active, r.n_candidates));
+        step_forces.push((input.tick as usize, tissue.force(0).z, last));
+    });
+    let places = ticks.iter().step_by(every).map(|tick| tick.position);
+    let converged = converged_forces(live, above, places)?;
+    let mut rows = Vec::new();
+    for ((k, tick), truth) in ticks.iter().enumerate().step_by(every).zip(converged) {
+        let before = &ticks[k.saturating_sub(1)];
+        let known = step_forces.partition_point(|(at, ..)| *at <= k);
+        let step = known.checked_sub(1).map(|i| step_forces[i]);
+        rows.push(TraceRow {
+            time_s: tick.time,
+            depth_mm: (-tick.position.z - above) * 1e3,
+            across_mm: tick.position.x * 1e3,
+            speed_mm_s: (tick.position - before.position).norm() / params.servo.period * 1e3,
+            force_n: tick.force.z,
+            step_force_n: step.map_or(0.0, |s| s.1),
+            static_force_n: truth.z,
+            error_n: (tick.force - truth).norm(),
+            n_active: tick.report.n_active,
+            sweeps: tick.report.sweeps,
+            residual: tick.report.residual,
+            step_active: step.map_or(0, |s| s.2.0),
+            step_candidates: step.map_or(0, |s| s.2.1),
+        });
+    }
+    Ok(rows)
+}
+
+/// Converged quasi-static forces on the tool at places of the device, each found from the one before; N, in the device's
+/// frame. Above the first touch (`above` under the device's origin, m) there is none.
+///
+/// # Errors
+/// When at a place no converged force is found.
+pub fn converged_forces(
+    live: &LiveScene,
+    above: f64,
+    places: impl IntoIterator<Item = Vec3>,
+) -> anyhow::Result<Vec<Vec3>> {
+    let mut converged = Converged::new(live);
+    let force = |place: Vec3| {
+        if place.z > -above {
+            converged.let_go();
+            Ok(Vec3::zeros())
+        } else {
+            converged.force(place)
+        }
+    };
+    places.into_iter().map(force).collect()
+}
+
+/// The body's equilibria, one after the other.
+struct Converged<'a> {
+    live: &'a LiveScene,
+    state: State,
+    ws: Workspace,
+    before: PosedTool,
+}
+
+impl<'a> Converged<'a> {
+    fn new(live: &'a LiveScene) -> Self {
+        Self {
+            state: State::new(&live.model),
+            ws: Workspace::new(&live.model),
+            before: live.posed(Vec3::zeros()),
+            live,
+        }
+    }
+
+    /// Back at rest: without a force there is none of which a share could be out of balance.
+    fn let_go(&mut self) {
+        self.state = State::new(&self.live.model);
+        self.before = self.live.posed(Vec3::zeros());
+    }
+
+    /// Force on the tool at a place of the device, N, in the device's frame.
+    fn force(&mut self, position: Vec3) -> anyhow::Result<Vec3> {
+        let (before, after) = ([self.before], [self.live.posed(position)]);
+        let from = Load {
+            tools: &before,
+            ..Load::default()
+        };
+        let to = Load {
+            tools: &after,
+            ..Load::default()
+        };
+        let params = SolveParams::default();
+        let report = advance(
+            &self.live.model,
+            &mut self.state,
+            &mut self.ws,
+            &from,
+            &to,
+            &params,
+        );
+        if report.outcome != Outcome::Converged {
+            bail!("no converged force at {position:?}: {:?}", report.outcome);
+        }
+        self.before = after[0];
+        let turn = self.live.scene_from_device.rotation;
+        Ok(turn.inverse_transform_vector(&report.tool_forces[0]))
+    }
+}
+
+/// Force against time, and the error, of several traces.
+pub fn trace_picture(title: &str, traces: &[(&str, Vec<TraceRow>)]) -> Picture {
+    let mut charts = Vec::new();
+    for (name, rows) in traces {
+        let line = |value: fn(&TraceRow) -> f64| -> Vec<[f64; 2]> {
+            rows.iter().map(|r| [r.time_s, value(r)]).collect()
+        };
+        charts.push(
+            Chart::new(
+                Axis::linear("time [s]"),
+                Axis::linear("force [N]").with_zero(),
+            )
+            .title(*name)
+            .line("1 kHz loop", line(|r| r.force_n))
+            .series(Series::new("tissue's step", line(|r| r.step_force_n)))
+            .series(Series::new("converged", line(|r| r.static_force_n)).dashed()),
+        );
+        charts.push(
+            Chart::new(
+                Axis::linear("time [s]"),
+                Axis::linear("error [N]").with_zero(),
+            )
+            .title(format!("{name}: error"))
+            .line("error", line(|r| r.error_n))
+            .series(Series::new("5 %", line(|r| 0.05 * r.static_force_n.abs())).dashed()),
+        );
+    }
+    panels(title, &charts, 2)
+}

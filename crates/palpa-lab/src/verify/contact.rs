@@ -1,0 +1,141 @@
+//! The laws of contact, on a sphere and a punch pressed into a block and dragged along it.
+
+use palpa_fem::law::NeoHookean;
+use palpa_fem::shape::{FlatPunch, Pose, Shape, Sphere, Tool};
+use palpa_fem::{Load, Material, PosedTool, StepReport};
+use palpa_mesh::LayeredBody;
+use palpa_mesh::generate::{GradedBlock, GradedLayer, LevelStack, Outline, graded_block};
+
+use crate::verify::press::Pressed;
+use crate::verify::tolerance::{LOAD_STEPS, PENETRATION};
+use crate::verify::{Findings, Options, Row, VerifyError};
+
+const CASE: &str = "contact";
+const DEPTH: f64 = 4e-3;
+
+fn body() -> LayeredBody {
+    let block = GradedBlock {
+        outline: Outline::Square,
+        half_width: 0.05,
+        centre: [0.0; 2],
+        ring_radius: Some(9e-3),
+        spacing: 1.5e-3,
+        inner_growth: 0.0,
+        growth: 0.6,
+        jitter: None,
+    };
+    let levels = LevelStack::graded(&[GradedLayer {
+        thickness: 0.04,
+        first_height: 2e-3,
+        growth: 0.4,
+    }]);
+    graded_block(&block, &levels)
+}
+
+pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
+    let body = body();
+    let mut findings = Findings::default();
+    let sphere = Shape::from(Sphere::new(0.01).expect("valid size"));
+    let punch = Shape::from(FlatPunch::new(8e-3, 5e-3).expect("valid sizes"));
+    for (name, shape) in [("sphere", sphere), ("rounded punch", punch)] {
+        let mut forces = Vec::new();
+        for n_steps in [1, 4, 16] {
+            let (report, nodes) = pressed(&body, shape, 0.0, n_steps, 0.0)?;
+            if n_steps == 4 {
+                residuals(&mut findings, &format!("{name}, smooth"), &report, nodes);
+            }
+            forces.push((n_steps, report.tool_forces[0].z, nodes));
+        }
+        let (_, finest, _) = forces[2];
+        for &(n_steps, force, nodes) in &forces[..2] {
+            findings.rows.push(Row::ratio(
+                CASE,
+                format!("{name}, smooth: force in {n_steps} load steps against 16, N"),
+                finest,
+                force,
+                LOAD_STEPS,
+                nodes,
+            ));
+        }
+        let (report, nodes) = pressed(&body, shape, 0.4, 4, 0.0)?;
+        residuals(
+            &mut findings,
+            &format!("{name}, friction 0.4"),
+            &report,
+            nodes,
+        );
+    }
+    // Dragged along: vertices slide, stick and let go.
+    for (name, shape) in [("sphere", sphere), ("rounded punch", punch)] {
+        let (report, nodes) = pressed(&body, shape, 0.4, 4, 3e-3)?;
+        let what = format!("{name}, friction 0.4, dragged 3 mm");
+        residuals(&mut findings, &what, &report, nodes);
+    }
+    Ok(findings)
+}
+
+/// Presses in equal steps, then drags along x; gives the last report.
+fn pressed(
+    body: &LayeredBody,
+    shape: Shape,
+    friction: f64,
+    n_steps: u32,
+    drag: f64,
+) -> Result<(StepReport, usize), VerifyError> {
+    let law = NeoHookean::from_young(30e3, 0.45).expect("valid constants");
+    let mut pressed = Pressed::layered(body, vec![Material::new("tissue", law)])?;
+    let tool = Tool::new(shape, friction).expect("valid friction");
+    let mut report = None;
+    for i in 1..=n_steps {
+        let depth = DEPTH * f64::from(i) / f64::from(n_steps);
+        report = Some(pressed.press(tool, [0.0; 2], depth)?);
+    }
+    for i in 1..=4 {
+        if drag > 0.0 {
+            let x = drag * f64::from(i) / 4.0;
+            let tools = [PosedTool {
+                tool,
+                pose: Pose::translation(x, 0.0, -DEPTH),
+            }];
+            let load = Load {
+                tools: &tools,
+                ..Load::default()
+            };
+            report = Some(pressed.step(&load, "dragged tool")?);
+        }
+    }
+    Ok((report.expect("at least one step"), pressed.nodes()))
+}
+
+fn residuals(findings: &mut Findings, what: &str, report: &StepReport, nodes: usize) {
+    let force = report.tool_forces[0].norm();
+    let contact = &report.contact;
+    for (quantity, value, tolerance) in [
+        ("gap at active vertices, m", contact.gap, PENETRATION),
+        (
+            "penetration at open vertices, m",
+            contact.penetration,
+            PENETRATION,
+        ),
+        ("largest pull, of the force", contact.tension / force, 1e-6),
+        (
+            "largest friction beyond the cone, of the force",
+            contact.cone / force,
+            1e-6,
+        ),
+        (
+            "friction that does not oppose slip, as a share of it",
+            contact.slip,
+            1e-3,
+        ),
+    ] {
+        findings.rows.push(Row::with_error(
+            CASE,
+            format!("{what}: {quantity}"),
+            [0.0, value],
+            value.max(0.0),
+            tolerance,
+            nodes,
+        ));
+    }
+}

@@ -1,0 +1,193 @@
+//! Layers of linear material under punches, pressures and spheres at small strain: what A1 to A3 share.
+
+use palpa_fem::law::Linear;
+use palpa_fem::shape::{Sphere, Tool};
+use palpa_fem::{Load, Material, Materials};
+use palpa_mesh::Vec3;
+
+use crate::verify::VerifyError;
+use crate::verify::press::Pressed;
+use crate::verify::sector::{Finest, Outline, Sector};
+
+/// Balance of forces, as a share of those that hold the body. Rounding over a wide body is worse than over a small one.
+const TOLERANCE: f64 = 1e-4;
+
+/// Share of the disc's radius that a sphere should touch: vertices are fine where its contact ends, which matters.
+pub(crate) const TOUCHED: f64 = 0.9;
+/// Edges to the disc's radius on which results are quoted, and with which they are studied: under punches and pressures,
+/// where the rim counts, and under spheres.
+const RIM: usize = 16;
+const INSIDE: usize = 10;
+const AROUND: usize = 8;
+/// Sizes of the meshes on which errors are studied, over the one on which results are quoted.
+pub(crate) const STUDIED: [f64; 4] = [2.0, 1.5, 1.0, 0.75];
+
+/// All that is measured is that of a sixth.
+const N_SECTORS: f64 = 6.0;
+
+/// A layer: thickness (m), Young's modulus (Pa) and Poisson's ratio.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layer {
+    pub(crate) thickness: f64,
+    pub(crate) young: f64,
+    pub(crate) nu: f64,
+}
+
+impl Layer {
+    fn material(&self) -> Material {
+        let law = Linear::from_young(self.young, self.nu).expect("valid constants");
+        Material::new(format!("{:.0} Pa", self.young), law)
+    }
+}
+
+/// What a press measures, and on how many nodes that can move.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    pub(crate) value: f64,
+    pub(crate) nodes: usize,
+}
+
+/// A sixth of a wide stack of layers with a disc in its middle.
+pub(crate) struct Stack {
+    pub(crate) sector: Sector,
+    layers: Vec<Layer>,
+}
+
+impl Stack {
+    /// With a disc of radius `ring` m; edges are `size` times as long as where results are quoted.
+    pub(crate) fn new(ring: f64, size: f64, finest: Finest, width: f64, layers: &[Layer]) -> Self {
+        let thicknesses: Vec<f64> = layers.iter().map(|l| l.thickness).collect();
+        let n = match finest {
+            Finest::Rim => RIM,
+            Finest::Inside => INSIDE,
+            Finest::Around => AROUND,
+        };
+        let n = (n as f64 / size).round() as usize;
+        Self {
+            sector: Sector::new(Outline::Round, ring, n, finest, width, &thicknesses),
+            layers: layers.to_vec(),
+        }
+    }
+
+    fn pressed(&self) -> Result<Pressed, VerifyError> {
+        let materials = Materials::of_layers(self.layers.iter().map(Layer::material).collect());
+        let Sector { body, supports, .. } = &self.sector;
+        let mut pressed = Pressed::new(body, &materials, supports)?;
+        pressed.params.tolerance = TOLERANCE;
+        Ok(pressed)
+    }
+
+    /// Stiffness against a flat punch on the disc under which tissue slides freely, N/m.
+    pub(crate) fn punch(&self) -> Result<Measured, VerifyError> {
+        let Sector { body, ring, .. } = &self.sector;
+        let mut pressed = self.pressed()?;
+        let patch = self.sector.patch.iter();
+        let guided: Vec<(usize, Vec3, f64)> = patch
+            .map(|&v| (body.node(v as usize, 0), Vec3::z(), -ring))
+            .collect();
+        let load = Load {
+            guided: &guided,
+            ..Load::default()
+        };
+        let report = pressed.step(&load, "smooth flat punch")?;
+        Ok(Measured {
+            value: N_SECTORS * report.held_force.z / ring,
+            nodes: pressed.nodes(),
+        })
+    }
+
+    /// Stiffness against a disc that is bonded, N/m.
+    pub(crate) fn bonded(&self) -> Result<Measured, VerifyError> {
+        let Sector { patch, ring, .. } = &self.sector;
+        let mut pressed = self.pressed()?;
+        let force = pressed.hold_down(patch, *ring)?;
+        Ok(Measured {
+            value: N_SECTORS * force / ring,
+            nodes: pressed.nodes(),
+        })
+    }
+
+    /// The ring of vertices next to `radius`: its radius, and its mean displacement along the radius and downwards, m.
+    pub(crate) fn ring_displacement(&self, pressed: &Pressed, radius: f64) -> (f64, [f64; 2]) {
+        let body = &self.sector.body;
+        let nearest = body
+            .skin
+            .points
+            .iter()
+            .map(palpa_mesh::Vec3::norm)
+            .min_by(|a, b| (a - radius).abs().total_cmp(&(b - radius).abs()))
+            .expect("there are vertices");
+        let (mut sum, mut n) = ([0.0; 2], 0.0);
+        for (v, p) in body.skin.points.iter().enumerate() {
+            if (p.norm() - nearest).abs() <= 1e-9 * nearest {
+                let u = pressed.state.displacements[body.node(v, 0)];
+                sum[0] += u.dot(&p.normalize());
+                sum[1] -= u.z;
+                n += 1.0;
+            }
+        }
+        (nearest, sum.map(|u| u / n))
+    }
+
+    /// The stack under 1 N that is spread evenly over the disc, and its mean indentation, m.
+    pub(crate) fn under_pressure(&self) -> Result<(Pressed, f64), VerifyError> {
+        let Sector { body, patch, .. } = &self.sector;
+        let mut pressed = self.pressed()?;
+        let mut forces = vec![Vec3::zeros(); body.n_nodes()];
+        let mut total = 0.0;
+        for (t, triangle) in body.skin.triangles.iter().enumerate() {
+            if triangle.iter().all(|v| patch.binary_search(v).is_ok()) {
+                let area = body.skin.area_vector(t).norm();
+                total += area;
+                for &v in triangle {
+                    forces[body.node(v as usize, 0)].z -= area / 3.0;
+                }
+            }
+        }
+        for force in &mut forces {
+            *force /= N_SECTORS * total;
+        }
+        let load = Load {
+            forces: &forces,
+            ..Load::default()
+        };
+        pressed.step(&load, "disc under pressure")?;
+        let work: f64 = forces
+            .iter()
+            .zip(&pressed.state.displacements)
+            .map(|(force, u)| force.dot(u))
+            .sum();
+        Ok((pressed, N_SECTORS * work))
+    }
+
+    /// Force on a paraboloid r²/2R whose tip is `depth` below the plane, N. It should touch nearly all of the disc, see
+    /// [`TOUCHED`]. It is solved for a depth of `shallow` radii of the disc: so little that vertices hardly slide along the
+    /// sphere. Linear material has no scale of its own, and the force is carried over to the depth that is asked for.
+    pub(crate) fn paraboloid(
+        &self,
+        radius: f64,
+        depth: f64,
+        shallow: f64,
+    ) -> Result<Measured, VerifyError> {
+        let Sector { body, ring, .. } = &self.sector;
+        let mut pressed = self.pressed()?;
+        // So shallow a sphere is a paraboloid that touches the same place; the force is smaller by the scale.
+        let shallow = shallow * ring;
+        let scale = shallow / depth;
+        let radius = radius / scale;
+        let tool = Tool::new(Sphere::new(radius).expect("valid size"), 0.0).expect("no friction");
+        pressed.params.gap_tolerance = 1e-6 * shallow;
+        // A guess of what touches, so that the search for it is short: all of the disc, and nothing outside.
+        for (v, p) in body.skin.points.iter().enumerate() {
+            let r = p.norm();
+            let apart = if r <= *ring { -1e-3 } else { 1e-3 };
+            let surface = p.norm_squared() / (2.0 * radius) - shallow;
+            pressed.state.displacements[body.node(v, 0)].z = (surface - apart * shallow).min(0.0);
+        }
+        let report = pressed.press(tool, [0.0; 2], shallow)?;
+        Ok(Measured {
+            value: N_SECTORS * report.tool_forces[0].z / scale,
+            nodes: pressed.nodes(),
+        })
+    }
+}

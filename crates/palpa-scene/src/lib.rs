@@ -1,0 +1,59 @@
+//! Scene file, units and the tissue catalogue.
+//!
+//! A scene is a TOML file that says which body is pressed, of which layers it is made, and how it is pressed. What
+//! [`Scene::load`] returns is complete and valid: lengths are metres, tissues are looked up, defaults are filled in.
+//!
+//! ```
+//! use palpa_scene::Scene;
+//!
+//! let scene = Scene::parse(
+//!     r#"
+//!     [body]
+//!     surface = "skin.ply"
+//!     [[layer]]
+//!     tissue = "muscle"
+//!     thickness = "20 mm"
+//!     "#,
+//!     "bodies".as_ref(),
+//! )?;
+//! assert_eq!(scene.layers[0].tissue.young(), Some(22e3)); // Pa
+//! # Ok::<(), palpa_scene::SceneError>(())
+//! ```
+
+pub mod units;
+
+mod catalogue;
+mod error;
+mod file;
+mod frame;
+mod law;
+mod limits;
+mod lump;
+mod model;
+mod motion;
+mod resolve;
+mod scene;
+mod schema;
+mod status;
+mod thickness;
+mod tissue;
+mod tool;
+mod write;
+
+pub use catalogue::catalogue;
+pub use error::{Place, SceneError};
+pub use lump::{Lump, LumpPlace, LumpShape};
+pub use model::{Damping, Dynamics, Mesh, Model, ModelKind};
+pub use motion::{Device, DeviceKind, DevicePreset, Grip, Motion, MotionKind};
+pub use scene::{
+    Body, CutFaces, Cutout, Generator, InPlane, Layer, LengthUnit, Press, Reference, Scene, Skin,
+    Solver, Target,
+};
+pub use schema::scene_schema;
+pub use status::{MaterialStatus, Parameter};
+pub use thickness::{Thickness, ThicknessError, ThicknessSample, read_thickness};
+pub use tissue::{
+    Elastic, Energy, Law, Moduli, OgdenTerm, Prony, PronyTerm, Resistance, Sourced, Status,
+    Stiffness, Tissue, Volume,
+};
+pub use tool::{ContactShape, ContactTool, Tool};

@@ -1,0 +1,198 @@
+//! A scene as JSON, and changes of it: the keys are those of a scene file, and so are the errors.
+
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use palpa_scene::{Scene, SceneError};
+use palpa_viewer::control::Edit;
+use serde_json::{Map, Value};
+
+/// Longest list that an edit may make: a scene is written by hand.
+const MOST_ITEMS: usize = 100;
+
+/// The scene with every key.
+///
+/// # Errors
+/// Never for a scene that was read; scenes made by programs may hold what TOML cannot say.
+pub fn to_json(scene: &Scene) -> anyhow::Result<Value> {
+    as_json(&scene.to_toml_in_full())
+}
+
+fn as_json(text: &str) -> anyhow::Result<Value> {
+    let table: toml::Value = toml::from_str(text)?;
+    Ok(serde_json::to_value(table)?)
+}
+
+/// The scene after the edits, in order; none counts if one fails.
+///
+/// # Errors
+/// Which edit leads nowhere, or what is wrong with the scene that they make.
+pub fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
+    let in_full = to_json(scene)?;
+    let mut value = in_full.clone();
+    for edit in edits {
+        apply(&mut value, edit).with_context(|| format!("edit of \"{}\"", edit.path))?;
+    }
+    name_again(&mut value, &in_full, &as_json(&scene.to_toml())?);
+    let text = toml::to_string(&without_nulls(value)).context("the edits make no scene file")?;
+    Ok(Scene::parse(&text, &scene.base_dir).map_err(SceneError::by_key)?)
+}
+
+/// Tissues that are as they were get their names back, and with them what the catalogue knows of their sources.
+fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
+    for list in ["layer", "lump"] {
+        let tissues = |scene: &Value| -> Vec<Value> {
+            let items = scene[list].as_array().map_or(&[][..], Vec::as_slice);
+            items.iter().map(|item| item["tissue"].clone()).collect()
+        };
+        let before: Vec<_> = tissues(in_full).into_iter().zip(tissues(named)).collect();
+        for item in value[list].as_array_mut().into_iter().flatten() {
+            let same = before.iter().find(|(full, _)| *full == item["tissue"]);
+            if let (Some((_, name)), Some(item)) = (same, item.as_object_mut()) {
+                item.insert("tissue".to_owned(), name.clone());
+            }
+        }
+    }
+}
+
+/// A scene from text, with the error in one line.
+///
+/// # Errors
+/// What is wrong with it, and where.
+pub fn parsed(text: &str, base: &Path) -> anyhow::Result<Scene> {
+    Ok(Scene::parse(text, base)?)
+}
+
+fn apply(scene: &mut Value, edit: &Edit) -> anyhow::Result<()> {
+    let Some(path) = edit.path.strip_prefix('/') else {
+        bail!("a path begins with \"/\", as \"/layer/1/tissue/young\"");
+    };
+    let keys: Vec<String> = path
+        .split('/')
+        .map(|key| key.replace("~1", "/").replace("~0", "~"))
+        .collect();
+    let (last, parents) = keys.split_last().context("the path names nothing")?;
+    let mut at = scene;
+    for (key, child) in parents.iter().zip(&keys[1..]) {
+        at = match at {
+            Value::Object(table) => {
+                let next = table.entry(key.as_str()).or_insert(Value::Null);
+                if next.is_null() {
+                    *next = if child == "-" {
+                        Value::Array(Vec::new())
+                    } else {
+                        Value::Object(Map::new())
+                    };
+                }
+                next
+            }
+            Value::Array(list) => {
+                let n = list.len();
+                let found = key.parse::<usize>().ok().and_then(|i| list.get_mut(i));
+                found.with_context(|| format!("there is no item {key} among {n}"))?
+            }
+            _ => bail!("\"{key}\" is inside a value that has no keys"),
+        };
+    }
+    put(at, last, edit.value.clone())
+}
+
+fn put(at: &mut Value, key: &str, value: Value) -> anyhow::Result<()> {
+    match at {
+        Value::Object(table) => {
+            if value.is_null() {
+                table.remove(key);
+            } else {
+                table.insert(key.to_owned(), value);
+            }
+        }
+        Value::Array(list) if key == "-" => {
+            if list.len() >= MOST_ITEMS {
+                bail!("there are {MOST_ITEMS} already");
+            }
+            list.push(value);
+        }
+        Value::Array(list) => {
+            let n = list.len();
+            let i = key.parse::<usize>().ok().filter(|&i| i < n);
+            let i = i.with_context(|| format!("there is no item {key} among {n}"))?;
+            if value.is_null() {
+                list.remove(i);
+            } else {
+                list[i] = value;
+            }
+        }
+        _ => bail!("\"{key}\" is inside a value that has no keys"),
+    }
+    Ok(())
+}
+
+/// TOML has no null: what is null is not there.
+fn without_nulls(value: Value) -> Value {
+    match value {
+        Value::Object(table) => Value::Object(
+            table
+                .into_iter()
+                .filter(|(_, v)| !v.is_null())
+                .map(|(k, v)| (k, without_nulls(v)))
+                .collect(),
+        ),
+        Value::Array(list) => Value::Array(list.into_iter().map(without_nulls).collect()),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn edit(path: &str, value: Value) -> Edit {
+        Edit {
+            path: path.to_owned(),
+            value,
+        }
+    }
+
+    #[test]
+    fn a_modulus_of_a_tissue_of_the_catalogue_can_be_changed() {
+        let scene = Scene::embedded();
+        let softer = edited(&scene, &[edit("/layer/0/tissue/young", json!("50 kPa"))]).unwrap();
+        assert!((softer.layers[0].tissue.young().unwrap() - 50e3).abs() < 1e-9);
+        assert_eq!(softer.layers[1..], scene.layers[1..]);
+    }
+
+    #[test]
+    fn lumps_come_and_go() {
+        let scene = Scene::embedded();
+        let lump = json!({ "name": "a", "shape": "sphere", "radius": "5 mm", "below": ["120 mm", "0 mm", "40 mm"],
+            "depth": "12 mm", "tissue": "fibrous lump" });
+        let one = edited(&scene, &[edit("/lump/-", lump.clone())]).unwrap();
+        let two = edited(
+            &one,
+            &[edit("/lump/-", lump), edit("/lump/1/name", json!("b"))],
+        )
+        .unwrap();
+        assert_eq!(two.lumps.len(), 2);
+        let left = edited(&two, &[edit("/lump/0", Value::Null)]).unwrap();
+        assert_eq!(left.lumps[0].name, "b");
+    }
+
+    #[test]
+    fn what_leads_nowhere_or_is_no_scene_is_refused_in_words() {
+        let scene = Scene::embedded();
+        let words = |path: &str, value: Value| {
+            let error = edited(&scene, &[edit(path, value)]).unwrap_err();
+            palpa::one_paragraph(&error)
+        };
+        assert!(words("layer", json!(1)).contains("begins with"));
+        assert!(words("/layer/9/levels", json!(1)).contains("no item 9"));
+        assert!(words("/layer/0/levels/x", json!(1)).contains("has no keys"));
+        let apples = words("/layer/0/tissue/young", json!("12 apples"));
+        assert!(
+            apples.contains("apples") && apples.contains("scene: layer[0]"),
+            "{apples}"
+        );
+        assert!(words("/nonsense", json!(1)).contains("nonsense"));
+    }
+}

@@ -1,0 +1,132 @@
+//! What the server sees of the session: a channel.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Sender, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use palpa_fem::Model;
+use palpa_mesh::{LayeredBody, Vec3};
+use palpa_rt::Table;
+use palpa_viewer::control::Request;
+use palpa_viewer::{Answer, Clients, Host, HostFile};
+
+use crate::world::World;
+use palpa_plot::vtu::Grid;
+
+/// How long a file may wait for the session.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// What the session is told.
+pub(super) enum Order {
+    Request(Request, Answer),
+    Clients(Clients),
+    File(HostFile, SyncSender<Option<Material>>),
+    /// A scene was built, or why not.
+    Built(Box<anyhow::Result<World>>),
+    Stop,
+}
+
+/// What a file is made of.
+pub(super) enum Material {
+    Scene(String),
+    Tissue(Arc<Model>, Vec<Vec3>),
+    Springs(Box<LayeredBody>, Vec<Vec3>),
+    Log(PathBuf),
+}
+
+/// The session's end that the server holds.
+#[derive(Debug)]
+pub struct Remote {
+    pub(super) orders: Sender<Order>,
+    pub(super) problem: Arc<Mutex<Option<String>>>,
+}
+
+impl Host for Remote {
+    fn request(&self, request: Request, answer: Answer) {
+        // A session that is gone answers nothing: the server goes with it.
+        let _ = self.orders.send(Order::Request(request, answer));
+    }
+
+    fn clients(&self, clients: Clients) {
+        let _ = self.orders.send(Order::Clients(clients));
+    }
+
+    fn file(&self, file: HostFile) -> Result<Option<Vec<u8>>, String> {
+        let (reply, material) = sync_channel(1);
+        let _ = self.orders.send(Order::File(file, reply));
+        let material = material
+            .recv_timeout(PATIENCE)
+            .map_err(|_| "the session does not answer; try again".to_owned())?;
+        let Some(material) = material else {
+            return Ok(None);
+        };
+        written(file, material)
+            .map(Some)
+            .map_err(|e| palpa::one_paragraph(&e))
+    }
+
+    fn problem(&self) -> Option<String> {
+        let problem = self.problem.lock();
+        problem.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+fn written(file: HostFile, material: Material) -> anyhow::Result<Vec<u8>> {
+    Ok(match material {
+        Material::Scene(text) => text.into_bytes(),
+        Material::Tissue(model, displacements) => vtu(model.body(), &displacements)?,
+        Material::Springs(body, displacements) => vtu(&body, &displacements)?,
+        Material::Log(path) if file == HostFile::RecordingCsv => {
+            let folder = tempfile::tempdir()?;
+            palpa_rt::export(&path, folder.path(), Table::Csv)?;
+            joined(
+                &std::fs::read_to_string(folder.path().join("ticks.csv"))?,
+                &std::fs::read_to_string(folder.path().join("device0.csv"))?,
+            )
+        }
+        Material::Log(path) => std::fs::read(path)?,
+    })
+}
+
+/// Two tables with a row per tick side by side; the second's first column is the tick again, and columns of its that are named as
+/// one of the first say that they are the device's.
+fn joined(ticks: &str, device: &str) -> Vec<u8> {
+    let mut out = String::with_capacity(ticks.len() + device.len());
+    for (row, (a, b)) in ticks.lines().zip(device.lines()).enumerate() {
+        out.push_str(a);
+        for cell in b.split(',').skip(1) {
+            let is_twice = row == 0 && a.split(',').any(|name| name == cell);
+            out.push_str(if is_twice { ",device_" } else { "," });
+            out.push_str(cell);
+        }
+        out.push('\n');
+    }
+    out.into_bytes()
+}
+
+fn vtu(body: &LayeredBody, displacements: &[Vec3]) -> anyhow::Result<Vec<u8>> {
+    let at: Vec<Vec3> = (body.positions.iter().zip(displacements))
+        .map(|(x, u)| x + u)
+        .collect();
+    let mut out = Vec::new();
+    Grid::of_body(body, &at)
+        .with_point_vectors("displacement", displacements)
+        .write(&mut out)?;
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::joined;
+
+    #[test]
+    fn tables_are_joined_with_each_name_once() {
+        let table = joined(
+            "tick,now,faults\n1,0.5,0\n",
+            "tick,force_x,faults\n1,2.5,1\n",
+        );
+        let wanted = "tick,now,faults,force_x,device_faults\n1,0.5,0,2.5,1\n";
+        assert_eq!(String::from_utf8(table).unwrap(), wanted);
+    }
+}

@@ -1,0 +1,142 @@
+//! The scene's device, and the way of the hand that holds it.
+
+use palpa_device::{DeviceModel, Grip, Path};
+use palpa_scene::{DevicePreset, Motion, MotionKind, Scene};
+use palpa_servo::{Pose, Vec3};
+
+/// Rest over the skin between two motions, s.
+const PAUSE: f64 = 0.3;
+/// Rest at the beginning, s, while the force is let in.
+const BEGIN: f64 = 0.7;
+/// The hand ends pressed and still for so long, s, so that a force that does not come to rest shows.
+const STILL: f64 = 3.5;
+/// Circles of a palpation: radius, m, and per second.
+const CIRCLE: f64 = 2e-3;
+const CIRCLES: f64 = 2.0;
+/// Seed of the hand's tremor.
+const SEED: u64 = 7;
+
+/// The figures of the scene's device.
+pub fn device_model(preset: DevicePreset) -> DeviceModel {
+    match preset {
+        DevicePreset::Falcon => DeviceModel::FALCON,
+        DevicePreset::Touch => DeviceModel::TOUCH,
+        DevicePreset::Inverse3 => DeviceModel::INVERSE3,
+        DevicePreset::Ideal => DeviceModel::IDEAL,
+    }
+}
+
+/// The figures of the hand that holds it.
+pub fn grip(grip: palpa_scene::Grip) -> Grip {
+    match grip {
+        palpa_scene::Grip::Soft => Grip::SOFT,
+        palpa_scene::Grip::Medium => Grip::MEDIUM,
+        palpa_scene::Grip::Stiff => Grip::STIFF,
+    }
+}
+
+/// The way of the hand in the device's frame: the scene's motion over and over for `seconds`, and at the end pressed and
+/// still.
+pub fn path(scene: &Scene, scene_from_device: &Pose, seconds: f64) -> Path {
+    let motion = &scene.motion;
+    let across = across(motion, scene_from_device);
+    let mut path = Path::from(start(motion, &across)).hold(BEGIN);
+    let press_time = 1.875 * (motion.above + motion.depth) / motion.speed;
+    let until = seconds - STILL - press_time;
+    let mut length = 0.0;
+    while path.duration() + length < until {
+        let began = path.duration();
+        path = once(path, motion, &across).hold(PAUSE);
+        length = path.duration() - began;
+    }
+    let down = Vec3::z() * -(motion.above + motion.depth);
+    let end = path.end();
+    let rest = (until - 0.5 - path.duration()).max(0.0);
+    path = path.hold(rest);
+    path = path
+        .to(Vec3::new(0.0, 0.0, end.z), motion.speed)
+        .to(down, motion.speed)
+        .hold(STILL + 10.0);
+    if motion.tremor > 0.0 {
+        let still_from = seconds - STILL;
+        path = path.trembling(motion.tremor, SEED, 0.0, still_from);
+    }
+    path
+}
+
+/// The scene's motion once, from where the hand is (m, in the device's frame) to where it begins, and back there.
+pub fn once_from(at: Vec3, scene: &Scene, scene_from_device: &Pose) -> Path {
+    let across = across(&scene.motion, scene_from_device);
+    let begin = start(&scene.motion, &across);
+    let path = Path::from(at).to(begin, scene.motion.speed).hold(PAUSE);
+    once(path, &scene.motion, &across)
+}
+
+/// The unit vector in the device's plane along which the hand goes across.
+fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
+    let along = motion.along.map_or(Vec3::x(), |along| {
+        scene_from_device
+            .rotation
+            .inverse_transform_vector(&Vec3::from(along))
+    });
+    Vec3::new(along.x, along.y, 0.0)
+        .try_normalize(1e-6)
+        .unwrap_or_else(Vec3::x)
+}
+
+/// Where the hand begins, in the device's frame, m.
+pub(super) fn beginning(scene: &Scene, scene_from_device: &Pose) -> Vec3 {
+    start(&scene.motion, &across(&scene.motion, scene_from_device))
+}
+
+fn start(motion: &Motion, across: &Vec3) -> Vec3 {
+    if motion.kind.goes_across() {
+        across * (-0.5 * motion.length)
+    } else {
+        Vec3::zeros()
+    }
+}
+
+/// The motion once, from the end of the path on and back over the skin.
+fn once(mut path: Path, motion: &Motion, across: &Vec3) -> Path {
+    let (from, speed) = (start(motion, across), motion.speed);
+    let down = Vec3::z() * -(motion.above + motion.depth);
+    let to = from + across * motion.length;
+    match motion.kind {
+        MotionKind::Press => path.to(down, speed).hold(motion.hold).to(from, speed),
+        MotionKind::Stroke => path
+            .to(from + down, speed)
+            .to(to + down, speed)
+            .to(to, speed)
+            .to(from, speed),
+        MotionKind::Drag => {
+            path = path.to(from + down, speed);
+            for _ in 0..motion.times {
+                path = path.to(to + down, speed).to(from + down, speed);
+            }
+            path.to(from, speed)
+        }
+        MotionKind::Tap => {
+            for _ in 0..motion.times {
+                path = path.to(down, speed).to(from, speed).hold(0.1);
+            }
+            path
+        }
+        MotionKind::Palpate => {
+            let side = Vec3::z().cross(across);
+            for k in 0..motion.times {
+                let share = f64::from(k) / f64::from(motion.times.max(2) - 1);
+                let over = from + (to - from) * share;
+                path = path.to(over, speed).to(over + down, speed);
+                let (began, ends) = (path.duration(), path.duration() + motion.hold);
+                let quarter = std::f64::consts::FRAC_PI_2;
+                path = path
+                    .hold(motion.hold)
+                    .with_wave(across * CIRCLE, CIRCLES, 0.0, began, ends)
+                    .with_wave(side * CIRCLE, CIRCLES, quarter, began, ends)
+                    .to(over, speed);
+            }
+            path.to(from, speed)
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! A scene in real time: the moving step behind the engine's [`palpa_rt::Tissue`], in the frame of a device.
+//!
+//! ```text
+//! scene ─► body, fine along the hand's way or where the tool is ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand
+//! ```
+//! The device's frame is that of the tool where it presses: z out of the tissue, x along the tool's length. Its origin is
+//! where the tool's tip hangs, [`palpa_scene::Motion::above`] over the first touch.
+
+mod fine;
+mod hand;
+mod record;
+mod rehearsal;
+mod springs;
+mod tissue;
+mod watch;
+
+pub use fine::FineScene;
+pub use hand::{device_model, grip, once_from, path};
+pub use record::{FileState, changed_files, notes_of, scene_of};
+pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
+pub use springs::{SpringScene, SpringTissue};
+pub use tissue::LiveTissue;
+pub use watch::{Look, Seen, Watch};
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, bail};
+use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
+use palpa_fem::shape::Tool as RigidTool;
+use palpa_fem::{Model, PosedTool};
+use palpa_mesh::{SurfaceIndex, Vec3};
+use palpa_scene::{Scene, Tool};
+use palpa_servo::Pose;
+
+use crate::build::{BuiltBody, build_within, in_mm, nearest};
+use crate::press::column_length;
+use crate::press::mesh::along_skin;
+use crate::press::tissue::Indentation;
+
+/// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
+/// least so much, m.
+const ZONE_RADII: f64 = 1.2;
+const LEAST_ZONE: f64 = 12e-3;
+/// How far a tool may go in a step of the tissue with the force at the device within about 2 % of the converged one, m: see
+/// "Force while moving" in docs/realtime.md.
+pub const GOOD_TRAVEL: f64 = 0.2e-3;
+/// A body of more nodes takes gigabytes, and a step of it longer than a patch may be old.
+const MOST_NODES: usize = 80_000;
+/// Distance of the points along the hand's way at which the body is made fine, m.
+const WAY_STEP: f64 = 4e-3;
+
+/// A scene set up for real time.
+#[derive(Debug)]
+pub struct LiveScene {
+    /// The body with its materials.
+    pub model: Arc<Model>,
+    /// What presses.
+    pub tool: RigidTool,
+    /// Where the device's frame is: its origin is where the tool's tip hangs at rest.
+    pub scene_from_device: Pose,
+    /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
+    pub meshes: Option<Arc<FineScene>>,
+    /// The body as it was grown, with its bones.
+    pub built: Arc<BuiltBody>,
+    /// Where the hand begins, in the device's frame, m.
+    pub start: Vec3,
+    /// How the moving step goes about its work.
+    pub params: LiveParams,
+    /// Mean length of the skin's edges near the tool, m.
+    pub mesh_size: f64,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+impl LiveScene {
+    /// Grows the scene's body and makes it fine along the way of the hand.
+    ///
+    /// # Errors
+    /// When the scene does not fit together, or its tool is bonded to the skin.
+    pub fn build(scene: &Scene) -> anyhow::Result<Self> {
+        if !matches!(scene.tool, Tool::Contact(_)) {
+            bail!(
+                "in real time the tool presses by contact, and the scene's is a {}; give [tool] a shape such as \"sphere\", \
+                 \"flat_punch\" or \"fingertip\"",
+                scene.tool
+            );
+        }
+        let scene = &coarser(scene);
+        let built = build_within(scene, MOST_NODES).context("in real time")?;
+        let built = Arc::new(built);
+        let moves = scene.mesh.moves;
+        if moves && !scene.mesh.refine {
+            bail!(
+                "[mesh] moves = true needs refine = true: with refine = false nothing is fine that could move"
+            );
+        }
+        let way = if moves { Vec::new() } else { way(scene) };
+        let indentation = Indentation::build_along(scene, &built, &way)?;
+        let mut notes = built.notes.clone();
+        notes.extend(indentation.notes.iter().cloned());
+        check_way(scene, &built, &indentation, &mut notes)?;
+        if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
+            notes.push(
+                "tension of layers is not at rest when the loop starts: the first steps of the tissue relax it".into(),
+            );
+        }
+        let Some(posed) = indentation.tool_at(-scene.motion.above) else {
+            bail!("the tool is bonded to the skin");
+        };
+        let start = hand::beginning(scene, &posed.pose);
+        let meshes = if moves {
+            Some(Arc::new(FineScene::new(scene, &built)?))
+        } else {
+            None
+        };
+        let model = match &meshes {
+            Some(meshes) => {
+                let at = posed.pose * nalgebra::Point3::from(start);
+                meshes.model(meshes.place(at.coords))?
+            }
+            None => Arc::new(indentation.model),
+        };
+        if model.n_nodes() > MOST_NODES {
+            bail!(
+                "{} nodes are more than can be pressed in real time, {MOST_NODES}; make the mesh coarser: [mesh] near_tool is \
+                 {:.1} mm under the tool now",
+                model.n_nodes(),
+                1e3 * indentation.mesh.mesh_size
+            );
+        }
+        Ok(Self {
+            start,
+            built,
+            meshes,
+            mesh_size: indentation.mesh.mesh_size,
+            params: LiveParams {
+                zone_radius: zone_radius(scene),
+                exterior: ExteriorMode::Linear,
+                ..LiveParams::default()
+            },
+            model,
+            tool: posed.tool,
+            scene_from_device: posed.pose,
+            notes,
+        })
+    }
+
+    /// The tissue, untouched.
+    ///
+    /// # Errors
+    /// When the body cannot be factored.
+    pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
+        self.tissue_at(self.start)
+    }
+
+    /// The tissue, untouched, with the device at another place than where the scene's hand begins, in its own frame, m.
+    ///
+    /// # Errors
+    /// When the body cannot be factored.
+    pub fn tissue_at(&self, start: Vec3) -> anyhow::Result<LiveTissue> {
+        let tools = [self.posed(start)];
+        let body = match &self.meshes {
+            Some(meshes) => {
+                let at = tools[0].pose.translation.vector;
+                Roaming::new(Arc::<FineScene>::clone(meshes), &tools, self.params, at)?
+            }
+            None => Roaming::fixed(Live::new(Arc::clone(&self.model), &tools, self.params)?),
+        };
+        Ok(LiveTissue::new(
+            body,
+            vec![self.tool],
+            self.scene_from_device,
+            self.params.tolerance,
+        ))
+    }
+
+    /// The tool where the device is at `position` in its own frame, m.
+    pub fn posed(&self, position: Vec3) -> PosedTool {
+        PosedTool {
+            tool: self.tool,
+            pose: self.scene_from_device * Pose::translation(position.x, position.y, position.z),
+        }
+    }
+}
+
+/// Where nothing is said of the mesh near the tool: a third of the radius that presses, where a press by script that may take its
+/// time has a quarter.
+fn coarser(scene: &Scene) -> Scene {
+    const COARSER: f64 = 4.0 / 3.0;
+    let mut scene = scene.clone();
+    let usual = scene.mesh.near_tool_of(&scene.tool);
+    scene.mesh.near_tool = scene.mesh.near_tool.or(usual.map(|h| COARSER * h));
+    // One more than there may be: what is too fine is refused, and not made a little coarser.
+    let n_levels = 1 + scene.layers.iter().map(|l| l.levels).sum::<usize>();
+    scene.mesh.max_vertices = scene.mesh.max_vertices.min(MOST_NODES / n_levels + 1);
+    scene
+}
+
+/// A radius that holds the contact at the depth of the hand.
+fn zone_radius(scene: &Scene) -> f64 {
+    let radius = scene.tool.contact_radius();
+    (ZONE_RADII * (radius + scene.motion.depth)).max(LEAST_ZONE)
+}
+
+/// Where along its way across the skin the hand's tool will be, from the place pressed, in shares of the tool's own frame:
+/// x along and y across. m
+fn way(scene: &Scene) -> Vec<f64> {
+    if !scene.motion.kind.goes_across() {
+        return vec![0.0];
+    }
+    let half = 0.5 * scene.motion.length;
+    let n = (half / WAY_STEP).ceil().max(1.0) as i32;
+    (-n..=n)
+        .map(|i| half * f64::from(i) / f64::from(n))
+        .collect()
+}
+
+/// Whether the hand's way lies on the body, and is not deeper than it.
+fn check_way(
+    scene: &Scene,
+    built: &BuiltBody,
+    indentation: &Indentation,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<()> {
+    let (body, place) = (&built.growth.body, &indentation.place);
+    let along = along_skin(scene, &place.direction);
+    let index = SurfaceIndex::build(&body.skin);
+    let depth = scene.motion.depth;
+    for far in way(scene) {
+        let over = built.press_at + along * far;
+        let Some(closest) = index.closest(over) else {
+            continue;
+        };
+        if (closest.point - over).norm() > depth {
+            notes.push(format!(
+                "{:.0} mm along its way the tool is off the skin, where nothing is felt; shorten [motion] length = \"{:.0} mm\"",
+                far * 1e3,
+                scene.motion.length * 1e3
+            ));
+            break;
+        }
+        let thickness = column_length(body, nearest(&body.skin, closest.point));
+        if depth >= thickness {
+            bail!(
+                "[motion] depth = \"{:.1} mm\" reaches beyond the body: at ({}) mm the tissue is {:.1} mm deep; press less deep, or \
+                 at another place",
+                depth * 1e3,
+                in_mm(closest.point),
+                thickness * 1e3
+            );
+        }
+    }
+    Ok(())
+}

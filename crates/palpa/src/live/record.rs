@@ -1,0 +1,92 @@
+//! What a log keeps of the scene, and the scene of a log.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use palpa_rt::Header;
+use palpa_scene::{LumpShape, Scene, Skin, Thickness};
+
+const BASE: &str = "scene_dir";
+const FILE: &str = "file ";
+
+/// How a file of a scene stands to what it was.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileState {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// The notes for a log that let its scene be made again: the folder that its paths start from, and what its files were.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn notes_of(scene: &Scene) -> anyhow::Result<BTreeMap<String, String>> {
+    let base = std::path::absolute(&scene.base_dir).unwrap_or_else(|_| scene.base_dir.clone());
+    let mut notes = BTreeMap::from([(BASE.to_owned(), base.display().to_string())]);
+    for path in files(scene) {
+        notes.insert(format!("{FILE}{}", path.display()), fingerprint(&path)?);
+    }
+    Ok(notes)
+}
+
+/// The scene that a log was made with.
+///
+/// # Errors
+/// When the log has none, or this version does not read it.
+pub fn scene_of(header: &Header) -> anyhow::Result<Scene> {
+    if header.scene.is_empty() {
+        anyhow::bail!(
+            "the log has no scene in it; name the one that it was made with: --scene SCENE"
+        );
+    }
+    let base = header.notes.get(BASE).map_or("", String::as_str);
+    Scene::parse(&header.scene, Path::new(base)).context("the scene in the log")
+}
+
+/// The files that are not what they were when the log was made.
+pub fn changed_files(header: &Header, scene: &Scene) -> Vec<FileState> {
+    let mut changed = Vec::new();
+    for path in files(scene) {
+        let was = header.notes.get(&format!("{FILE}{}", path.display()));
+        let problem = match (was, fingerprint(&path)) {
+            (_, Err(error)) => format!("{error:#}"),
+            (None, _) => "the log says nothing of it".to_owned(),
+            (Some(was), Ok(is)) if *was != is => "it has changed since the log was made".to_owned(),
+            _ => continue,
+        };
+        changed.push(FileState { path, problem });
+    }
+    changed
+}
+
+/// All files that a scene refers to.
+fn files(scene: &Scene) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    if let Skin::File(path) = &scene.body.skin {
+        files.push(path.clone());
+    }
+    files.extend(scene.body.bones.iter().cloned());
+    for layer in &scene.layers {
+        if let Some(Thickness::File(path)) = &layer.thickness {
+            files.push(path.clone());
+        }
+    }
+    for lump in &scene.lumps {
+        if let LumpShape::Mesh(path) = &lump.shape {
+            files.push(path.clone());
+        }
+    }
+    files
+}
+
+/// Length and a hash (FNV-1a) of a file: against mix-ups, not against malice.
+fn fingerprint(path: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
+    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    Ok(format!("{} bytes, {hash:016x}", bytes.len()))
+}

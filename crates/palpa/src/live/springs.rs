@@ -1,0 +1,276 @@
+//! The reference method in real time: a node of the skin is operated, as in 2009, while the tool's tip presses it.
+
+use palpa_mesh::{LayeredBody, Vec3};
+use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
+use palpa_scene::{ContactShape, ContactTool, Scene};
+use palpa_servo::{Candidate, ContactPatch, Mat3, Pose, ToolContact};
+use palpa_springs::{Outcome, SpringModel, SpringState, StepParams, Workspace, step};
+use std::sync::Arc;
+
+use super::{MOST_NODES, Watch};
+use crate::build::{BuiltBody, build_within, nearest};
+use crate::continuum;
+use crate::press::{Place, reference};
+
+/// The tip holds the node as a point that hardly slips.
+const FRICTION: f64 = 5.0;
+/// The point that the tip is has a frame as any tool, m.
+const POINT: f64 = 5e-3;
+/// Way of the node by which its stiffness is measured, as a share of the mean edge.
+const PROBE: f64 = 1e-3;
+
+/// A scene of the reference method, set up for real time.
+#[derive(Debug, Clone)]
+pub struct SpringScene {
+    scene: Arc<Scene>,
+    built: Arc<BuiltBody>,
+    /// How far from the node the tip may be and still press it, m.
+    reach: f64,
+    /// Where the device's frame is: z out of the tissue where the scene presses, its origin over the skin.
+    pub scene_from_device: Pose,
+}
+
+/// The body with one of its nodes operated.
+#[derive(Debug)]
+pub struct Held {
+    model: SpringModel,
+    params: StepParams,
+    vertex: usize,
+    at: Vec3,
+    /// Displacement of the node per force on it, m/N.
+    compliance: Mat3,
+    stiffness: Mat3,
+}
+
+impl SpringScene {
+    /// Builds the body of a scene whose model is the reference method.
+    ///
+    /// # Errors
+    /// When the scene has what the reference method has not, or its body cannot be grown.
+    pub fn build(scene: &Scene) -> anyhow::Result<Self> {
+        reference::check_reference(scene)?;
+        let built = Arc::new(build_within(scene, MOST_NODES)?);
+        let body = &built.growth.body;
+        let place = Place::find(scene, body, built.press_vertex, &mut Vec::new())?;
+        let point = ContactTool {
+            shape: ContactShape::Sphere { radius: POINT },
+            friction: 0.0,
+            axis: None,
+        };
+        let (_, at_rest) = continuum::tool(&point, place.direction.into_inner(), place.at)?;
+        Ok(Self {
+            scene_from_device: at_rest * Pose::translation(0.0, 0.0, scene.motion.above),
+            reach: body.skin.mean_edge_length(),
+            scene: Arc::new(scene.clone()),
+            built,
+        })
+    }
+
+    /// The body as it was grown.
+    pub fn built(&self) -> &Arc<BuiltBody> {
+        &self.built
+    }
+
+    /// Where the hand begins, in the scene's frame, m.
+    pub fn beginning(&self) -> Vec3 {
+        self.scene_from_device.translation.vector
+    }
+
+    /// The body at rest.
+    pub fn body(&self) -> &LayeredBody {
+        &self.built.growth.body
+    }
+
+    /// The body with a vertex of its skin operated.
+    ///
+    /// # Errors
+    /// When its network cannot be built.
+    fn held(&self, vertex: usize) -> anyhow::Result<Held> {
+        let body = self.body();
+        let node = body.node(vertex, 0);
+        let mut notes = Vec::new();
+        let constraints = reference::constraints(&self.scene, body, vec![node], &mut notes);
+        let params = reference::spring_params(&self.scene);
+        let model = SpringModel::build(body, &params, &constraints)?;
+        let params = reference::step_params(&self.scene, &model);
+        let stiffness = stiffness(&model, &params, PROBE * self.reach);
+        let compliance = stiffness.try_inverse().unwrap_or_default();
+        Ok(Held {
+            at: body.positions[node],
+            model,
+            params,
+            vertex,
+            compliance,
+            stiffness,
+        })
+    }
+
+    /// The tissue, untouched, in the frame of a device.
+    ///
+    /// # Errors
+    /// When its network cannot be built.
+    pub fn tissue(&self, tip: Vec3, watch: Option<Watch>) -> anyhow::Result<SpringTissue> {
+        let held = self.held(nearest(&self.body().skin, tip))?;
+        Ok(SpringTissue {
+            state: SpringState::new(&held.model),
+            workspace: Workspace::new(&held.model),
+            held,
+            scene: self.clone(),
+            grip: None,
+            wanted: None,
+            n_held: 1,
+            watch,
+        })
+    }
+}
+
+/// How the force on the node resists, N/m: by small steps along each axis.
+fn stiffness(model: &SpringModel, params: &StepParams, probe: f64) -> Mat3 {
+    let mut k = Mat3::zeros();
+    for axis in 0..3 {
+        let mut state = SpringState::new(model);
+        let mut workspace = Workspace::new(model);
+        let mut by = Vec3::zeros();
+        by[axis] = probe;
+        let report = step(model, &mut state, &mut workspace, by, params);
+        k.set_column(axis, &(-report.force / probe));
+    }
+    (k + k.transpose()) * 0.5
+}
+
+/// The network of bars under a tip that operates a node of its skin.
+#[derive(Debug)]
+pub struct SpringTissue {
+    scene: SpringScene,
+    held: Held,
+    state: SpringState,
+    workspace: Workspace,
+    /// Where the tip took the node, off the node's place at rest along the skin, m; none while it presses nothing.
+    grip: Option<Vec3>,
+    /// The vertex that the tip is over, where it is another.
+    wanted: Option<usize>,
+    n_held: u64,
+    watch: Option<Watch>,
+}
+
+impl SpringTissue {
+    fn follow(&mut self, tip: Vec3, up: Vec3) -> Outcome {
+        let off = tip - self.held.at;
+        let depth = -up.dot(&off);
+        let aside = off + up * depth;
+        let grip = match self.grip {
+            None if depth > 0.0 && aside.norm() <= self.scene.reach => aside,
+            None => {
+                self.look_for(tip);
+                return Outcome::Converged;
+            }
+            Some(_) if depth <= 0.0 || self.state.force.dot(&up) < 0.0 && depth < PROBE => {
+                self.let_go();
+                return Outcome::Converged;
+            }
+            Some(grip) => grip,
+        };
+        self.grip = Some(grip);
+        let by = off - grip - self.state.displacement;
+        let Held { model, params, .. } = &self.held;
+        step(model, &mut self.state, &mut self.workspace, by, params).outcome
+    }
+
+    fn let_go(&mut self) {
+        self.grip = None;
+        self.state = SpringState::new(&self.held.model);
+    }
+
+    fn look_for(&mut self, tip: Vec3) {
+        let vertex = nearest(&self.scene.body().skin, tip);
+        self.wanted = (vertex != self.held.vertex).then_some(vertex);
+    }
+
+    fn fill(&self, input: &TissueInput, patch: &mut ContactPatch) {
+        let frame = &self.scene.scene_from_device;
+        let turn: Mat3 = *frame.rotation.to_rotation_matrix().matrix();
+        let back = turn.transpose();
+        let pose = input.poses[0];
+        let is_held = self.grip.is_some();
+        patch.n_tools = 1;
+        patch.tools[0] = ToolContact {
+            pose,
+            friction: FRICTION,
+            is_bonded: false,
+            force: back * self.state.force,
+            stiffness: if is_held {
+                back * self.held.stiffness * turn
+            } else {
+                Mat3::zeros()
+            },
+        };
+        let at = frame.inverse_transform_point(&(self.held.at + self.state.displacement).into());
+        let tip = pose.translation.vector;
+        patch.n_contacts = usize::from(is_held || (at.coords - tip).norm() < self.scene.reach);
+        patch.contacts[0] = Candidate {
+            vertex: self.held.vertex as u32,
+            tool: 0,
+            position: at.coords,
+            force: -(back * self.state.force),
+            surface: Vec3::zeros(),
+            normal: -Vec3::z(),
+            curvature: Mat3::zeros(),
+            anchor: pose.inverse_transform_point(&at).coords,
+        };
+        patch.set_block(0, 0, &(back * self.held.compliance * turn));
+    }
+}
+
+/// A vertex that is to be operated, and the scene that it is of.
+#[derive(Debug)]
+pub struct Take(SpringScene, usize);
+
+impl Tissue for SpringTissue {
+    type Job = Take;
+    type Done = Option<Held>;
+
+    fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
+        let pose = self.scene.scene_from_device * input.poses[0];
+        let up = pose.rotation * Vec3::z();
+        let outcome = self.follow(pose.translation.vector, up);
+        self.fill(input, patch);
+        if let Some(watch) = &mut self.watch {
+            let model = &self.held.model;
+            let moved = self.state.positions.iter().zip(model.rest_positions());
+            watch.look_at(input.step, input.now, moved.map(|(now, rest)| now - rest));
+        }
+        TissueStep {
+            status: match outcome {
+                Outcome::Converged => StepStatus::Converged,
+                Outcome::EulerFallback { .. } => StepStatus::Unfinished,
+                Outcome::Diverged { .. } | Outcome::NotFinite => StepStatus::Failed,
+            },
+            iterations: 1,
+            mesh: 1,
+            zone: self.n_held,
+            ..TissueStep::default()
+        }
+    }
+
+    fn take_job(&mut self) -> Option<Take> {
+        let vertex = self.wanted.take()?;
+        self.grip
+            .is_none()
+            .then(|| Take(self.scene.clone(), vertex))
+    }
+
+    fn run(Take(scene, vertex): Take) -> Option<Held> {
+        scene.held(vertex).ok()
+    }
+
+    fn install(&mut self, done: Option<Held>) {
+        let Some(held) = done else { return };
+        // A node that is operated by now is not let go for another.
+        if self.grip.is_none() {
+            self.state = SpringState::new(&held.model);
+            self.workspace = Workspace::new(&held.model);
+            self.held = held;
+            self.n_held += 1;
+        }
+    }
+}
