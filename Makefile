@@ -33,12 +33,12 @@ test: $(PAGE) test-page
 # The binary with its page in a real browser.
 test-page: $(PAGE)
 	cd web && npm run generate --silent && git diff --exit-code -- src/generated
-	cargo build --release --package palpa
+	cargo build --release --package palpa-cli
 	node web/e2e/browser.mjs --install
 	cd web && PALPA_BIN="$(abspath $(TARGET))/release/palpa" PALPA_SHOTS="$(abspath $(SHOTS))" npm test
 
 dist: $(PAGE)
-	cargo build --release --package palpa
+	cargo build --release --package palpa-cli
 	tools/dist.sh "$(TARGET)" "$(VERSION)"
 
 test-data: shared $(VENV)/ready
