@@ -1,12 +1,14 @@
 //! Result files that are whole or absent: written under a temporary name beside the target, then renamed.
 
+use std::fmt;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use serde::Serialize;
+use serde::de::{IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use tempfile::{Builder, NamedTempFile};
 
 /// An output folder that exists and can be written to.
@@ -81,31 +83,29 @@ impl OutDir {
     /// # Errors
     /// When the file cannot be made.
     pub fn table<R: Serialize>(&self, name: &str) -> anyhow::Result<CsvTable<R>> {
-        self.begin_table(name, true)
+        self.begin_table(name, None)
     }
 
-    /// Begins a CSV table under a given header, for rows whose fields are lists.
+    /// The same for rows whose last field is a list, with a name for each of its columns.
     ///
     /// # Errors
     /// When the file cannot be made.
-    pub fn table_under<R: Serialize>(
+    pub fn table_with_list<R: Serialize>(
         &self,
         name: &str,
-        header: &[String],
+        list: Vec<String>,
     ) -> anyhow::Result<CsvTable<R>> {
-        let mut table = self.begin_table(name, false)?;
-        let written = table.writer.write_record(header);
-        written.with_context(|| cannot_write(&table.path))?;
-        Ok(table)
+        self.begin_table(name, Some(list))
     }
 
-    fn begin_table<R>(&self, name: &str, has_header: bool) -> anyhow::Result<CsvTable<R>> {
+    fn begin_table<R>(&self, name: &str, list: Option<Vec<String>>) -> anyhow::Result<CsvTable<R>> {
         let path = self.path.join(name);
         let file = temporary_for(&path).with_context(|| cannot_write(&path))?;
         let mut builder = csv::WriterBuilder::new();
         Ok(CsvTable {
             path,
-            writer: builder.has_headers(has_header).from_writer(file),
+            writer: builder.has_headers(list.is_none()).from_writer(file),
+            list,
             row: PhantomData,
         })
     }
@@ -119,6 +119,8 @@ impl OutDir {
 pub struct CsvTable<R> {
     path: PathBuf,
     writer: csv::Writer<NamedTempFile>,
+    /// Names for the columns of a list at the end of the rows, until the header is written.
+    list: Option<Vec<String>>,
     row: PhantomData<R>,
 }
 
@@ -128,6 +130,12 @@ impl<R: Serialize> CsvTable<R> {
     /// # Errors
     /// When the file cannot be written, the disk being full for one.
     pub fn push(&mut self, row: &R) -> anyhow::Result<()> {
+        if let Some(list) = self.list.take() {
+            let mut header = field_names(row)?;
+            header.pop();
+            header.extend(list);
+            (self.writer.write_record(header)).with_context(|| cannot_write(&self.path))?;
+        }
         self.writer
             .serialize(row)
             .with_context(|| cannot_write(&self.path))?;
@@ -152,6 +160,39 @@ impl<R: Serialize> CsvTable<R> {
         finish().with_context(|| cannot_write(&path))?;
         Ok(path)
     }
+}
+
+/// Names of the fields of a row, in their order.
+fn field_names(row: &impl Serialize) -> anyhow::Result<Vec<String>> {
+    /// The keys of a JSON object; `serde_json::Value` would sort them.
+    struct Keys(Vec<String>);
+
+    impl<'de> Deserialize<'de> for Keys {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_map(KeyVisitor)
+        }
+    }
+
+    struct KeyVisitor;
+
+    impl<'de> Visitor<'de> for KeyVisitor {
+        type Value = Keys;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a row with named fields")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Keys, A::Error> {
+            let mut keys = Vec::new();
+            while let Some((key, IgnoredAny)) = map.next_entry()? {
+                keys.push(key);
+            }
+            Ok(Keys(keys))
+        }
+    }
+
+    let text = serde_json::to_string(row)?;
+    Ok(serde_json::from_str::<Keys>(&text)?.0)
 }
 
 fn cannot_write(path: &Path) -> String {

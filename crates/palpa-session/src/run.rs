@@ -28,7 +28,7 @@ use crate::recording::{self, MeshBytes, Recording};
 use crate::remote::{Material, Order, Remote};
 use crate::world::{BEFORE_THE_BROWSER, Running, World};
 use palpa::live::{Look, Seen, notes_of, once_from};
-use palpa::one_paragraph;
+use palpa::{Note, one_paragraph};
 
 const PERIOD: Duration = Duration::from_micros(16_667);
 const MOST_ORDERS: u32 = 1000;
@@ -516,12 +516,12 @@ impl Body {
             .spec
             .max_force;
         state.method = world.method;
-        state.notes.clone_from(&world.notes);
-        state.n_nodes = world.n_nodes() as u32;
-        if hides {
+        state.notes = (world.notes.iter())
             // A note on a lump says where it is.
-            state.notes.retain(|note| !note.contains("lump"));
-        }
+            .filter(|note| !(hides && note.is_about_lumps()))
+            .map(Note::to_string)
+            .collect();
+        state.n_nodes = world.n_nodes() as u32;
     }
 
     fn fail(&mut self, problem: String) {

@@ -14,8 +14,8 @@ use palpa_servo::{Pose, ServoParams};
 use palpa_viewer::control::{self, LayerInfo, LumpForm, LumpInfo, Method, ToolForm, ToolInfo};
 
 use crate::hand::{HOVER, Place, Skin};
+use palpa::Note;
 use palpa::build::BuiltBody;
-use palpa::continuum;
 use palpa::live::{LiveScene, Look, SpringScene, Watch, device_model, grip};
 use palpa::press;
 
@@ -51,8 +51,6 @@ pub struct World {
     pub layers: Vec<LayerInfo>,
     /// The lumps.
     pub lumps: Vec<LumpInfo>,
-    /// The lumps where they lie, for what is to be asked of them.
-    pub placed: Vec<PlacedLump>,
     /// What presses.
     pub tool: ToolInfo,
     /// Where the scene presses.
@@ -60,7 +58,7 @@ pub struct World {
     /// Where the device's frame is.
     pub scene_from_device: Pose,
     /// What a user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     kind: Kind,
 }
 
@@ -95,22 +93,18 @@ impl World {
         }
     }
 
-    fn of_tissue(scene: Scene, mut notes: Vec<String>) -> anyhow::Result<Self> {
+    fn of_tissue(scene: Scene, mut notes: Vec<Note>) -> anyhow::Result<Self> {
         let live = LiveScene::build(&scene)?;
         notes.extend(live.notes.iter().cloned());
-        let built = Arc::clone(&live.built);
-        let placed = continuum::lumps(&scene, &built, &mut Vec::new())?;
+        let built = Arc::clone(&live.prepared.grown);
+        let lumps = lump_infos(&scene, live.prepared.lumps());
         let frame = live.scene_from_device;
         let kind = Kind::Tissue(Box::new(live));
         let world = Self::around(scene, &built, frame, notes, kind)?;
-        Ok(Self {
-            lumps: lump_infos(&world.scene, &placed),
-            placed,
-            ..world
-        })
+        Ok(Self { lumps, ..world })
     }
 
-    fn of_springs(scene: Scene, notes: Vec<String>) -> anyhow::Result<Self> {
+    fn of_springs(scene: Scene, notes: Vec<Note>) -> anyhow::Result<Self> {
         let springs = SpringScene::build(&scene)?;
         let built = Arc::clone(springs.built());
         let frame = springs.scene_from_device;
@@ -122,7 +116,7 @@ impl World {
         scene: Scene,
         built: &BuiltBody,
         scene_from_device: Pose,
-        mut notes: Vec<String>,
+        mut notes: Vec<Note>,
         kind: Kind,
     ) -> anyhow::Result<Self> {
         let body = &built.growth.body;
@@ -147,7 +141,6 @@ impl World {
             bones: built.bones.clone(),
             layers: layer_infos(&scene, body),
             lumps: Vec::new(),
-            placed: Vec::new(),
             tool: tool_info(&scene.tool),
             home,
             scene_from_device,
@@ -208,6 +201,14 @@ impl World {
         }
     }
 
+    /// The lumps in their places.
+    pub fn placed(&self) -> &[PlacedLump] {
+        match &self.kind {
+            Kind::Tissue(live) => live.prepared.lumps(),
+            Kind::Springs(_) => &[],
+        }
+    }
+
     /// Nodes of the body, before what is fine moves.
     pub fn n_nodes(&self) -> usize {
         match &self.kind {
@@ -259,11 +260,7 @@ impl World {
 
     /// Young's modulus at small strain of every prism of a body, Pa; N/m of bars. `[n_prisms]`
     pub fn stiffness(&self, body: &LayeredBody, shows_lumps: bool) -> Vec<f32> {
-        let lumps = if shows_lumps {
-            self.placed.as_slice()
-        } else {
-            &[]
-        };
+        let lumps = if shows_lumps { self.placed() } else { &[] };
         let n_intervals = body.n_levels - 1;
         let mut all = Vec::with_capacity(body.n_prisms());
         for t in 0..body.skin.triangles.len() {
@@ -282,7 +279,7 @@ impl World {
 }
 
 /// The scene as it can be touched: by contact, and fine where the hand goes.
-fn fit_for_touch(scene: &Scene, notes: &mut Vec<String>) -> Scene {
+fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
     let mut scene = scene.clone();
     if scene.model.kind == ModelKind::Reference {
         return scene;
@@ -301,10 +298,10 @@ fn fit_for_touch(scene: &Scene, notes: &mut Vec<String>) -> Scene {
             friction: 0.0,
             axis: None,
         });
-        notes.push(format!(
-            "a hand presses by contact: the scene's {} was replaced by a {tool}",
-            scene.tool
-        ));
+        notes.push(Note::ToolReplaced {
+            tool: scene.tool.to_string(),
+            by: tool.to_string(),
+        });
         scene.tool = tool;
     }
     scene.mesh.moves |= scene.mesh.refine;
@@ -313,10 +310,7 @@ fn fit_for_touch(scene: &Scene, notes: &mut Vec<String>) -> Scene {
         let fine = (scene.tool.contact_radius() / 3.0).max(LEAST_EDGE);
         scene.mesh.near_tool = Some(fine);
         if usual.is_some_and(|usual| 1.5 * usual < fine) {
-            notes.push(format!(
-                "the skin's edges under the tool are {:.1} mm long, so that a hand can be followed; [mesh] near_tool makes them finer",
-                fine * 1e3
-            ));
+            notes.push(Note::CoarserForTouch { edge: fine });
         }
     }
     if scene.mesh.near_lumps.is_none() {

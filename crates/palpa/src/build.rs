@@ -6,12 +6,14 @@ use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
 use palpa_mesh::growth::{MAX_NODES, ScatteredThickness, Thickness as ThicknessField};
 use palpa_mesh::{
-    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, RepairReport, Surface,
-    SurfaceIndex, Vec3, grow, read_surface, repair,
+    Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, Surface, SurfaceIndex, Vec3, grow,
+    read_surface, repair,
 };
 use palpa_scene::{
     Generator, LengthUnit, LumpPlace, Scene, Skin, Target, Thickness, read_thickness,
 };
+
+use crate::note::Note;
 
 /// A place further from the skin than this share of the body's size is taken for a mistake in frame or unit.
 const FAR_FROM_SKIN: f64 = 0.25;
@@ -33,7 +35,7 @@ pub struct BuiltBody {
     /// For each lump of the scene the place on the skin that it lies under, if it is placed so. m
     pub lump_places: Vec<Option<Vec3>>,
     /// What was done to the surfaces on the way and a user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 /// Reads or makes the surfaces of `scene` and grows them into layers.
@@ -99,10 +101,9 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
         grow(&skin, &bones, &params).map_err(|error| with_bone_name(error, &scene.body.bones))?;
     let n_overlaps = growth.report.n_base_overlaps;
     if n_overlaps > 0 {
-        notes.push(format!(
-            "the base of the body passes through itself ({n_overlaps} pairs of triangles): look at section.png or the VTU \
-             before trusting forces near there"
-        ));
+        notes.push(Note::BaseOverlaps {
+            n_pairs: n_overlaps,
+        });
     }
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     let on_body = &growth.body.skin;
@@ -231,14 +232,13 @@ fn area_centroid(surface: &Surface) -> Vec3 {
 pub(crate) fn read_in_metres(
     path: &Path,
     unit: LengthUnit,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> anyhow::Result<Surface> {
     let file = read_surface(path)?;
-    notes.extend(
-        file.notes
-            .iter()
-            .map(|note| format!("{}: {note}", file_name(path))),
-    );
+    notes.extend(file.notes.iter().map(|note| Note::FileRead {
+        file: file_name(path),
+        text: note.to_string(),
+    }));
     let surface = match unit {
         LengthUnit::M => file.surface,
         unit => file.surface.scaled(unit.metres()),
@@ -256,47 +256,33 @@ pub(crate) fn read_in_metres(
     let (lo, hi) = surface.bounds().unwrap_or_default();
     let size = (hi - lo).norm();
     if !USUAL_SIZE.contains(&size) {
-        notes.push(format!(
-            "{} is {size:.4} m large, which no body part is; check `unit` in the scene's [body]",
-            file_name(path)
-        ));
+        notes.push(Note::UnusualSize {
+            file: file_name(path),
+            size,
+        });
     }
     Ok(surface)
 }
 
 /// The surface with what is safe to repair repaired.
-pub(crate) fn mended(surface: &Surface, path: &Path, notes: &mut Vec<String>) -> Surface {
+pub(crate) fn mended(surface: &Surface, path: &Path, notes: &mut Vec<Note>) -> Surface {
     let (mended, report) = repair(surface, &RepairOptions::default());
     if report.is_changed() {
-        notes.push(format!(
-            "{}: repaired on the way in: {}",
-            file_name(path),
-            repairs(&report)
-        ));
+        notes.push(Note::Repaired {
+            file: file_name(path),
+            n_welded: report.n_welded,
+            n_degenerate: report.n_degenerate,
+            n_duplicate: report.n_duplicate,
+            n_unused: report.n_unused,
+            n_flipped: report.orientation.n_flipped,
+        });
     }
     mended
 }
 
-fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
-    path.file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-}
-
-fn repairs(report: &RepairReport) -> String {
-    let counts = [
-        (report.n_welded, "vertices welded"),
-        (report.n_degenerate, "triangles without area dropped"),
-        (report.n_duplicate, "double triangles dropped"),
-        (report.n_unused, "unused vertices dropped"),
-        (report.orientation.n_flipped, "triangles turned outward"),
-    ];
-    let done: Vec<String> = counts
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, what)| format!("{n} {what}"))
-        .collect();
-    done.join(", ")
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
 }
 
 fn generated(generator: Generator) -> (Surface, Vec<Surface>) {
@@ -378,7 +364,7 @@ fn thickness_field(thickness: &Thickness, unit: LengthUnit) -> anyhow::Result<Th
 }
 
 /// Says so when a cut-out's rim is so near that it would be felt.
-fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<String>) {
+fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<Note>) {
     const ENOUGH: f64 = 2.0;
     let tool = scene.tool.contact_radius();
     let depth: f64 = growth
@@ -389,11 +375,9 @@ fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<Stri
         .sum();
     let wanted = tool + ENOUGH * depth;
     if radius < wanted {
-        notes.push(format!(
-            "the cut-out's radius of {:.0} mm is less than the tool's radius plus {ENOUGH:.0} times the tissue's depth \
-             ({:.0} mm): the free rim may be felt; choose a larger cutout_radius",
-            radius * 1e3,
-            wanted * 1e3,
-        ));
+        notes.push(Note::CutoutNear {
+            radius,
+            enough: wanted,
+        });
     }
 }

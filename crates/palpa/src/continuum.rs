@@ -17,6 +17,7 @@ use palpa_scene::{
 };
 
 use crate::build::{BuiltBody, in_mm, mended, read_in_metres};
+use crate::note::{Note, xyz};
 use crate::press::lump::share_inside;
 
 /// A lump of which less lies in the tissue is an error; of which less than that, worth a note.
@@ -94,8 +95,8 @@ fn law(elastic: &Elastic) -> Result<Law, LawError> {
     })
 }
 
-/// The scene's lumps in their places under the body's skin. The material of the i-th is that of [`materials`] after those
-/// of the layers.
+/// The scene's lumps in their places under the body's skin, those that are meshes with their surface there (m). The material
+/// of the i-th is that of [`materials`] after those of the layers.
 ///
 /// # Errors
 /// When a mesh cannot be read or has no inside, or a lump lies outside the body.
@@ -105,8 +106,8 @@ fn law(elastic: &Elastic) -> Result<Law, LawError> {
 pub fn lumps(
     scene: &Scene,
     built: &BuiltBody,
-    notes: &mut Vec<String>,
-) -> anyhow::Result<Vec<Lump>> {
+    notes: &mut Vec<Note>,
+) -> anyhow::Result<Vec<(Lump, Option<Surface>)>> {
     if scene.lumps.is_empty() {
         return Ok(Vec::new());
     }
@@ -114,7 +115,7 @@ pub fn lumps(
     let mut lumps = Vec::new();
     for (i, lump) in scene.lumps.iter().enumerate() {
         let of_lump = || format!("lump \"{}\"", lump.name);
-        let shape = lump_shape(scene, &lump.shape, notes).with_context(of_lump)?;
+        let (shape, drawn) = lump_shape(scene, &lump.shape, notes).with_context(of_lump)?;
         let (middle, inward) = match (&lump.place, &shape) {
             (LumpPlace::Below { depth, .. }, _) => {
                 let place = built.lump_places[i].expect("a lump below the skin has a place there");
@@ -134,7 +135,15 @@ pub fn lumps(
         let material = scene.layers.len() + i;
         let made = Lump::new(shape, pose, lump.transition, material).with_context(of_lump)?;
         check_place(&made, &lump.name, &built.growth.body, notes)?;
-        lumps.push(made);
+        // A mesh is moved so that its centroid is in its place.
+        let drawn = drawn.map(|mut surface| {
+            if let LumpShape::Mesh(mesh) = made.shape() {
+                let shift = made.pose().translation.vector - mesh.centroid();
+                surface.points.iter_mut().for_each(|p| *p += shift);
+            }
+            surface
+        });
+        lumps.push((made, drawn));
     }
     Ok(lumps)
 }
@@ -144,28 +153,29 @@ fn check_place(
     lump: &Lump,
     name: &str,
     body: &LayeredBody,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> anyhow::Result<()> {
     let share = share_inside(body, lump);
-    let at = in_mm(lump.bounding_sphere().0);
+    let (middle, _) = lump.bounding_sphere();
     if share < LEAST_SHARE {
         let (lo, hi) = (body.positions.iter()).fold(
             (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)),
             |(lo, hi), p| (lo.inf(p), hi.sup(p)),
         );
         bail!(
-            "the lump \"{name}\" lies outside the tissue: its middle is at ({at}) mm, and the tissue is between ({}) and ({}) mm, \
+            "the lump \"{name}\" lies outside the tissue: its middle is at ({}) mm, and the tissue is between ({}) and ({}) mm, \
              round the bones; move it with `at`, or with `below` and `depth`, or check the `unit` of its file",
+            in_mm(middle),
             in_mm(lo),
             in_mm(hi)
         );
     }
     if share < FULL_SHARE {
-        notes.push(format!(
-            "{:.0} % of the lump \"{name}\" at ({at}) mm lies in the tissue; the rest, outside the skin or in the bone, does not \
-             count",
-            100.0 * share
-        ));
+        notes.push(Note::LumpPartlyOutside {
+            lump: name.to_owned(),
+            share,
+            at: xyz(middle),
+        });
     }
     Ok(())
 }
@@ -173,19 +183,20 @@ fn check_place(
 fn lump_shape(
     scene: &Scene,
     shape: &palpa_scene::LumpShape,
-    notes: &mut Vec<String>,
-) -> anyhow::Result<LumpShape> {
+    notes: &mut Vec<Note>,
+) -> anyhow::Result<(LumpShape, Option<Surface>)> {
     use palpa_scene::LumpShape as Given;
-    Ok(match shape {
+    let shape = match shape {
         Given::Sphere { radius } => LumpShape::Sphere(Sphere::new(*radius)?),
         Given::Ellipsoid { radii } => LumpShape::Ellipsoid(Ellipsoid::new(Vec3::from(*radii))?),
         Given::Capsule { radius, length } => LumpShape::Capsule(Capsule::new(*radius, *length)?),
         Given::Mesh(path) => {
-            let surface = read_in_metres(path, scene.body.unit, notes)?;
-            let mesh = ClosedMesh::new(&mended(&surface, path, notes));
-            LumpShape::Mesh(mesh.with_context(|| path.display().to_string())?)
+            let surface = mended(&read_in_metres(path, scene.body.unit, notes)?, path, notes);
+            let mesh = ClosedMesh::new(&surface).with_context(|| path.display().to_string())?;
+            return Ok((LumpShape::Mesh(mesh), Some(surface)));
         }
-    })
+    };
+    Ok((shape, None))
 }
 
 /// The rotation of a frame given by its three axes.
@@ -233,7 +244,7 @@ impl<'a> Skin<'a> {
 
 /// What holds the body: its base, and its cut faces as the scene says. Faces that cannot be held so are left free, with
 /// a note.
-pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<String>) -> Supports {
+pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<Note>) -> Supports {
     let mut supports = Supports::on_base(body);
     for face in &body.cut_faces {
         let columns = face.vertices.iter().map(|&v| v as usize);
@@ -242,12 +253,13 @@ pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<String>
             CutFaces::Free => {}
             CutFaces::Fixed => supports.fixed.extend(nodes),
             CutFaces::Symmetric if face.is_flat => {
-                supports.planes.extend(nodes.map(|node| (node, face.normal)));
+                supports
+                    .planes
+                    .extend(nodes.map(|node| (node, face.normal)));
             }
-            CutFaces::Symmetric => notes.push(format!(
-                "the cut face at ({}) mm is not flat, so it is no plane of symmetry; it was left free",
-                in_mm(face.point)
-            )),
+            CutFaces::Symmetric => notes.push(Note::CutFaceNotFlat {
+                at: xyz(face.point),
+            }),
         }
     }
     supports.fixed.sort_unstable();

@@ -8,9 +8,12 @@ pub mod build;
 pub mod continuum;
 mod error;
 pub mod live;
+mod note;
+mod prepare;
 pub mod press;
 
 pub use error::one_paragraph;
+pub use note::{Note, in_words};
 pub use palpa_device as device;
 pub use palpa_fem as fem;
 pub use palpa_mesh as mesh;
@@ -18,3 +21,4 @@ pub use palpa_rt as rt;
 pub use palpa_scene as scene;
 pub use palpa_servo as servo;
 pub use palpa_springs as springs;
+pub use prepare::{Approach, PrepareParams, Prepared};

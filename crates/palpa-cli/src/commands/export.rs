@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use palpa::build::{build, in_mm};
-use palpa::continuum;
+use palpa::build::in_mm;
 use palpa::press::mesh::PressedBody;
+use palpa::{Note, Prepared};
 use palpa_lab::export::{self, Deck, Export, Section};
 
 /// Write a scene as an input deck for CalculiX, to check its forces with another solver
@@ -90,11 +90,6 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     }
     let out = context.out_dir()?;
     let spinner = context.progress(0, "growing the body");
-    let built = build(&scene)?;
-    drop(spinner);
-    let mut notes = built.notes.clone();
-    let materials = continuum::materials(&scene)?;
-    let lumps = continuum::lumps(&scene, &built, &mut notes)?;
     if scene.tool.contact().is_some() {
         bail!(
             "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
@@ -102,10 +97,10 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
             scene.tool
         );
     }
-    let pressed = PressedBody::build(&scene, &built, &lumps, &[], &mut notes)?;
-    let (body, place) = (&pressed.body, &pressed.place);
-    let supports = continuum::supports(scene.body.cut_faces, body, &mut notes);
-    let patch = patch(&pressed);
+    let prepared = Prepared::build(&scene)?;
+    drop(spinner);
+    let (body, place) = (&prepared.mesh.body, prepared.place());
+    let patch = patch(&prepared.mesh);
     let scene_name = args
         .scene
         .as_deref()
@@ -125,9 +120,9 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     ];
     let deck = Deck::build(&Export {
         body,
-        materials: &materials,
-        lumps: &lumps,
-        supports: &supports,
+        materials: &prepared.materials.materials,
+        lumps: prepared.lumps(),
+        supports: &prepared.supports,
         patch: &patch,
         travel: place.direction.into_inner() * scene.press.depth,
         n_results: (scene.press.depth / scene.press.step - 1e-9)
@@ -137,6 +132,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         is_approximate: args.approximate,
         title: &title,
     })?;
+    let mut notes: Vec<String> = prepared.notes.iter().map(Note::to_string).collect();
     notes.extend(deck.notes.iter().cloned());
     out.write_with("body.inp", |w| deck.write(w))?;
     let report = Report {
@@ -150,8 +146,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         n_nodes: deck.n_nodes(),
         n_elements: deck.n_elements(),
         n_patch_nodes: deck.n_patch_nodes(),
-        patch_radius_mm: pressed
-            .patch
+        patch_radius_mm: (prepared.mesh.patch)
             .as_ref()
             .map_or(0.0, |patch| patch.radius * 1e3),
         depth_mm: scene.press.depth * 1e3,

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use palpa::press::tissue::{Indentation, Sample};
+use palpa::press::tissue::Indentation;
+use palpa::{Note, Prepared};
 use palpa_scene::{Scene, Skin};
 use serde_json::Value;
 use vtkio::Vtk;
@@ -122,12 +123,43 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
     check_series(&out.join("series"));
 }
 
+/// The columns of press.csv before the layers: programs read them by these names.
+const COLUMNS: [&str; 27] = [
+    "run",
+    "speed_mm_s",
+    "phase",
+    "cycle",
+    "time_s",
+    "depth_mm",
+    "force_n",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+    "contact_area_mm2",
+    "max_pressure_kpa",
+    "n_touching",
+    "gap_um",
+    "penetration_um",
+    "tension_n",
+    "cone_n",
+    "slip",
+    "friction_smoothing_um",
+    "residual",
+    "iterations",
+    "substeps",
+    "outcome",
+    "energy_mj",
+    "work_mj",
+    "volume_ratio_min",
+    "volume_ratio_max",
+];
+
 /// The table has the fields of the samples and their values.
 fn check_table(table: &str, report: &Value) {
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let (fields, layers) = header.split_at(Sample::COLUMNS.len());
-    assert_eq!(fields, Sample::COLUMNS);
+    let (fields, layers) = header.split_at(COLUMNS.len());
+    assert_eq!(fields, COLUMNS);
     assert_eq!(layers, ["layer_0_soft_mm", "layer_1_stiff_mm"]);
     let samples = report["samples"].as_array().unwrap();
     let keys: BTreeSet<&str> = samples[0]
@@ -434,11 +466,10 @@ fn what_a_continuum_cannot_be_is_refused() {
 /// The notes of an indentation that is set up, or why it is not.
 fn set_up(scene: &str) -> Result<String, String> {
     let scene = Scene::parse(scene, std::path::Path::new(".")).unwrap();
-    let built = palpa::build::build(&scene).unwrap();
-    match Indentation::build(&scene, &built) {
-        Ok(indentation) => Ok(indentation.notes.join("\n")),
-        Err(error) => Err(format!("{error:#}")),
-    }
+    let prepared = Prepared::build(&scene).map_err(|error| format!("{error:#}"))?;
+    let indentation = Indentation::build(prepared.into()).map_err(|error| format!("{error:#}"))?;
+    let notes: Vec<String> = indentation.notes.iter().map(Note::to_string).collect();
+    Ok(notes.join("\n"))
 }
 
 #[test]
@@ -521,12 +552,12 @@ fn the_shipped_scenes_without_files_can_be_set_up() {
         if !matches!(scene.body.skin, Skin::Generated(_)) {
             continue;
         }
-        let built = palpa::build::build(&scene).unwrap();
-        let indentation = Indentation::build(&scene, &built).unwrap();
+        let prepared = Prepared::build(&scene).unwrap();
+        let indentation = Indentation::build(prepared.into()).unwrap();
         let sample = indentation.start(0).advance().unwrap();
-        let is_at_rest = sample.outcome == "converged" && sample.force_n.abs() < 1e-12;
+        let is_at_rest = sample.outcome.is_converged() && sample.force_n.abs() < 1e-12;
         assert!(is_at_rest, "{}: {sample:?}", path.display());
-        assert!(indentation.mesh.is_resolved, "{}", path.display());
+        assert!(indentation.mesh().is_resolved, "{}", path.display());
         n += 1;
     }
     assert!(n >= 4, "{n}");

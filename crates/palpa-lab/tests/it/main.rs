@@ -1,5 +1,3 @@
 //! Integration tests of the laboratory.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 mod verify;

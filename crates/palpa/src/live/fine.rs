@@ -5,13 +5,13 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use palpa_fem::realtime::FineBodies;
-use palpa_fem::{FemError, Materials, Model, ModelParams};
+use palpa_fem::{FemError, Model, ModelParams};
 use palpa_mesh::Vec3;
-use palpa_scene::Scene;
 
 use super::zone_radius;
-use crate::build::{BuiltBody, nearest};
+use crate::build::nearest;
 use crate::continuum;
+use crate::prepare::Prepared;
 use crate::press::mesh::CoarseBody;
 
 /// The fine part holds a zone, and so much round it, m.
@@ -21,9 +21,8 @@ const MOST_KEPT: usize = 24;
 
 /// Meshes of the scene's body, each fine round a vertex of the body as it was grown.
 pub struct FineScene {
-    scene: Scene,
+    prepared: Arc<Prepared>,
     coarse: CoarseBody,
-    materials: Materials,
     radius: f64,
     /// The latest last. Only the background takes it.
     kept: Mutex<VecDeque<(Vec3, Arc<Model>)>>,
@@ -38,34 +37,28 @@ impl fmt::Debug for FineScene {
 }
 
 impl FineScene {
-    /// Of a scene and the body that was grown for it.
+    /// Of a prepared scene.
     ///
     /// # Errors
     /// When the scene does not fit the body.
-    pub fn new(scene: &Scene, built: &BuiltBody) -> anyhow::Result<Self> {
-        let lumps = continuum::lumps(scene, built, &mut Vec::new())?;
-        let coarse = CoarseBody::build(scene, built, &lumps)?;
+    pub fn new(prepared: Arc<Prepared>) -> anyhow::Result<Self> {
+        let scene = &prepared.scene;
         Ok(Self {
-            coarse,
-            materials: Materials {
-                materials: continuum::materials(scene)?,
-                layers: (0..scene.layers.len()).collect(),
-                lumps,
-                stiffness: None,
-            },
+            coarse: CoarseBody::build(scene, &prepared.grown, prepared.lumps())?,
             radius: zone_radius(scene) + MARGIN,
             kept: Mutex::default(),
-            scene: scene.clone(),
+            prepared,
         })
     }
 
     fn build(&self, place: Vec3) -> Result<Model, FemError> {
-        let body = self.coarse.fine_round(&self.scene, place, self.radius);
-        let supports = continuum::supports(self.scene.body.cut_faces, &body, &mut Vec::new());
+        let scene = &self.prepared.scene;
+        let body = self.coarse.fine_round(scene, place, self.radius);
+        let supports = continuum::supports(scene.body.cut_faces, &body, &mut Vec::new());
         let params = ModelParams {
-            alpha: self.scene.model.alpha,
+            alpha: scene.model.alpha,
         };
-        Model::build(&body, &self.materials, &supports, params)
+        Model::build(&body, &self.prepared.materials, &supports, params)
     }
 }
 

@@ -8,18 +8,18 @@
 
 mod fine;
 mod hand;
+mod moving;
 mod record;
 mod rehearsal;
 mod springs;
-mod tissue;
 mod watch;
 
 pub use fine::FineScene;
 pub use hand::{device_model, grip, once_from, path};
+pub use moving::LiveTissue;
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
 pub use springs::{SpringScene, SpringTissue};
-pub use tissue::LiveTissue;
 pub use watch::{Look, Seen, Watch};
 
 use std::sync::Arc;
@@ -32,10 +32,12 @@ use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Tool};
 use palpa_servo::Pose;
 
-use crate::build::{BuiltBody, build_within, in_mm, nearest};
+use crate::build::{build_within, in_mm, nearest};
+use crate::note::Note;
+use crate::prepare::Prepared;
 use crate::press::column_length;
 use crate::press::mesh::along_skin;
-use crate::press::tissue::Indentation;
+use crate::press::tissue::{note_mesh, note_tension};
 
 /// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
 /// least so much, m.
@@ -60,8 +62,8 @@ pub struct LiveScene {
     pub scene_from_device: Pose,
     /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
     pub meshes: Option<Arc<FineScene>>,
-    /// The body as it was grown, with its bones.
-    pub built: Arc<BuiltBody>,
+    /// The scene that is touched, with its body, lumps and materials.
+    pub prepared: Arc<Prepared>,
     /// Where the hand begins, in the device's frame, m.
     pub start: Vec3,
     /// How the moving step goes about its work.
@@ -69,7 +71,7 @@ pub struct LiveScene {
     /// Mean length of the skin's edges near the tool, m.
     pub mesh_size: f64,
     /// What a user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 impl LiveScene {
@@ -81,13 +83,12 @@ impl LiveScene {
         if !matches!(scene.tool, Tool::Contact(_)) {
             bail!(
                 "in real time the tool presses by contact, and the scene's is a {}; give [tool] a shape such as \"sphere\", \
-                 \"flat_punch\" or \"fingertip\"",
+                 \"flat-punch\" or \"fingertip\"",
                 scene.tool
             );
         }
         let scene = &coarser(scene);
-        let built = build_within(scene, MOST_NODES).context("in real time")?;
-        let built = Arc::new(built);
+        let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
         let moves = scene.mesh.moves;
         if moves && !scene.mesh.refine {
             bail!(
@@ -95,21 +96,20 @@ impl LiveScene {
             );
         }
         let way = if moves { Vec::new() } else { way(scene) };
-        let indentation = Indentation::build_along(scene, &built, &way)?;
-        let mut notes = built.notes.clone();
-        notes.extend(indentation.notes.iter().cloned());
-        check_way(scene, &built, &indentation, &mut notes)?;
-        if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
-            notes.push(
-                "tension of layers is not at rest when the loop starts: the first steps of the tissue relax it".into(),
-            );
-        }
-        let Some(posed) = indentation.tool_at(-scene.motion.above) else {
+        let prepared = Arc::new(Prepared::on(scene, grown, &way)?);
+        // The body that the loop begins with; where the mesh moves, a body without tension needs no other.
+        let rest = if prepared.is_tense() {
+            Some(prepared.rest()?)
+        } else {
+            None
+        };
+        let Some(approach) = prepared.approach(rest.as_ref())? else {
             bail!("the tool is bonded to the skin");
         };
+        let posed = approach.at(-scene.motion.above);
         let start = hand::beginning(scene, &posed.pose);
         let meshes = if moves {
-            Some(Arc::new(FineScene::new(scene, &built)?))
+            Some(Arc::new(FineScene::new(Arc::clone(&prepared))?))
         } else {
             None
         };
@@ -118,21 +118,28 @@ impl LiveScene {
                 let at = posed.pose * nalgebra::Point3::from(start);
                 meshes.model(meshes.place(at.coords))?
             }
-            None => Arc::new(indentation.model),
+            None => prepared.model()?,
         };
+        let mesh = &prepared.mesh;
         if model.n_nodes() > MOST_NODES {
             bail!(
                 "{} nodes are more than can be pressed in real time, {MOST_NODES}; make the mesh coarser: [mesh] near_tool is \
                  {:.1} mm under the tool now",
                 model.n_nodes(),
-                1e3 * indentation.mesh.mesh_size
+                1e3 * mesh.mesh_size
             );
+        }
+        let mut notes = prepared.notes.clone();
+        note_mesh(&model, mesh, scene, &mut notes);
+        note_tension(&mesh.body, scene, &mut notes);
+        check_way(scene, &prepared, &mut notes)?;
+        if prepared.is_tense() {
+            notes.push(Note::TensionRelaxes);
         }
         Ok(Self {
             start,
-            built,
             meshes,
-            mesh_size: indentation.mesh.mesh_size,
+            mesh_size: mesh.mesh_size,
             params: LiveParams {
                 zone_radius: zone_radius(scene),
                 exterior: ExteriorMode::Linear,
@@ -142,6 +149,7 @@ impl LiveScene {
             tool: posed.tool,
             scene_from_device: posed.pose,
             notes,
+            prepared,
         })
     }
 
@@ -216,27 +224,21 @@ fn way(scene: &Scene) -> Vec<f64> {
 }
 
 /// Whether the hand's way lies on the body, and is not deeper than it.
-fn check_way(
-    scene: &Scene,
-    built: &BuiltBody,
-    indentation: &Indentation,
-    notes: &mut Vec<String>,
-) -> anyhow::Result<()> {
-    let (body, place) = (&built.growth.body, &indentation.place);
+fn check_way(scene: &Scene, prepared: &Prepared, notes: &mut Vec<Note>) -> anyhow::Result<()> {
+    let (body, place) = (&prepared.grown.growth.body, prepared.place());
     let along = along_skin(scene, &place.direction);
     let index = SurfaceIndex::build(&body.skin);
     let depth = scene.motion.depth;
     for far in way(scene) {
-        let over = built.press_at + along * far;
+        let over = prepared.grown.press_at + along * far;
         let Some(closest) = index.closest(over) else {
             continue;
         };
         if (closest.point - over).norm() > depth {
-            notes.push(format!(
-                "{:.0} mm along its way the tool is off the skin, where nothing is felt; shorten [motion] length = \"{:.0} mm\"",
-                far * 1e3,
-                scene.motion.length * 1e3
-            ));
+            notes.push(Note::MotionOffSkin {
+                far,
+                length: scene.motion.length,
+            });
             break;
         }
         let thickness = column_length(body, nearest(&body.skin, closest.point));

@@ -1,10 +1,7 @@
 //! Lumps as they are looked at: their share of every prism, and their surface as it moves with the tissue.
 
-use palpa_fem::lump::{Lump, LumpShape};
+use palpa_fem::lump::Lump;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
-use palpa_scene::Scene;
-
-use crate::build::{mended, read_in_metres};
 
 /// Samples along each side of a triangle, and over the height of a prism.
 const IN_PLANE: usize = 4;
@@ -103,26 +100,8 @@ fn points_inside(lump: &Lump) -> Vec<Vec3> {
     }
 }
 
-/// The surface of a lump at rest. m
-///
-/// # Errors
-/// When the file of a mesh cannot be read any more.
-pub fn lump_surface(
-    scene: &Scene,
-    given: &palpa_scene::Lump,
-    lump: &Lump,
-) -> anyhow::Result<Surface> {
-    if let (palpa_scene::LumpShape::Mesh(path), LumpShape::Mesh(mesh)) =
-        (&given.shape, lump.shape())
-    {
-        // What there is to note was noted when the lump was made.
-        let mut notes = Vec::new();
-        let mut surface = read_in_metres(path, scene.body.unit, &mut notes)?;
-        surface = mended(&surface, path, &mut notes);
-        let shift = lump.pose().translation.vector - mesh.centroid();
-        surface.points.iter_mut().for_each(|p| *p += shift);
-        return Ok(surface);
-    }
+/// The surface of a lump of a simple convex shape at rest. m
+pub(crate) fn surface_of_shape(lump: &Lump) -> Surface {
     let (middle, reach) = lump.bounding_sphere();
     let axes = lump.pose().rotation;
     let point = |j: usize, i: usize| {
@@ -155,7 +134,7 @@ pub fn lump_surface(
         })
         .filter(|[a, b, c]| a != b && b != c && c != a)
         .collect();
-    Ok(Surface { points, triangles })
+    Surface { points, triangles }
 }
 
 /// How far a convex lump reaches from its middle in a direction. m
@@ -261,6 +240,7 @@ fn inverse(corners: &[Vec3; 4]) -> Option<nalgebra::Matrix3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpa_fem::lump::LumpShape;
     use palpa_fem::shape::{Pose, Sphere};
     use palpa_mesh::generate;
 

@@ -11,7 +11,8 @@ use palpa_scene::{ContactShape, Scene, Target, Tool};
 
 use super::place::mesh_size_near;
 use super::{Place, nodes_under_disc};
-use crate::build::{BuiltBody, in_mm, nearest};
+use crate::build::{BuiltBody, nearest};
+use crate::note::{Note, xyz};
 
 /// Most levels that splitting leads to: the cost grows with their cube.
 const MOST_LEVELS: usize = 24;
@@ -71,7 +72,7 @@ impl PressedBody {
         built: &BuiltBody,
         lumps: &[Lump],
         way: &[f64],
-        notes: &mut Vec<String>,
+        notes: &mut Vec<Note>,
     ) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
         // What is wrong with the place is said before any work, and once.
@@ -90,17 +91,16 @@ impl PressedBody {
         let stand_off = refined.interpolate(&built.growth.stand_off);
         let is_fine = refined.n_too_large == 0;
         if !is_fine {
-            notes.push(format!(
-                "{} skin triangles are larger than wanted near the tool or a lump, since [mesh] max_vertices = {} was \
-                 reached",
-                refined.n_too_large, scene.mesh.max_vertices
-            ));
+            notes.push(Note::SkinTooCoarse {
+                n_triangles: refined.n_too_large,
+                max_vertices: scene.mesh.max_vertices,
+            });
         }
         let (body, is_split) = split_near(scene, refined.body, &place, lumps);
         if !is_split {
-            notes.push(format!(
-                "levels are higher than wanted under the tool or round a lump, since there are {MOST_LEVELS} already"
-            ));
+            notes.push(Note::LevelsTooHigh {
+                max_levels: MOST_LEVELS,
+            });
         }
         Ok(Self {
             mesh_size: mesh_size_near(&body, place.at, scene.tool.contact_radius()),
@@ -129,7 +129,7 @@ fn refine_near(
     place: &Place,
     lumps: &[Lump],
     way: &[f64],
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Refined {
     let body = &built.growth.body;
     let mut fine = Vec::new();
@@ -170,7 +170,7 @@ fn over_lumps(
     scene: &Scene,
     body: &LayeredBody,
     lumps: &[Lump],
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Vec<Fine> {
     if lumps.is_empty() || !scene.mesh.refine {
         return Vec::new();
@@ -179,10 +179,9 @@ fn over_lumps(
     let mut fine = Vec::new();
     for (lump, given) in lumps.iter().zip(&scene.lumps) {
         let Some(h) = scene.mesh.near_lump_of(given) else {
-            notes.push(format!(
-                "the mesh is not refined round the lump \"{}\", whose size it does not know; set [mesh] near_lumps",
-                given.name
-            ));
+            notes.push(Note::LumpNotRefined {
+                lump: given.name.clone(),
+            });
             continue;
         };
         let (points, radius) = backbone(lump);
@@ -423,13 +422,15 @@ fn bond(
     refined: &mut Refined,
     place: &Place,
     radius: f64,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Patch {
     if scene.mesh.refine {
         match imprinted(refined, place, radius) {
             Ok((imprint, triangles, effective)) => {
                 *refined = imprint;
-                let corners = triangles.iter().flat_map(|&t| refined.body.skin.triangles[t as usize]);
+                let corners = triangles
+                    .iter()
+                    .flat_map(|&t| refined.body.skin.triangles[t as usize]);
                 let mut vertices: Vec<usize> = corners.map(|v| v as usize).collect();
                 vertices.sort_unstable();
                 vertices.dedup();
@@ -439,10 +440,9 @@ fn bond(
                     radius: effective,
                 };
             }
-            Err(why) => notes.push(format!(
-                "the disc's edge could not be made a ring of vertices, so that its radius is that of the vertices under it: \
-                 {why}"
-            )),
+            Err(why) => notes.push(Note::DiscNotImprinted {
+                why: why.to_string(),
+            }),
         }
     }
     let body = &refined.body;
@@ -468,13 +468,12 @@ fn bond(
         vertices: nodes.iter().map(|node| node / body.n_levels).collect(),
         radius: (area / std::f64::consts::PI).sqrt(),
     };
-    notes.push(format!(
-        "{} skin vertices lie under the disc of radius {:.1} mm at ({}) mm; they hold a patch of radius {:.1} mm",
-        nodes.len(),
-        radius * 1e3,
-        in_mm(place.at),
-        patch.radius * 1e3,
-    ));
+    notes.push(Note::DiscPatch {
+        n_vertices: nodes.len(),
+        radius,
+        at: xyz(place.at),
+        effective_radius: patch.radius,
+    });
     patch
 }
 

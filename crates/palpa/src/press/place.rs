@@ -6,6 +6,7 @@ use palpa_mesh::{LayeredBody, Vec3};
 use palpa_scene::Scene;
 
 use crate::build::in_mm;
+use crate::note::Note;
 
 /// Edges within this many tool radii of the press point make the mesh size near the tool.
 const NEAR_TOOL: f64 = 2.0;
@@ -34,7 +35,7 @@ impl Place {
         scene: &Scene,
         body: &LayeredBody,
         vertex: usize,
-        notes: &mut Vec<String>,
+        notes: &mut Vec<Note>,
     ) -> anyhow::Result<Self> {
         let at = body.skin.points[vertex];
         let inward = -body.skin.vertex_normals()[vertex];
@@ -57,10 +58,9 @@ impl Place {
             );
         }
         if slant < OBLIQUE_COS {
-            notes.push(format!(
-                "the press direction is {:.0}° from the skin's inward normal: the tool drags more than it presses",
-                slant.acos().to_degrees()
-            ));
+            notes.push(Note::ObliquePress {
+                angle: slant.acos(),
+            });
         }
         let tissue_depth = column_length(body, vertex);
         if scene.press.depth >= tissue_depth {
@@ -74,7 +74,7 @@ impl Place {
         }
         let mut on_rim = body.cut_faces.iter().flat_map(|face| &face.vertices);
         if on_rim.any(|&v| v as usize == vertex) {
-            notes.push("the press point lies on a cut face of the body; the force there is that of a free edge".into());
+            notes.push(Note::PressOnCutFace);
         }
         Ok(Self {
             vertex,

@@ -12,7 +12,8 @@ use serde::Serialize;
 
 use super::place::mesh_size_near;
 use super::{Phase, Place, Waypoint, tidy, waypoints};
-use crate::build::{BuiltBody, in_mm};
+use crate::build::BuiltBody;
+use crate::note::{Note, xyz};
 
 /// Samples of a rest, evenly spread: springs do not relax, so that it is all the same.
 const HOLD_SAMPLES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
@@ -32,7 +33,7 @@ pub struct Indentation {
     /// Mean length of the skin's edges near the tool. m
     pub mesh_size: f64,
     /// What a user should know beside the result.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     params: StepParams,
     path: Vec<Waypoint>,
 }
@@ -64,9 +65,21 @@ pub struct Sample {
     /// Prisms that are turned over: bars have no volume and do not prevent it. From the first one on the force is that
     /// of the bars alone, no longer of a body.
     pub n_inverted: usize,
-    /// `converged`, `euler_fallback` (a singular step was done by explicit Euler) or `diverged`: then the state is the one
-    /// before, the forces are those of the sample before, and the run ends.
-    pub outcome: &'static str,
+    /// How the step ended. If it diverged, the state is the one before, the forces are those of the sample before, and the
+    /// run ends.
+    pub outcome: SampleOutcome,
+}
+
+/// How the step to a sample ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SampleOutcome {
+    /// By incremental finite elements.
+    Converged,
+    /// The step was singular and was done by explicit Euler.
+    EulerFallback,
+    /// The body was lost.
+    Diverged,
 }
 
 /// What moves while an indentation runs.
@@ -105,23 +118,18 @@ impl Indentation {
         };
         let mesh_size = mesh_size_near(body, at, radius);
         if matches!(scene.tool, Tool::Disc { .. }) && operated.len() < ENOUGH_NODES {
-            notes.push(format!(
-                "only {} skin vertices lie under the tool of radius {:.1} mm, with edges of {:.1} mm there: the force \
-                 depends on the mesh; take a finer skin or a larger tool",
-                operated.len(),
-                radius * 1e3,
-                mesh_size * 1e3,
-            ));
+            notes.push(Note::FewUnderDisc {
+                n_vertices: operated.len(),
+                radius,
+                edge: mesh_size,
+            });
         }
         note_aspects(built, scene, mesh_size, &mut notes);
         if scene.layers.iter().any(|layer| layer.prestress > 0.0) {
-            notes.push("bars are without tension at rest; `prestress` was left out".into());
+            notes.push(Note::TensionLeftOut);
         }
         if scene.press.speeds.len() > 1 {
-            notes.push(
-                "bars have no time, so every speed gives the same force; only the first of `speeds` was run"
-                    .into(),
-            );
+            notes.push(Note::FirstSpeedOnly);
         }
         let model = SpringModel::build(
             body,
@@ -197,11 +205,11 @@ impl Run<'_> {
             params,
         );
         let outcome = match report.outcome {
-            Outcome::Converged => "converged",
-            Outcome::EulerFallback { .. } => "euler_fallback",
-            Outcome::Diverged { .. } | Outcome::NotFinite => "diverged",
+            Outcome::Converged => SampleOutcome::Converged,
+            Outcome::EulerFallback { .. } => SampleOutcome::EulerFallback,
+            Outcome::Diverged { .. } | Outcome::NotFinite => SampleOutcome::Diverged,
         };
-        self.next = if outcome == "diverged" {
+        self.next = if outcome == SampleOutcome::Diverged {
             path.len()
         } else {
             self.next + 1
@@ -297,7 +305,7 @@ pub(crate) fn constraints(
     scene: &Scene,
     body: &LayeredBody,
     operated: Vec<usize>,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Constraints {
     let mut constraints = Constraints::hold(body, operated);
     let nodes = |v: u32| (0..body.n_levels).map(move |l| body.node(v as usize, l));
@@ -311,10 +319,9 @@ pub(crate) fn constraints(
                     .extend(rim.flat_map(nodes).map(|node| (node, face.normal)));
             }
             CutFaces::Symmetric => {
-                notes.push(format!(
-                    "the cut face at ({}) mm is not flat, so it is no plane of symmetry; it was left free",
-                    in_mm(face.point)
-                ));
+                notes.push(Note::CutFaceNotFlat {
+                    at: xyz(face.point),
+                });
             }
             // What the tool holds, it holds.
             CutFaces::Fixed => {
@@ -366,22 +373,20 @@ pub(crate) fn nodes_under_disc(
 }
 
 /// Says which layers have levels too flat or too tall for bars to stand for their modulus.
-fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<String>) {
-    let unsound: Vec<String> = (built.growth.report.layers.iter().zip(&scene.layers))
+fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<Note>) {
+    let unsound: Vec<(String, f64)> = (built.growth.report.layers.iter().zip(&scene.layers))
         .filter(|(_, layer)| layer.tissue.elastic().is_some())
         .filter_map(|(report, _)| {
             let height = report.thickness.median / report.n_levels as f64;
             let aspect = height / mesh_size;
-            (!SOUND_ASPECT.contains(&aspect)).then(|| format!("{} {aspect:.2}", report.name))
+            (!SOUND_ASPECT.contains(&aspect)).then(|| (report.name.clone(), aspect))
         })
         .collect();
     if !unsound.is_empty() {
-        notes.push(format!(
-            "levels over skin edges near the tool: {}; outside {} to {} bars are too stiff across or too soft in shear, \
-             and the force depends on the number of levels",
-            unsound.join(", "),
-            SOUND_ASPECT.start(),
-            SOUND_ASPECT.end(),
-        ));
+        notes.push(Note::BarAspects {
+            layers: unsound,
+            least: *SOUND_ASPECT.start(),
+            most: *SOUND_ASPECT.end(),
+        });
     }
 }

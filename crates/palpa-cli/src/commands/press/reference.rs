@@ -10,8 +10,9 @@ use self::report::{PressReport, announce, conclude, facts, result_of};
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
+use palpa::Note;
 use palpa::build::build;
-use palpa::press::reference::Indentation;
+use palpa::press::reference::{Indentation, SampleOutcome};
 
 /// Runs the press.
 pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
@@ -26,11 +27,8 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     let built = build(scene)?;
     drop(spinner);
     let indentation = Indentation::build(scene, &built)?;
-    let notes: Vec<String> = built
-        .notes
-        .iter()
-        .chain(&indentation.notes)
-        .cloned()
+    let notes: Vec<String> = (built.notes.iter().chain(&indentation.notes))
+        .map(Note::to_string)
         .collect();
     let materials = scene.material_status();
     announce(context, scene_name, scene, &built, &indentation, &materials)?;
@@ -59,7 +57,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     conclude(context, out.path(), &recorded, &report, &pictures, &notes)?;
     Ok(match (context.is_interrupted(), report.result.outcome) {
         (true, _) => Outcome::Interrupted,
-        (_, "diverged") => Outcome::NotGood,
+        (_, SampleOutcome::Diverged) => Outcome::NotGood,
         _ => Outcome::Done,
     })
 }

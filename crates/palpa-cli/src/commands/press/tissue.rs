@@ -6,6 +6,8 @@ mod record;
 mod report;
 mod result;
 
+use std::sync::Arc;
+
 use palpa_scene::Scene;
 
 use self::pictures::draw_pictures;
@@ -15,8 +17,8 @@ use self::result::result_of;
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
-use palpa::build::build;
-use palpa::press::tissue::Indentation;
+use palpa::press::tissue::{Indentation, SampleOutcome};
+use palpa::{Note, Prepared};
 
 /// Runs the press.
 pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
@@ -27,31 +29,29 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         ..
     } = *job;
     let spinner = context.progress(0, "growing the body");
-    let built = build(scene)?;
+    let prepared = Arc::new(Prepared::build(scene)?);
     spinner.set_message("setting up the model");
-    let indentation = Indentation::build(scene, &built)?;
+    let indentation = Indentation::build(prepared)?;
     drop(spinner);
     let materials: Vec<_> = materials_of(scene);
-    announce(job, &built, &indentation, &materials)?;
+    announce(job, &indentation, &materials)?;
 
     context.begin_recording();
     remove_older(out.path())?;
-    let recorded = record(job, &built, &indentation)?;
+    let recorded = record(job, &indentation)?;
     let result = result_of(
         &indentation,
         &recorded,
         &materials,
         context.is_interrupted(),
     );
-    let notes: Vec<String> = (built.notes.iter())
-        .chain(&indentation.notes)
-        .chain(&result.notes)
-        .cloned()
+    let notes: Vec<String> = (indentation.notes.iter().chain(&result.notes))
+        .map(Note::to_string)
         .collect();
     let report = PressReport {
         model: "tissue",
         scene: job.scene_name,
-        body: &built.growth.report,
+        body: &indentation.prepared.grown.growth.report,
         materials: &materials,
         press: facts(scene, &indentation),
         result,
@@ -60,7 +60,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     };
     out.write_json("press.json", &report)?;
     let pictures = if recorded.samples.len() > 1 {
-        draw_pictures(job, &built, &indentation, &recorded, &report.result)?
+        draw_pictures(job, &indentation, &recorded, &report.result)?
     } else {
         Vec::new()
     };
@@ -68,7 +68,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     conclude(job, &indentation, &report, &pictures)?;
     Ok(match (context.is_interrupted(), report.result.outcome) {
         (true, _) => Outcome::Interrupted,
-        (_, "converged") => Outcome::Done,
+        (_, SampleOutcome::Converged) => Outcome::Done,
         _ => Outcome::NotGood,
     })
 }

@@ -10,7 +10,7 @@ use super::record::Recorded;
 use super::report::PressResult;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
-use palpa::press::reference::{Indentation, Sample};
+use palpa::press::reference::{Indentation, Sample, SampleOutcome};
 use palpa_plot::output::OutDir;
 use palpa_plot::section::{Panel, ToolOutline, cut_body, draw};
 use palpa_plot::{Axis, Chart, Guide};
@@ -26,7 +26,7 @@ pub(super) fn draw_pictures(
     let samples: Vec<&Sample> = recorded
         .samples
         .iter()
-        .filter(|s| s.outcome != "diverged")
+        .filter(|s| s.outcome != SampleOutcome::Diverged)
         .collect();
     let of_phase = |phases: &[Phase]| -> Vec<[f64; 2]> {
         samples

@@ -6,7 +6,7 @@ use super::super::Args;
 use super::super::files::{Series, with_making};
 use crate::cli::Context;
 use palpa::build::BuiltBody;
-use palpa::press::reference::{Indentation, Run, Sample};
+use palpa::press::reference::{Indentation, Run, Sample, SampleOutcome};
 use palpa_plot::output::OutDir;
 use palpa_plot::vtu::Grid;
 
@@ -37,7 +37,7 @@ pub(super) fn record(
     let progress = context.progress(indentation.n_samples(), "pressing");
     while let Some(sample) = run.advance() {
         table.push(&sample)?;
-        if sample.outcome != "diverged" {
+        if sample.outcome != SampleOutcome::Diverged {
             if series.wants(recorded.samples.len()) {
                 series.push(out, sample.time_s, &grid(built, &run))?;
             }

@@ -12,7 +12,7 @@ use crate::cli::Context;
 use crate::table::Table;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
-use palpa::press::reference::{Indentation, Sample};
+use palpa::press::reference::{Indentation, Sample, SampleOutcome};
 
 /// What `--json` prints and press.json holds.
 #[derive(Debug, Serialize)]
@@ -41,7 +41,7 @@ pub(super) struct PressFacts {
 
 #[derive(Debug, Serialize)]
 pub(super) struct PressResult {
-    pub(super) outcome: &'static str,
+    pub(super) outcome: SampleOutcome,
     /// Whether the whole script was run; not after Ctrl-C or a divergence.
     pub(super) is_complete: bool,
     pub(super) max_force_n: f64,
@@ -71,16 +71,19 @@ pub(super) fn result_of(
     materials: &[MaterialStatus],
     is_interrupted: bool,
 ) -> PressResult {
-    let good: Vec<&Sample> = samples.iter().filter(|s| s.outcome != "diverged").collect();
+    let good: Vec<&Sample> = samples
+        .iter()
+        .filter(|s| s.outcome != SampleOutcome::Diverged)
+        .collect();
     let max = good.iter().max_by(|a, b| a.force_n.total_cmp(&b.force_n));
     let (max_force_n, at_depth_mm) = max.map_or((0.0, 0.0), |s| (s.force_n, s.depth_mm));
-    let is_any = |outcome: &str| samples.iter().any(|s| s.outcome == outcome);
+    let is_any = |outcome: SampleOutcome| samples.iter().any(|s| s.outcome == outcome);
     PressResult {
-        is_complete: !is_interrupted && !is_any("diverged"),
+        is_complete: !is_interrupted && !is_any(SampleOutcome::Diverged),
         outcome: match () {
-            () if is_any("diverged") => "diverged",
-            () if is_any("euler_fallback") => "euler_fallback",
-            () => "converged",
+            () if is_any(SampleOutcome::Diverged) => SampleOutcome::Diverged,
+            () if is_any(SampleOutcome::EulerFallback) => SampleOutcome::EulerFallback,
+            () => SampleOutcome::Converged,
         },
         max_force_n,
         at_depth_mm,
@@ -171,7 +174,7 @@ pub(super) fn conclude(
             "back at the start {left:.3} N are left: the drift of a force summed along the path, nothing that tissue does"
         ))?;
     }
-    if r.outcome == "diverged" {
+    if r.outcome == SampleOutcome::Diverged {
         context.say(
             "the last step DIVERGED; results end before it. Use more substeps or a smaller step",
         )?;

@@ -9,8 +9,8 @@ use palpa_plot::vtu::Grid;
 /// Point arrays: `displacement` (m), `force` that holds a node (N), `contact_pressure` on the skin (Pa), and how the body was
 /// made. Cell arrays, each a mean over the prism: `cauchy`, `von_mises` and `pressure` (Pa), `stretch_min` and `stretch_max`,
 /// `volume_ratio`, `strain_energy` (J/m³), `lump` (the share of it that is lump, by volume).
-pub(super) fn grid(indentation: &Indentation, run: &Run<'_>) -> Grid {
-    let (model, mesh) = (&indentation.model, &indentation.mesh);
+pub(super) fn grid(indentation: &Indentation, lump_shares: &[f64], run: &Run<'_>) -> Grid {
+    let (model, mesh) = (&indentation.model, indentation.mesh());
     let body = &mesh.body;
     let fields = prism_fields(model, &run.state, &run.workspace);
     let scalar = |of: fn(&PrismField) -> f64| fields.iter().map(of).collect::<Vec<f64>>();
@@ -30,8 +30,8 @@ pub(super) fn grid(indentation: &Indentation, run: &Run<'_>) -> Grid {
         .with_cell_scalars("stretch_max", scalar(|field| field.stretches[2]))
         .with_cell_scalars("volume_ratio", scalar(|field| field.volume_ratio))
         .with_cell_scalars("strain_energy", scalar(|field| field.energy));
-    if !indentation.lump_shares.is_empty() {
-        grid = grid.with_cell_scalars("lump", indentation.lump_shares.clone());
+    if !lump_shares.is_empty() {
+        grid = grid.with_cell_scalars("lump", lump_shares.to_vec());
     }
     with_making(grid, body, &mesh.thinning, &mesh.stand_off)
 }

@@ -9,28 +9,27 @@ use palpa_scene::{Scene, Tool};
 use super::super::{Job, cut};
 use super::record::Recorded;
 use super::result::PressResult;
-use palpa::build::{BuiltBody, in_mm};
+use palpa::build::in_mm;
 use palpa::press::Phase;
-use palpa::press::lump::{Embedded, lump_surface};
+use palpa::press::lump::Embedded;
 use palpa::press::tissue::{Indentation, Sample};
 use palpa_plot::section::{Panel, Plane, Shades, ToolOutline, cut_body, draw};
 use palpa_plot::{Axis, Chart, PALETTE, Picture, Series};
 
 pub(super) fn draw_pictures(
     job: &Job<'_>,
-    built: &BuiltBody,
     indentation: &Indentation,
     recorded: &Recorded,
     result: &PressResult,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let out = job.out;
     let samples: Vec<&Sample> = (recorded.samples.iter())
-        .filter(|s| s.outcome == "converged")
+        .filter(|s| s.outcome.is_converged())
         .collect();
     let subtitle = format!(
         "{}; skin edges {:.1} mm near it; {}",
         job.scene.tool,
-        indentation.mesh.mesh_size * 1e3,
+        indentation.mesh().mesh_size * 1e3,
         result.material_status
     );
     let mut paths = Vec::new();
@@ -47,7 +46,7 @@ pub(super) fn draw_pictures(
         let relaxation = relaxation(&samples, indentation).subtitle(&subtitle).draw();
         paths.extend(relaxation.save(out, "relaxation")?);
     }
-    if let Some([section, stress]) = sections(job, built, indentation, recorded)? {
+    if let Some([section, stress]) = sections(job, indentation, recorded) {
         paths.extend(section.save(out, "section")?);
         paths.extend(stress.save(out, "stress")?);
     }
@@ -55,22 +54,12 @@ pub(super) fn draw_pictures(
 }
 
 /// The body cut through the press point, at rest and at the deepest sample: its layers and lumps, and its stress.
-fn sections(
-    job: &Job<'_>,
-    built: &BuiltBody,
-    indentation: &Indentation,
-    recorded: &Recorded,
-) -> anyhow::Result<Option<[Picture; 2]>> {
-    let body = &indentation.mesh.body;
-    let place = &indentation.place;
+fn sections(job: &Job<'_>, indentation: &Indentation, recorded: &Recorded) -> Option<[Picture; 2]> {
+    let body = &indentation.mesh().body;
+    let place = indentation.place();
     let deepest = &recorded.deepest;
-    let Some(plane) = cut::plane(body, place) else {
-        return Ok(None);
-    };
-    let mut at_rest: Vec<Surface> = Vec::new();
-    for (given, lump) in job.scene.lumps.iter().zip(&indentation.lumps) {
-        at_rest.push(lump_surface(job.scene, given, lump)?);
-    }
+    let plane = cut::plane(body, place)?;
+    let at_rest = indentation.prepared.lump_surfaces();
     let moved: Vec<Surface> = (at_rest.iter())
         .map(|surface| {
             let embedded = Embedded::new(body, &surface.points);
@@ -85,7 +74,7 @@ fn sections(
     let positions: Vec<Vec3> = (body.positions.iter().zip(&deepest.displacements))
         .map(|(p, u)| p + u)
         .collect();
-    let bones = cut::lines(&built.bones, &plane);
+    let bones = cut::lines(&indentation.prepared.grown.bones, &plane);
     let [rest_lumps, pressed_lumps] = [&at_rest, &moved].map(|s| cut::lines(s, &plane));
     let [rest, pressed] =
         [&body.positions, &positions].map(|positions| cut_body(body, positions, &plane));
@@ -126,10 +115,7 @@ fn sections(
         shades: Some(shades),
         ..panel
     };
-    Ok(Some([
-        layers,
-        draw("Stress under the tool", &through, &[stressed]),
-    ]))
+    Some([layers, draw("Stress under the tool", &through, &[stressed])])
 }
 
 /// The largest value that shades tell apart: a few prisms at a sharp edge would take the contrast from all others.
@@ -150,8 +136,8 @@ fn tool_outline(
     plane: &Plane,
     depth: f64,
 ) -> ToolOutline {
-    let direction = indentation.place.direction.into_inner();
-    let at = indentation.place.at + direction * depth;
+    let direction = indentation.place().direction.into_inner();
+    let at = indentation.place().at + direction * depth;
     let Some(PosedTool { tool, pose }) = indentation.tool_at(depth) else {
         return match scene.tool {
             Tool::Disc { radius } => ToolOutline::disc(plane, &at, &direction, radius),
@@ -277,7 +263,7 @@ fn layers(samples: &[&Sample], indentation: &Indentation) -> Chart {
     let Some(rest) = down.first() else {
         return chart;
     };
-    let names = &indentation.mesh.body.layer_names;
+    let names = &indentation.mesh().body.layer_names;
     for (i, name) in names.iter().enumerate() {
         let at_rest = rest.layer_thickness_mm[i];
         let points = down

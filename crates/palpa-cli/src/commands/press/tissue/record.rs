@@ -7,7 +7,6 @@ use palpa_mesh::{LayeredBody, Vec3};
 use super::super::Job;
 use super::super::files::Series;
 use super::fields::grid;
-use palpa::build::BuiltBody;
 use palpa::press::tissue::{Failure, Indentation, Run, Sample};
 use palpa_plot::output::{CsvTable, OutDir};
 
@@ -41,11 +40,7 @@ pub(super) struct Turned {
 }
 
 /// Runs the script at every speed; each sample goes to the table at once, so that an interrupted run leaves a valid one.
-pub(super) fn record(
-    job: &Job<'_>,
-    built: &BuiltBody,
-    indentation: &Indentation,
-) -> anyhow::Result<Recorded> {
+pub(super) fn record(job: &Job<'_>, indentation: &Indentation) -> anyhow::Result<Recorded> {
     let Job {
         args,
         context,
@@ -56,6 +51,7 @@ pub(super) fn record(
     let names = scene.layers.iter().map(|layer| layer.tissue.name.as_str());
     let mut table = table(out, names)?;
     let n_samples = indentation.n_samples();
+    let lump_shares = indentation.prepared.lump_shares();
     let mut series = Series::new(args.frames, n_samples, indentation.deepest());
     let mut recorded = Recorded {
         samples: Vec::new(),
@@ -65,7 +61,7 @@ pub(super) fn record(
             depth_mm: 0.0,
             displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
             level_forces: Vec::new(),
-            von_mises: vec![0.0; indentation.mesh.body.n_prisms()],
+            von_mises: vec![0.0; indentation.mesh().body.n_prisms()],
             turned: None,
         },
     };
@@ -78,7 +74,7 @@ pub(super) fn record(
             table.push(&sample)?;
             if run.failure.is_none() && index == 0 {
                 if series.wants(number) {
-                    series.push(out, sample.time_s, &grid(indentation, &run))?;
+                    series.push(out, sample.time_s, &grid(indentation, &lump_shares, &run))?;
                 }
                 if sample.depth_mm > recorded.deepest.depth_mm {
                     recorded.deepest = deepest(indentation, &run, number, sample.depth_mm);
@@ -94,7 +90,7 @@ pub(super) fn record(
         recorded.failures.extend(run.failure);
     }
     table.finish()?;
-    series.finish(out, &built.bones)?;
+    series.finish(out, &indentation.prepared.grown.bones)?;
     Ok(recorded)
 }
 
@@ -109,7 +105,7 @@ fn deepest(indentation: &Indentation, run: &Run<'_>, sample: usize, depth_mm: f6
             .iter()
             .map(palpa_fem::PrismField::von_mises)
             .collect(),
-        turned: turned(&indentation.mesh.body, &state.positions(model)),
+        turned: turned(&indentation.mesh().body, &state.positions(model)),
     }
 }
 
@@ -130,14 +126,10 @@ fn table<'a>(
     out: &OutDir,
     layers: impl Iterator<Item = &'a str>,
 ) -> anyhow::Result<CsvTable<Sample>> {
-    let mut header = Sample::COLUMNS.map(str::to_owned).to_vec();
-    for (i, layer) in layers.enumerate() {
+    let column = |(i, layer): (usize, &str)| {
+        let word = layer.replace(|c: char| !c.is_alphanumeric(), "_");
         // Two layers may be of one tissue.
-        let word: String = layer
-            .chars()
-            .map(|c| if c.is_alphanumeric() { c } else { '_' })
-            .collect();
-        header.push(format!("layer_{i}_{word}_mm"));
-    }
-    out.table_under("press.csv", &header)
+        format!("layer_{i}_{word}_mm")
+    };
+    out.table_with_list("press.csv", layers.enumerate().map(column).collect())
 }

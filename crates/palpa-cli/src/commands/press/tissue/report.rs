@@ -10,7 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::{PressResult, RunResult};
 use crate::table::Table;
-use palpa::build::{BuiltBody, in_mm};
+use palpa::build::in_mm;
 use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, Sample};
 
@@ -54,7 +54,7 @@ pub(super) struct PressFacts {
 }
 
 pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
-    let (model, mesh, place) = (&indentation.model, &indentation.mesh, &indentation.place);
+    let (model, mesh, place) = (&indentation.model, indentation.mesh(), indentation.place());
     PressFacts {
         vertex: place.vertex,
         at_m: place.at.into(),
@@ -79,7 +79,6 @@ pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
 
 pub(super) fn announce(
     job: &Job<'_>,
-    built: &BuiltBody,
     indentation: &Indentation,
     materials: &[MaterialStatus],
 ) -> anyhow::Result<()> {
@@ -89,7 +88,7 @@ pub(super) fn announce(
         scene_name,
         ..
     } = *job;
-    let grown = &built.growth.report;
+    let grown = &indentation.prepared.grown.growth.report;
     let facts = facts(scene, indentation);
     context.say(format!(
         "{scene_name}: grown to {} skin vertices × {} levels; refined to {} × {} = {} nodes, {} prisms",
@@ -119,7 +118,7 @@ pub(super) fn announce(
     context.say(format!(
         "continuum model; {}{hold} at ({}) mm, where the tissue is {:.1} mm deep; skin edges near the tool {:.1} mm",
         facts.tool,
-        in_mm(indentation.place.at),
+        in_mm(indentation.place().at),
         facts.tissue_depth_mm,
         facts.mesh_size_near_tool_mm
     ))
@@ -212,7 +211,7 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
     const ROWS: usize = 12;
     let is_down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
     let loading: Vec<&Sample> = samples.iter().filter(is_down).collect();
-    let names = indentation.mesh.body.layer_names.join(", ");
+    let names = indentation.mesh().body.layer_names.join(", ");
     let mut table = Table::new([
         "depth mm",
         "force N",

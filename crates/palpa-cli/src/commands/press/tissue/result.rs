@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::super::words::status_line;
 use super::record::Recorded;
-use palpa::build::in_mm;
+use palpa::Note;
 use palpa::press::Phase;
-use palpa::press::tissue::{Failure, Indentation, Sample, told};
+use palpa::press::tissue::{Failure, Indentation, Sample, SampleOutcome};
 
 /// A contact whose radius is fewer edges than this is worth a note.
 const FEWEST_EDGES: f64 = 3.0;
@@ -16,7 +16,7 @@ const FEWEST_EDGES: f64 = 3.0;
 #[derive(Debug, Serialize)]
 pub(super) struct PressResult {
     /// `converged`, or how the first step that failed ended.
-    pub(super) outcome: &'static str,
+    pub(super) outcome: SampleOutcome,
     /// Whether the whole script was run; not after Ctrl-C or a step that failed.
     pub(super) is_complete: bool,
     /// Of the first run, as in `runs`.
@@ -37,7 +37,7 @@ pub(super) struct PressResult {
     pub(super) failures: Vec<Failure>,
     pub(super) material_status: String,
     #[serde(skip)]
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
 }
 
 /// What came out at one speed.
@@ -86,7 +86,7 @@ pub(super) fn result_of(
     is_interrupted: bool,
 ) -> PressResult {
     let good: Vec<&Sample> = (recorded.samples.iter())
-        .filter(|s| s.outcome == "converged")
+        .filter(|s| s.outcome.is_converged())
         .collect();
     let runs: Vec<RunResult> = (0..indentation.speeds.len())
         .filter_map(|index| {
@@ -98,9 +98,9 @@ pub(super) fn result_of(
     let change = |l: &LayerResult| (l.thickness_at_rest_mm - l.thickness_pressed_mm).abs();
     let most = layers.iter().max_by(|a, b| change(a).total_cmp(&change(b)));
     let first = runs.first();
-    let failed = (recorded.samples.iter()).find(|s| s.outcome != "converged");
+    let failed = (recorded.samples.iter()).find(|s| !s.outcome.is_converged());
     PressResult {
-        outcome: failed.map_or("converged", |s| s.outcome),
+        outcome: failed.map_or(SampleOutcome::Converged, |s| s.outcome),
         is_complete: !is_interrupted && failed.is_none(),
         max_force_n: first.map_or(0.0, |run| run.max_force_n),
         at_depth_mm: first.map_or(0.0, |run| run.at_depth_mm),
@@ -166,12 +166,12 @@ fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
     let (Some(rest), Some(pressed)) = (samples.first(), samples.get(deepest.sample)) else {
         return Vec::new();
     };
-    let direction = &indentation.place.direction;
+    let direction = &indentation.place().direction;
     let thicknesses = rest
         .layer_thickness_mm
         .iter()
         .zip(&pressed.layer_thickness_mm);
-    let names = &indentation.mesh.body.layer_names;
+    let names = &indentation.mesh().body.layer_names;
     (names.iter().zip(thicknesses).zip(&indentation.borders[1..]))
         .map(|((name, (at_rest, pressed)), &below)| LayerResult {
             name: name.clone(),
@@ -202,47 +202,41 @@ fn worst(good: &[&Sample]) -> Worst {
     }
 }
 
-fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Vec<String> {
-    let mut notes: Vec<String> = (recorded.failures.iter())
-        .map(|failure| {
-            format!(
-                "at {} mm/s the step to {:.2} mm FAILED: {}; results end before it. Press less deep, refine the mesh there, or make [model] alpha smaller",
-                failure.speed_mm_s,
-                failure.depth_mm,
-                told(&failure.outcome)
-            )
+fn notes(indentation: &Indentation, recorded: &Recorded, good: &[&Sample]) -> Vec<Note> {
+    let mut notes: Vec<Note> = (recorded.failures.iter())
+        .map(|failure| Note::StepFailed {
+            speed: failure.speed_mm_s * 1e-3,
+            depth: failure.depth_mm * 1e-3,
+            outcome: failure.outcome,
         })
         .collect();
     if let Some(turned) = &recorded.deepest.turned {
-        notes.push(format!(
-            "prisms with a corner turned inside out at {:.2} mm: {}, the worst near ({}) mm; stress there means little, and the \
-             force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
-            recorded.deepest.depth_mm,
-            turned.n,
-            in_mm(turned.at)
-        ));
+        notes.push(Note::TurnedPrisms {
+            n: turned.n,
+            depth: recorded.deepest.depth_mm * 1e-3,
+            at: turned.at.into(),
+        });
     }
     let smoothed = (good.iter())
         .filter(|s| s.friction_smoothing_um > 0.0)
         .count();
     if smoothed > 0 {
-        notes.push(format!(
-            "friction had to be smoothed in {smoothed} of {} steps, over a slip of up to {:.0} µm: what would be held creeps by \
-             about as much",
-            good.len(),
-            worst(good).friction_smoothing_um
-        ));
+        notes.push(Note::FrictionSmoothed {
+            n: smoothed,
+            n_all: good.len(),
+            slip: worst(good).friction_smoothing_um * 1e-6,
+        });
     }
     let widest = (good.iter()).max_by(|a, b| a.contact_area_mm2.total_cmp(&b.contact_area_mm2));
     if let Some(widest) = widest.filter(|_| !indentation.is_bonded()) {
-        let radius = (widest.contact_area_mm2 / std::f64::consts::PI).sqrt();
-        let edge = indentation.mesh.mesh_size * 1e3;
+        let radius = (widest.contact_area_mm2 * 1e-6 / std::f64::consts::PI).sqrt();
+        let edge = indentation.mesh().mesh_size;
         if radius < FEWEST_EDGES * edge {
-            notes.push(format!(
-                "only {} skin vertices touch the tool at most, over a circle of {radius:.1} mm radius with edges of \
-                 {edge:.1} mm: the force depends on the mesh; press deeper, or refine it with [mesh] near_tool",
-                widest.n_touching
-            ));
+            notes.push(Note::FewTouching {
+                n_vertices: widest.n_touching,
+                radius,
+                edge,
+            });
         }
     }
     notes

@@ -1,0 +1,517 @@
+//! What a user should know beside a result: typed, with the names and numbers inside.
+//!
+//! [`Display`](fmt::Display) has the English words that the command prints and files keep. The page of the viewer gets the
+//! same notes as JSON and has words of its own in each of its languages.
+//!
+//! To add a note: a variant here with its numbers in SI units, its words in `fmt` below, and its words in
+//! `web/src/i18n/en.ts` and `ja.ts` (the page's types are made from this one, so that a missing entry does not compile).
+
+use std::fmt;
+
+use palpa_fem::Outcome;
+use palpa_mesh::Vec3;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Something a user should know. Lengths in m, angles in rad, points `[x, y, z]` in m.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Note {
+    /// The reader of a surface file changed or left out something.
+    FileRead {
+        /// Name of the file.
+        file: String,
+        /// What the reader did, in English.
+        text: String,
+    },
+    /// A surface is larger or smaller than any body part.
+    UnusualSize {
+        /// Name of the file.
+        file: String,
+        /// Diagonal of its bounding box, m.
+        size: f64,
+    },
+    /// A surface was repaired before it was used.
+    Repaired {
+        /// Name of the file.
+        file: String,
+        /// Vertices that were welded to others.
+        n_welded: usize,
+        /// Triangles without area that were dropped.
+        n_degenerate: usize,
+        /// Triangles that were there twice.
+        n_duplicate: usize,
+        /// Vertices of no triangle that were dropped.
+        n_unused: usize,
+        /// Triangles that were turned outward.
+        n_flipped: usize,
+    },
+    /// Triangles of the body's base pass through each other.
+    BaseOverlaps {
+        /// Pairs of triangles.
+        n_pairs: usize,
+    },
+    /// The rim of a cut-out is so near that it may be felt.
+    CutoutNear {
+        /// Radius of the cut-out, m.
+        radius: f64,
+        /// Radius from which on the rim is not felt, m.
+        enough: f64,
+    },
+    /// The tool goes down at a slant.
+    ObliquePress {
+        /// Angle to the inward normal of the skin, rad.
+        angle: f64,
+    },
+    /// The place that is pressed is on the rim of a cut face.
+    PressOnCutFace,
+    /// The skin could not be refined as far as wanted.
+    SkinTooCoarse {
+        /// Triangles that are larger than wanted.
+        n_triangles: usize,
+        /// The limit that was reached.
+        max_vertices: usize,
+    },
+    /// Levels could not be split as far as wanted.
+    LevelsTooHigh {
+        /// The limit that was reached.
+        max_levels: usize,
+    },
+    /// The mesh is not refined round a lump that gives no size.
+    LumpNotRefined {
+        /// Name of the lump.
+        lump: String,
+    },
+    /// A lump reaches out of the tissue.
+    LumpPartlyOutside {
+        /// Name of the lump.
+        lump: String,
+        /// Share of its volume in the tissue.
+        share: f64,
+        /// Its middle, m.
+        at: [f64; 3],
+    },
+    /// The edge of a bonded disc could not be cut into the skin's mesh.
+    DiscNotImprinted {
+        /// Why, in English.
+        why: String,
+    },
+    /// Which skin a bonded disc holds where its edge is not part of the mesh.
+    DiscPatch {
+        /// Vertices under the disc.
+        n_vertices: usize,
+        /// Radius of the disc, m.
+        radius: f64,
+        /// Where it presses, m.
+        at: [f64; 3],
+        /// Radius of the circle with the area that is held, m.
+        effective_radius: f64,
+    },
+    /// A cut face that is not flat cannot be a plane of symmetry.
+    CutFaceNotFlat {
+        /// A point of the face, m.
+        at: [f64; 3],
+    },
+    /// Several speeds were asked for, and nothing depends on speed.
+    SpeedsAlike,
+    /// Many triangles of the skin have no partner to be paired with.
+    SingleTriangles {
+        /// Triangles without a partner.
+        n: usize,
+        /// All triangles.
+        n_all: usize,
+    },
+    /// The mesh under the tool is coarse for the size of the contact.
+    CoarseUnderTool {
+        /// Mean length of the skin's edges near the tool, m.
+        edge: f64,
+        /// Radius of the tool that presses, m.
+        radius: f64,
+    },
+    /// The mesh under the tool is coarse for its rounded edge.
+    CoarseAtEdge {
+        /// Mean length of the skin's edges near the tool, m.
+        edge: f64,
+        /// Radius of the tool's edge, m.
+        edge_radius: f64,
+    },
+    /// Free cut faces let go of the tension of a layer.
+    TensionLost {
+        /// Name of the layer's tissue.
+        layer: String,
+    },
+    /// Steps are long for friction.
+    LongFrictionSteps {
+        /// Length of a step, m.
+        step: f64,
+        /// Length that is short enough, m.
+        enough: f64,
+    },
+    /// Few vertices of the reference method lie under the disc.
+    FewUnderDisc {
+        /// Vertices under the disc.
+        n_vertices: usize,
+        /// Radius of the disc, m.
+        radius: f64,
+        /// Mean length of the skin's edges near the tool, m.
+        edge: f64,
+    },
+    /// Bars have no tension at rest.
+    TensionLeftOut,
+    /// Bars have no time.
+    FirstSpeedOnly,
+    /// Levels are too flat or too tall for bars to stand for a Young's modulus.
+    BarAspects {
+        /// Each layer's name, and the height of its levels over the length of edges near the tool.
+        layers: Vec<(String, f64)>,
+        /// Smallest sound ratio.
+        least: f64,
+        /// Largest sound ratio.
+        most: f64,
+    },
+    /// The first steps of the tissue relax the tension of layers.
+    TensionRelaxes,
+    /// The motion leaves the skin.
+    MotionOffSkin {
+        /// How far along the motion, m.
+        far: f64,
+        /// Length of the motion, m.
+        length: f64,
+    },
+    /// A bonded tool was replaced by one that touches.
+    ToolReplaced {
+        /// The scene's tool, in English.
+        tool: String,
+        /// What presses instead, in English.
+        by: String,
+    },
+    /// The mesh under the tool is coarser than a press by script would make it.
+    CoarserForTouch {
+        /// Length of the skin's edges under the tool, m.
+        edge: f64,
+    },
+    /// A step of a press failed.
+    StepFailed {
+        /// Speed of the run, m/s.
+        speed: f64,
+        /// Depth that was to be reached, m.
+        depth: f64,
+        /// Why and where.
+        #[schemars(skip)]
+        outcome: Outcome,
+    },
+    /// Prisms have a corner that is turned inside out.
+    TurnedPrisms {
+        /// How many.
+        n: usize,
+        /// At which depth, m.
+        depth: f64,
+        /// The middle of the worst, m.
+        at: [f64; 3],
+    },
+    /// Friction had to be smoothed.
+    FrictionSmoothed {
+        /// In how many steps.
+        n: usize,
+        /// Of how many.
+        n_all: usize,
+        /// Largest slip over which it was smoothed, m.
+        slip: f64,
+    },
+    /// Few vertices touch the tool.
+    FewTouching {
+        /// How many at most.
+        n_vertices: usize,
+        /// Radius of the circle with the largest contact area, m.
+        radius: f64,
+        /// Mean length of the skin's edges near the tool, m.
+        edge: f64,
+    },
+    /// CalculiX is given something else than the scene says.
+    Departure {
+        /// What differs, in English.
+        text: String,
+    },
+}
+
+impl Note {
+    /// Whether the note gives away that there is a lump, or where.
+    pub fn is_about_lumps(&self) -> bool {
+        // Skin and levels may be too coarse just because of a lump.
+        matches!(
+            self,
+            Self::LumpNotRefined { .. }
+                | Self::LumpPartlyOutside { .. }
+                | Self::SkinTooCoarse { .. }
+                | Self::LevelsTooHigh { .. }
+        )
+    }
+}
+
+/// Three coordinates, for a note.
+pub(crate) fn xyz(p: Vec3) -> [f64; 3] {
+    p.into()
+}
+
+/// A point in millimetres.
+struct Mm([f64; 3]);
+
+impl fmt::Display for Mm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&crate::build::in_mm(self.0.into()))
+    }
+}
+
+impl fmt::Display for Note {
+    #[expect(clippy::too_many_lines, reason = "one arm a note")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm = |length: &f64| length * 1e3;
+        match self {
+            Self::FileRead { file, text } => write!(f, "{file}: {text}"),
+            Self::UnusualSize { file, size } => write!(
+                f,
+                "{file} is {size:.4} m large, and no body part is; check `unit` in the scene's [body]"
+            ),
+            Self::Repaired {
+                file,
+                n_welded,
+                n_degenerate,
+                n_duplicate,
+                n_unused,
+                n_flipped,
+            } => {
+                let counts = [
+                    (n_welded, "vertices welded"),
+                    (n_degenerate, "triangles without area dropped"),
+                    (n_duplicate, "double triangles dropped"),
+                    (n_unused, "unused vertices dropped"),
+                    (n_flipped, "triangles turned outward"),
+                ];
+                let done: Vec<String> = (counts.iter())
+                    .filter(|(n, _)| **n > 0)
+                    .map(|(n, what)| format!("{n} {what}"))
+                    .collect();
+                write!(f, "{file}: repaired on the way in: {}", done.join(", "))
+            }
+            Self::BaseOverlaps { n_pairs } => write!(
+                f,
+                "the base of the body passes through itself ({n_pairs} pairs of triangles): look at section.png or the VTU \
+                 before you trust forces near there"
+            ),
+            Self::CutoutNear { radius, enough } => write!(
+                f,
+                "the cut-out's radius of {:.0} mm is less than the tool's radius plus twice the tissue's depth ({:.0} mm): the \
+                 free rim may be felt; choose a larger cutout_radius",
+                mm(radius),
+                mm(enough)
+            ),
+            Self::ObliquePress { angle } => write!(
+                f,
+                "the press direction is {:.0}° from the skin's inward normal: the tool drags more than it presses",
+                angle.to_degrees()
+            ),
+            Self::PressOnCutFace => f.write_str(
+                "the press point lies on a cut face of the body; the force there is that of a free edge",
+            ),
+            Self::SkinTooCoarse {
+                n_triangles,
+                max_vertices,
+            } => write!(
+                f,
+                "{n_triangles} skin triangles are larger than wanted near the tool or a lump, because [mesh] max_vertices = \
+                 {max_vertices} was reached"
+            ),
+            Self::LevelsTooHigh { max_levels } => write!(
+                f,
+                "levels are higher than wanted under the tool or round a lump, because there are {max_levels} already"
+            ),
+            Self::LumpNotRefined { lump } => write!(
+                f,
+                "the mesh is not refined round the lump \"{lump}\", because its size is not known; set [mesh] near_lumps"
+            ),
+            Self::LumpPartlyOutside { lump, share, at } => write!(
+                f,
+                "{:.0} % of the lump \"{lump}\" at ({}) mm lies in the tissue; the rest, outside the skin or in the bone, does \
+                 not count",
+                100.0 * share,
+                Mm(*at)
+            ),
+            Self::DiscNotImprinted { why } => write!(
+                f,
+                "the disc's edge could not be made a ring of vertices, so its radius is that of the vertices under it: {why}"
+            ),
+            Self::DiscPatch {
+                n_vertices,
+                radius,
+                at,
+                effective_radius,
+            } => write!(
+                f,
+                "{n_vertices} skin vertices lie under the disc of radius {:.1} mm at ({}) mm; they hold a patch of radius \
+                 {:.1} mm",
+                mm(radius),
+                Mm(*at),
+                mm(effective_radius)
+            ),
+            Self::CutFaceNotFlat { at } => write!(
+                f,
+                "the cut face at ({}) mm is not flat, so it cannot be a plane of symmetry; it was left free",
+                Mm(*at)
+            ),
+            Self::SpeedsAlike => f.write_str(
+                "no tissue relaxes and nothing has mass here: every speed gives the same force",
+            ),
+            Self::SingleTriangles { n, n_all } => write!(
+                f,
+                "{n} of {n_all} skin triangles have no partner; the prisms under them are too stiff where tissue keeps its \
+                 volume"
+            ),
+            Self::CoarseUnderTool { edge, radius } => write!(
+                f,
+                "skin edges near the tool are {:.1} mm long, more than a third of its contact radius of {:.1} mm: the force \
+                 depends on the mesh; refine it with [mesh] near_tool",
+                mm(edge),
+                mm(radius)
+            ),
+            Self::CoarseAtEdge { edge, edge_radius } => write!(
+                f,
+                "skin edges near the tool are {:.1} mm long, more than a third of its edge's radius of {:.1} mm: vertices find \
+                 the rounded edge or miss it, so there can be several equilibria and the force depends on the steps; make the \
+                 edge rounder, or refine the mesh with [mesh] near_tool",
+                mm(edge),
+                mm(edge_radius)
+            ),
+            Self::TensionLost { layer } => write!(
+                f,
+                "the cut faces are free and let go of most of the tension of \"{layer}\" (of 30 kPa in the skin of a block 60 mm \
+                 wide, 3 kPa are left in its middle); set cut_faces = \"fixed\" or \"symmetric\" in [body] to keep it"
+            ),
+            Self::LongFrictionSteps { step, enough } => write!(
+                f,
+                "with friction the force depends on the steps, here of {:.2} mm (a sphere of radius 8 mm with friction 0.4, \
+                 pressed 3 mm: 13 % less in one step, 5 % in steps of 1 mm); press with --step \"{} mm\" or shorter",
+                mm(step),
+                rounded(enough * 1e3)
+            ),
+            Self::FewUnderDisc {
+                n_vertices,
+                radius,
+                edge,
+            } => write!(
+                f,
+                "only {n_vertices} skin vertices lie under the tool of radius {:.1} mm, with edges of {:.1} mm there: the force \
+                 depends on the mesh; take a finer skin or a larger tool",
+                mm(radius),
+                mm(edge)
+            ),
+            Self::TensionLeftOut => {
+                f.write_str("bars are without tension at rest; `prestress` was left out")
+            }
+            Self::FirstSpeedOnly => f.write_str(
+                "bars have no time, so every speed gives the same force; only the first of `speeds` was run",
+            ),
+            Self::BarAspects {
+                layers,
+                least,
+                most,
+            } => {
+                let unsound: Vec<String> = (layers.iter())
+                    .map(|(name, aspect)| format!("{name} {aspect:.2}"))
+                    .collect();
+                write!(
+                    f,
+                    "height of levels over length of skin edges near the tool: {}; outside {least} to {most} bars are too stiff \
+                     across or too soft in shear, and the force depends on the number of levels",
+                    unsound.join(", ")
+                )
+            }
+            Self::TensionRelaxes => f.write_str(
+                "tension of layers is not in equilibrium when the loop starts: the first steps of the tissue relax it",
+            ),
+            Self::MotionOffSkin { far, length } => write!(
+                f,
+                "{:.0} mm along its motion the tool is off the skin, where nothing is felt; shorten [motion] length = \"{:.0} mm\"",
+                mm(far),
+                mm(length)
+            ),
+            Self::ToolReplaced { tool, by } => {
+                write!(f, "a hand presses by contact: the scene's {tool} was replaced by a {by}")
+            }
+            Self::CoarserForTouch { edge } => write!(
+                f,
+                "the skin's edges under the tool are {:.1} mm long, so that the body can follow a hand; [mesh] near_tool makes \
+                 them finer",
+                mm(edge)
+            ),
+            Self::StepFailed {
+                speed,
+                depth,
+                outcome,
+            } => write!(
+                f,
+                "at {} mm/s the step to {:.2} mm FAILED: {}; results end before it. Press less deep, refine the mesh there, or \
+                 make [model] alpha smaller",
+                tidy(mm(speed)),
+                mm(depth),
+                in_words(outcome)
+            ),
+            Self::TurnedPrisms { n, depth, at } => write!(
+                f,
+                "prisms with a corner turned inside out at {:.2} mm: {n}, the worst near ({}) mm; stress there means little, and \
+                 the force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
+                mm(depth),
+                Mm(*at)
+            ),
+            Self::FrictionSmoothed { n, n_all, slip } => write!(
+                f,
+                "friction had to be smoothed in {n} of {n_all} steps, over a slip of up to {:.0} µm: vertices that should stick \
+                 creep by about as much",
+                slip * 1e6
+            ),
+            Self::FewTouching {
+                n_vertices,
+                radius,
+                edge,
+            } => write!(
+                f,
+                "only {n_vertices} skin vertices touch the tool at most, over a circle of {:.1} mm radius with edges of {:.1} mm: \
+                 the force depends on the mesh; press deeper, or refine it with [mesh] near_tool",
+                mm(radius),
+                mm(edge)
+            ),
+            Self::Departure { text } => f.write_str(text),
+        }
+    }
+}
+
+/// Rounded down to a hundredth that is not zero.
+fn rounded(mm: f64) -> f64 {
+    ((mm * 100.0).floor() / 100.0).max(0.01)
+}
+
+/// Without the digits that binary fractions leave behind.
+fn tidy(x: f64) -> f64 {
+    (x * 1e9).round() / 1e9
+}
+
+/// How a step ended, in words.
+pub fn in_words(outcome: &Outcome) -> String {
+    let near = |at: &[f64; 3]| Mm(*at).to_string();
+    match outcome {
+        Outcome::Converged => "converged".to_owned(),
+        Outcome::IterationLimit { at } => {
+            format!(
+                "no equilibrium was found, the largest imbalance is near ({}) mm",
+                near(at)
+            )
+        }
+        Outcome::Inverted { at } => {
+            format!(
+                "the tissue would be turned inside out near ({}) mm",
+                near(at)
+            )
+        }
+        Outcome::Singular => "the tissue has lost its stiffness".to_owned(),
+    }
+}

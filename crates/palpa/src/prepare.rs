@@ -1,0 +1,292 @@
+//! A scene made ready to be pressed: everything that a press by script, a live session, a viewer and an export share.
+//!
+//! ```text
+//! Scene ─► GrownBody ─► lumps in their places ─► mesh, refined where it is pressed ─► Model (built when first asked for)
+//!          build.rs     continuum.rs             press/mesh.rs
+//! ```
+
+use std::sync::{Arc, OnceLock};
+
+use anyhow::bail;
+use palpa_fem::lump::Lump;
+use palpa_fem::shape::{Pose, Tool as RigidTool};
+use palpa_fem::{
+    Load, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Supports,
+    Workspace, advance,
+};
+use palpa_mesh::growth::MAX_NODES;
+use palpa_mesh::{LayeredBody, Surface, Vec3};
+use palpa_scene::{Scene, Tool};
+
+use crate::build::{BuiltBody, build_within};
+use crate::continuum;
+use crate::note::{Note, in_words};
+use crate::press::Place;
+use crate::press::lump::{lump_shares, surface_of_shape};
+use crate::press::mesh::PressedBody;
+
+/// How a scene is prepared.
+#[derive(Debug, Clone)]
+pub struct PrepareParams {
+    /// A body of more nodes than this is refused before it is grown.
+    pub max_nodes: usize,
+    /// The skin is also refined at these distances from the place, along the scene's motion. m
+    pub way: Vec<f64>,
+}
+
+impl Default for PrepareParams {
+    fn default() -> Self {
+        Self {
+            max_nodes: MAX_NODES,
+            way: Vec::new(),
+        }
+    }
+}
+
+/// A scene with its body grown and refined, its lumps and materials in their places.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The scene.
+    pub scene: Scene,
+    /// The body as it was grown, with its bones.
+    pub grown: Arc<BuiltBody>,
+    /// Materials of the layers, then of the lumps; and the lumps in their places.
+    pub materials: Materials,
+    /// The body refined where it is pressed, and the place.
+    pub mesh: PressedBody,
+    /// What holds the body.
+    pub supports: Supports,
+    /// What a user should know, in the order in which it was found.
+    pub notes: Vec<Note>,
+    /// For each lump that is a mesh its surface as it was drawn. m
+    drawn: Vec<Option<Surface>>,
+    model: OnceLock<Arc<Model>>,
+}
+
+impl Prepared {
+    /// Grows the scene's body and refines it where it is pressed.
+    ///
+    /// # Errors
+    /// When a file cannot be read, the body cannot be grown, or place, depth, tissues or lumps do not fit it.
+    pub fn build(scene: &Scene) -> anyhow::Result<Self> {
+        Self::with_params(scene, &PrepareParams::default())
+    }
+
+    /// The same with other parameters.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn with_params(scene: &Scene, params: &PrepareParams) -> anyhow::Result<Self> {
+        let grown = build_within(scene, params.max_nodes)?;
+        Self::on(scene, Arc::new(grown), &params.way)
+    }
+
+    /// The same on a body that was grown for this scene.
+    ///
+    /// # Errors
+    /// When place, depth, tissues or lumps do not fit the body.
+    pub fn on(scene: &Scene, grown: Arc<BuiltBody>, way: &[f64]) -> anyhow::Result<Self> {
+        let mut notes = grown.notes.clone();
+        let materials = continuum::materials(scene)?;
+        let lumps = continuum::lumps(scene, &grown, &mut notes)?;
+        let (lumps, drawn): (Vec<Lump>, Vec<Option<Surface>>) = lumps.into_iter().unzip();
+        let mesh = PressedBody::build(scene, &grown, &lumps, way, &mut notes)?;
+        let supports = continuum::supports(scene.body.cut_faces, &mesh.body, &mut notes);
+        Ok(Self {
+            scene: scene.clone(),
+            grown,
+            materials: Materials {
+                materials,
+                layers: (0..scene.layers.len()).collect(),
+                lumps,
+                stiffness: None,
+            },
+            mesh,
+            supports,
+            notes,
+            drawn,
+            model: OnceLock::new(),
+        })
+    }
+
+    /// Where the scene presses.
+    pub fn place(&self) -> &Place {
+        &self.mesh.place
+    }
+
+    /// The lumps in their places, in the order of the scene.
+    pub fn lumps(&self) -> &[Lump] {
+        &self.materials.lumps
+    }
+
+    /// The surface of each lump at rest. m
+    pub fn lump_surfaces(&self) -> Vec<Surface> {
+        (self.lumps().iter().zip(&self.drawn))
+            .map(|(lump, drawn)| drawn.clone().unwrap_or_else(|| surface_of_shape(lump)))
+            .collect()
+    }
+
+    /// Share of every prism that is lump, by volume; empty without lumps. `[n_prisms]`
+    pub fn lump_shares(&self) -> Vec<f64> {
+        lump_shares(&self.mesh.body, self.lumps())
+    }
+
+    /// The finite elements of the refined body; built once, when they are first asked for.
+    ///
+    /// # Errors
+    /// When the body cannot be pressed.
+    pub fn model(&self) -> anyhow::Result<Arc<Model>> {
+        if let Some(model) = self.model.get() {
+            return Ok(Arc::clone(model));
+        }
+        let params = ModelParams {
+            alpha: self.scene.model.alpha,
+        };
+        let model = Model::build(&self.mesh.body, &self.materials, &self.supports, params)?;
+        Ok(Arc::clone(self.model.get_or_init(|| Arc::new(model))))
+    }
+
+    /// How near equilibrium a step must come.
+    pub fn solve_params(&self) -> SolveParams {
+        SolveParams {
+            tolerance: self.scene.model.tolerance,
+            ..SolveParams::default()
+        }
+    }
+
+    /// Whether any layer is under tension at rest.
+    pub fn is_tense(&self) -> bool {
+        self.scene.layers.iter().any(|layer| layer.prestress != 0.0)
+    }
+
+    /// The state before anything presses: under the tension of its layers, relaxed.
+    ///
+    /// # Errors
+    /// When the body cannot be pressed, or finds no rest.
+    pub fn rest(&self) -> anyhow::Result<State> {
+        let model = self.model()?;
+        let mut state = State::new(&model);
+        if !self.is_tense() {
+            return Ok(state);
+        }
+        let mut ws = Workspace::new(&model);
+        let load = Load {
+            duration: f64::INFINITY,
+            ..Load::default()
+        };
+        let params = self.solve_params();
+        let report = advance(
+            &model,
+            &mut state,
+            &mut ws,
+            &Load::default(),
+            &load,
+            &params,
+        );
+        if report.outcome != Outcome::Converged {
+            bail!(
+                "the body finds no rest under the tension of its layers: {}; make `prestress` smaller, or hold the body with \
+                 cut_faces = \"fixed\"",
+                in_words(&report.outcome)
+            );
+        }
+        Ok(state)
+    }
+
+    /// How the tool comes down on the place; none for a tool that is bonded to the skin. `rest` is the body's state at rest,
+    /// which may be left out where no layer is under tension.
+    ///
+    /// # Errors
+    /// When the tool's sizes make no shape.
+    pub fn approach(&self, rest: Option<&State>) -> anyhow::Result<Option<Approach>> {
+        let Tool::Contact(given) = &self.scene.tool else {
+            return Ok(None);
+        };
+        let place = self.place();
+        let direction = place.direction.into_inner();
+        let (tool, pose) = continuum::tool(given, direction, place.at)?;
+        let touch = first_touch(&self.mesh.body, rest, &tool, &pose, place);
+        Ok(Some(Approach {
+            tool,
+            pose,
+            direction,
+            touch,
+        }))
+    }
+}
+
+/// The straight way of a tool down on the skin.
+#[derive(Debug, Clone, Copy)]
+pub struct Approach {
+    /// What presses.
+    pub tool: RigidTool,
+    /// The tool with its tip at the place at rest.
+    pose: Pose,
+    /// Unit vector along which it goes.
+    direction: Vec3,
+    /// How far along its way from `pose` it touches first, m.
+    touch: f64,
+}
+
+impl Approach {
+    /// The tool at a depth below the first touch, m; above it where the depth is negative.
+    pub fn at(&self, depth: f64) -> PosedTool {
+        let way = self.direction * (self.touch + depth);
+        let translation = self.pose.translation.vector + way;
+        PosedTool {
+            tool: self.tool,
+            pose: Pose::from_parts(translation.into(), self.pose.rotation),
+        }
+    }
+}
+
+/// How far the tool can go along its way from `pose` until it touches the skin: 0 where its tip touches first, less where
+/// the skin beside it is higher. m
+fn first_touch(
+    body: &LayeredBody,
+    rest: Option<&State>,
+    tool: &RigidTool,
+    pose: &Pose,
+    place: &Place,
+) -> f64 {
+    const HALVINGS: usize = 60;
+    let direction = place.direction.into_inner();
+    let x = |v: usize| {
+        let node = body.node(v, 0);
+        body.positions[node] + rest.map_or_else(Vec3::zeros, |rest| rest.displacements[node])
+    };
+    // Tension may have moved the skin, and the place with it.
+    let start = (x(place.vertex) - place.at).dot(&direction);
+    let normals = body.skin.vertex_normals();
+    let facing: Vec<Vec3> = (0..body.n_vertices())
+        .filter(|&v| normals[v].dot(&direction) < 0.0)
+        .map(x)
+        .collect();
+    let gap = |s: f64| {
+        let at = Pose::from_parts(
+            (pose.translation.vector + direction * s).into(),
+            pose.rotation,
+        );
+        facing
+            .iter()
+            .map(|x| tool.distance_at(&at, x).distance)
+            .fold(f64::INFINITY, f64::min)
+    };
+    if gap(start) > -1e-9 {
+        return start;
+    }
+    let mut back = 1e-4;
+    while gap(start - back) < 0.0 && back < 1.0 {
+        back *= 2.0;
+    }
+    let (mut free, mut deep) = (start - back, start);
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(free, deep);
+        if gap(middle) < 0.0 {
+            deep = middle;
+        } else {
+            free = middle;
+        }
+    }
+    free
+}

@@ -1,0 +1,274 @@
+//! The indentation with the continuum model.
+
+mod notes;
+mod run;
+mod sample;
+
+use std::sync::Arc;
+
+use palpa_fem::{Dynamics, Model, PosedTool, SolveParams, State, Workspace};
+
+use self::notes::note_friction;
+pub(crate) use self::notes::{note_mesh, note_tension};
+pub use self::run::Run;
+use self::run::{Acting, Earlier};
+pub use self::sample::{Failure, Sample, SampleOutcome};
+use super::mesh::{Patch, PressedBody};
+use super::{Phase, Place, Waypoint, waypoints};
+use crate::note::Note;
+use crate::prepare::{Approach, Prepared};
+
+/// Samples of a rest in which tissue relaxes, evenly spread in the logarithm of time from this share of the rest on.
+const HOLD_SAMPLES: usize = 10;
+const FIRST_HOLD: f64 = 0.01;
+
+/// An indentation that is set up: what does not change while it runs.
+#[derive(Debug)]
+pub struct Indentation {
+    /// The scene that is pressed.
+    pub prepared: Arc<Prepared>,
+    /// The finite elements of its body.
+    pub model: Arc<Model>,
+    /// The level at which each layer begins, and the deepest. `[n_layers + 1]`
+    pub borders: Vec<usize>,
+    /// Speeds at which the whole press is run, m/s; at least one.
+    pub speeds: Vec<f64>,
+    /// Whether any tissue relaxes, so that speed and rest count.
+    pub is_viscous: bool,
+    /// What a user should know beside the result: the notes of the prepared scene, and those of the press.
+    pub notes: Vec<Note>,
+    grip: Grip,
+    /// The state at rest, under the tension of the layers.
+    rest: State,
+    params: SolveParams,
+    dynamics: Option<Dynamics>,
+}
+
+/// How the tool holds the skin.
+#[derive(Debug)]
+enum Grip {
+    /// These nodes are bonded to it, and stand for areas of skin (m²), if it has any.
+    Bond { nodes: Vec<usize>, areas: Vec<f64> },
+    /// It touches.
+    Contact(Approach),
+}
+
+impl Indentation {
+    /// Sets up the indentation of a prepared scene, and takes the body to rest under the tension of its layers.
+    ///
+    /// # Errors
+    /// When the body cannot be pressed, or finds no rest.
+    pub fn build(prepared: Arc<Prepared>) -> anyhow::Result<Self> {
+        let scene = &prepared.scene;
+        let is_viscous = (prepared.materials.materials.iter()).any(|m| m.prony.is_some());
+        let model = prepared.model()?;
+        let mut notes = prepared.notes.clone();
+        note_mesh(&model, &prepared.mesh, scene, &mut notes);
+        note_tension(&prepared.mesh.body, scene, &mut notes);
+        let rest = prepared.rest()?;
+        let grip = grip(&prepared, &rest)?;
+        let speeds = match &scene.press.speeds[..] {
+            [] => vec![scene.press.speed],
+            speeds => speeds.to_vec(),
+        };
+        let dynamics = match scene.model.dynamics {
+            palpa_scene::Dynamics::QuasiStatic => None,
+            palpa_scene::Dynamics::Implicit(damping) => Some(Dynamics {
+                mass_damping: damping.mass,
+                stiffness_damping: damping.stiffness,
+            }),
+        };
+        if speeds.len() > 1 && !is_viscous && dynamics.is_none() {
+            notes.push(Note::SpeedsAlike);
+        }
+        note_friction(scene, &mut notes);
+        Ok(Self {
+            borders: borders(&prepared.mesh.body.interval_layer),
+            model,
+            speeds,
+            is_viscous,
+            notes,
+            grip,
+            rest,
+            params: prepared.solve_params(),
+            dynamics,
+            prepared,
+        })
+    }
+
+    /// The body refined where it is pressed.
+    pub fn mesh(&self) -> &PressedBody {
+        &self.prepared.mesh
+    }
+
+    /// Where it is pressed.
+    pub fn place(&self) -> &Place {
+        self.prepared.place()
+    }
+
+    /// Number of skin vertices that are bonded to the tool.
+    pub fn n_bonded(&self) -> usize {
+        match &self.grip {
+            Grip::Bond { nodes, .. } => nodes.len(),
+            Grip::Contact(_) => 0,
+        }
+    }
+
+    /// Whether mass and damping count.
+    pub fn is_dynamic(&self) -> bool {
+        self.dynamics.is_some()
+    }
+
+    /// Whether the skin is bonded to the tool.
+    pub fn is_bonded(&self) -> bool {
+        matches!(self.grip, Grip::Bond { .. })
+    }
+
+    /// Number of samples of the run at one speed.
+    pub fn n_samples(&self) -> usize {
+        self.path(self.speeds[0]).len()
+    }
+
+    /// The index of the deepest sample in a run, where loading first ends.
+    pub fn deepest(&self) -> usize {
+        let path = self.path(self.speeds[0]);
+        let is_down = |w: &Waypoint| w.phase == Phase::Load && w.cycle == 0;
+        path.iter().rposition(is_down).unwrap_or(0)
+    }
+
+    /// Begins the run at the `index`-th speed, at rest.
+    pub fn start(&self, index: usize) -> Run<'_> {
+        Run {
+            indentation: self,
+            index,
+            state: self.rest.clone(),
+            workspace: Workspace::new(&self.model),
+            path: self.path(self.speeds[index]),
+            next: 0,
+            before: Acting::default(),
+            earlier: Earlier::default(),
+            time: 0.0,
+            last: None,
+            failure: None,
+        }
+    }
+
+    /// The rigid tool and where it is at a depth (m); `None` where the skin is bonded.
+    pub fn tool_at(&self, depth: f64) -> Option<PosedTool> {
+        match &self.grip {
+            Grip::Bond { .. } => None,
+            Grip::Contact(approach) => Some(approach.at(depth)),
+        }
+    }
+
+    /// Pressure of the tool on the skin, where the last step of `run` has it. Pa `[n_vertices]`
+    pub fn skin_pressure(&self, run: &Run<'_>) -> Vec<f64> {
+        let body = &self.mesh().body;
+        let reactions = run.workspace.reactions();
+        let mut pressure = vec![0.0; body.n_vertices()];
+        match &self.grip {
+            Grip::Bond { nodes, areas } => {
+                for (&node, area) in nodes.iter().zip(areas).filter(|(_, area)| **area > 0.0) {
+                    let pressing = reactions[node].dot(&self.place().direction);
+                    pressure[node / body.n_levels] = pressing / area;
+                }
+            }
+            Grip::Contact(_) => {
+                let areas = self.model.skin_areas();
+                for (v, touch) in run.state.touches.iter().enumerate() {
+                    let Some(tool) = touch.tool().and_then(|k| run.before.tools.get(k)) else {
+                        continue;
+                    };
+                    let node = body.node(v, 0);
+                    let x = body.positions[node] + run.state.displacements[node];
+                    let normal = tool.tool.distance_at(&tool.pose, &x).normal;
+                    pressure[v] = reactions[node].dot(&normal) / areas[v];
+                }
+            }
+        }
+        pressure
+    }
+
+    fn path(&self, speed: f64) -> Vec<Waypoint> {
+        let rests: Vec<f64> = if self.is_viscous || self.dynamics.is_some() {
+            (0..HOLD_SAMPLES)
+                .map(|i| FIRST_HOLD.powf(1.0 - i as f64 / (HOLD_SAMPLES - 1) as f64))
+                .collect()
+        } else {
+            // Nothing happens.
+            vec![1.0]
+        };
+        waypoints(&self.prepared.scene.press, speed, &rests)
+    }
+
+    fn acting(&self, depth: f64) -> Acting {
+        match &self.grip {
+            Grip::Bond { nodes, .. } => {
+                let way = self.place().direction.into_inner() * depth;
+                let at = |&node: &usize| (node, self.rest.displacements[node] + way);
+                Acting {
+                    held: nodes.iter().map(at).collect(),
+                    ..Acting::default()
+                }
+            }
+            Grip::Contact(_) => Acting {
+                tools: self.tool_at(depth).into_iter().collect(),
+                ..Acting::default()
+            },
+        }
+    }
+
+    /// Thickness of each layer along the pressed column. m `[n_layers]`
+    fn thicknesses(&self, state: &State) -> Vec<f64> {
+        let body = &self.mesh().body;
+        let at = |level: usize| {
+            let node = body.node(self.place().vertex, level);
+            body.positions[node] + state.displacements[node]
+        };
+        let length = |levels: &[usize]| -> f64 {
+            (levels[0]..levels[1])
+                .map(|l| (at(l + 1) - at(l)).norm())
+                .sum()
+        };
+        self.borders.windows(2).map(length).collect()
+    }
+}
+
+/// The level at which each layer begins, and the deepest.
+fn borders(interval_layer: &[usize]) -> Vec<usize> {
+    let mut borders = vec![0];
+    borders
+        .extend((1..interval_layer.len()).filter(|&i| interval_layer[i] != interval_layer[i - 1]));
+    borders.push(interval_layer.len());
+    borders
+}
+
+fn grip(prepared: &Prepared, rest: &State) -> anyhow::Result<Grip> {
+    if let Some(approach) = prepared.approach(Some(rest))? {
+        return Ok(Grip::Contact(approach));
+    }
+    let mesh = &prepared.mesh;
+    Ok(match &mesh.patch {
+        Some(Patch {
+            vertices, areas, ..
+        }) => Grip::Bond {
+            nodes: vertices.iter().map(|&v| mesh.body.node(v, 0)).collect(),
+            areas: areas.clone(),
+        },
+        None => Grip::Bond {
+            nodes: vec![mesh.body.node(mesh.place.vertex, 0)],
+            areas: vec![0.0],
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_begin_where_the_layer_changes() {
+        assert_eq!(borders(&[0, 1, 1, 2, 2, 2]), [0, 1, 3, 6]);
+        assert_eq!(borders(&[0]), [0, 1]);
+    }
+}

@@ -1,0 +1,71 @@
+//! What is known beforehand to make a press less accurate.
+
+use palpa_fem::Model;
+use palpa_mesh::LayeredBody;
+use palpa_scene::{CutFaces, Scene};
+
+use crate::note::Note;
+use crate::press::mesh::PressedBody;
+use crate::press::n_steps;
+
+/// A contact whose radius is fewer edges than this is worth a note: its force is off by more than about 5 %.
+const FEWEST_EDGES: f64 = 3.0;
+/// Skin triangles without a partner are worth a note beyond this share of all.
+const FEW_SINGLES: f64 = 0.01;
+/// With friction a step longer than this share of the contact radius is worth a note: its force is off by more than about
+/// 0.5 %.
+const LONGEST_STEP: f64 = 0.05;
+
+/// Says where the mesh is known to be too coarse.
+pub(crate) fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes: &mut Vec<Note>) {
+    let n_triangles = mesh.body.skin.triangles.len();
+    let n_singles = model.n_single_triangles();
+    if n_singles as f64 > FEW_SINGLES * n_triangles as f64 {
+        notes.push(Note::SingleTriangles {
+            n: n_singles,
+            n_all: n_triangles,
+        });
+    }
+    let radius = scene.tool.contact_radius();
+    if radius > 0.0 && radius < FEWEST_EDGES * mesh.mesh_size {
+        notes.push(Note::CoarseUnderTool {
+            edge: mesh.mesh_size,
+            radius,
+        });
+    }
+    let edge = scene
+        .tool
+        .contact()
+        .and_then(|tool| tool.shape.edge_radius());
+    if let Some(edge) = edge.filter(|&edge| edge < FEWEST_EDGES * mesh.mesh_size) {
+        notes.push(Note::CoarseAtEdge {
+            edge: mesh.mesh_size,
+            edge_radius: edge,
+        });
+    }
+}
+
+/// Says where tension is let go.
+pub(crate) fn note_tension(body: &LayeredBody, scene: &Scene, notes: &mut Vec<Note>) {
+    let tense = scene.layers.iter().find(|layer| layer.prestress > 0.0);
+    let is_free = scene.body.cut_faces == CutFaces::Free && !body.cut_faces.is_empty();
+    if let Some(layer) = tense.filter(|_| is_free) {
+        notes.push(Note::TensionLost {
+            layer: layer.tissue.name.clone(),
+        });
+    }
+}
+
+/// Says where steps are too long for friction, which depends on the way that skin has slipped.
+pub(crate) fn note_friction(scene: &Scene, notes: &mut Vec<Note>) {
+    let press = &scene.press;
+    let step = press.depth / n_steps(press) as f64;
+    let longest = LONGEST_STEP * scene.tool.contact_radius();
+    let has_friction = scene.tool.contact().is_some_and(|tool| tool.friction > 0.0);
+    if has_friction && step > longest {
+        notes.push(Note::LongFrictionSteps {
+            step,
+            enough: longest,
+        });
+    }
+}

@@ -1,0 +1,234 @@
+//! A press at one speed, sample by sample.
+
+use palpa_fem::{
+    Dynamics, Load, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
+    equilibrate, prism_fields,
+};
+use palpa_mesh::Vec3;
+
+use super::sample::{Failure, Sample, SampleOutcome};
+use super::{Grip, Indentation};
+use crate::press::{Phase, Waypoint, tidy};
+
+/// Forces out of balance in a body at rest, as a share of those that count as none: rounding only.
+const REST_TOLERANCE: f64 = 1e-3;
+
+/// What moves while one speed is run.
+#[derive(Debug)]
+pub struct Run<'a> {
+    pub(super) indentation: &'a Indentation,
+    /// The number of its speed.
+    pub index: usize,
+    /// The body's state.
+    pub state: State,
+    /// What solved it last.
+    pub workspace: Workspace,
+    pub(super) path: Vec<Waypoint>,
+    pub(super) next: usize,
+    /// The load of the last sample.
+    pub(super) before: Acting,
+    pub(super) earlier: Earlier,
+    pub(super) time: f64,
+    pub(super) last: Option<Sample>,
+    /// Why the run ended early, if it did.
+    pub failure: Option<Failure>,
+}
+
+/// Tools and held nodes at one moment.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Acting {
+    pub(super) tools: Vec<PosedTool>,
+    pub(super) held: Vec<(usize, Vec3)>,
+}
+
+/// Displacements at the last samples of one phase, the newest first: enough to go on along a parabola. Newton's method
+/// then starts where it would be after its first iteration, and saves that.
+#[derive(Debug, Default)]
+pub(super) struct Earlier {
+    phase: Option<Phase>,
+    displacements: Vec<Vec<Vec3>>,
+}
+
+impl Earlier {
+    fn note(&mut self, phase: Phase, displacements: &[Vec3]) {
+        if self.phase != Some(phase) {
+            // Where one phase ends, the next one begins.
+            self.displacements.truncate(1);
+            self.phase = Some(phase);
+        }
+        self.displacements.truncate(2);
+        self.displacements.insert(0, displacements.to_vec());
+    }
+
+    /// Where nodes will be at the next sample, as far as three or two samples at equal distances tell.
+    fn guess(&self, phase: Phase) -> Option<Vec<Vec3>> {
+        if self.phase != Some(phase) {
+            return None;
+        }
+        match &self.displacements[..] {
+            [a, b, c, ..] => Some(
+                (a.iter().zip(b).zip(c))
+                    .map(|((a, b), c)| a * 3.0 - b * 3.0 + c)
+                    .collect(),
+            ),
+            [a, b] => Some(a.iter().zip(b).map(|(a, b)| a * 2.0 - b).collect()),
+            _ => None,
+        }
+    }
+}
+
+impl Acting {
+    fn load(&self, duration: f64, dynamics: Option<Dynamics>) -> Load<'_> {
+        Load {
+            tools: &self.tools,
+            held: &self.held,
+            duration,
+            dynamics,
+            ..Load::default()
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Goes on to the next sample; `None` at the end. A sample that did not converge is the last.
+    pub fn advance(&mut self) -> Option<Sample> {
+        let indentation = self.indentation;
+        let waypoint = *self.path.get(self.next)?;
+        let acting = indentation.acting(waypoint.depth);
+        let report = self.solve(&waypoint, &acting);
+        self.earlier.note(waypoint.phase, &self.state.displacements);
+        let speed_mm_s = tidy(indentation.speeds[self.index] * 1e3);
+        let depth_mm = tidy(waypoint.depth * 1e3);
+        let outcome = report.outcome;
+        let sample = if outcome == Outcome::Converged {
+            self.before = acting;
+            self.next += 1;
+            self.measured(&waypoint, &report)
+        } else {
+            self.next = self.path.len();
+            self.failure = Some(Failure {
+                speed_mm_s,
+                depth_mm,
+                outcome,
+            });
+            let unmoved = || self.measured(&waypoint, &report);
+            self.last.clone().unwrap_or_else(unmoved)
+        };
+        self.time = waypoint.time;
+        let sample = Sample {
+            iterations: report.iterations,
+            substeps: report.substeps,
+            residual: report.residual,
+            phase: waypoint.phase,
+            cycle: waypoint.cycle,
+            time_s: tidy(waypoint.time),
+            depth_mm,
+            outcome: SampleOutcome::from(&outcome),
+            ..sample
+        };
+        self.last = Some(sample.clone());
+        Some(sample)
+    }
+
+    /// Takes the body to where the tool is at a waypoint; first from a guess that goes on as the last samples did.
+    fn solve(&mut self, waypoint: &Waypoint, acting: &Acting) -> StepReport {
+        let indentation = self.indentation;
+        let (before, load) = (
+            self.before.load(0.0, None),
+            acting.load(waypoint.time - self.time, indentation.dynamics),
+        );
+        let (model, params) = (&*indentation.model, &indentation.params);
+        let has_memory = indentation.is_viscous || indentation.dynamics.is_some();
+        if waypoint.depth == 0.0 && (self.next == 0 || !has_memory) {
+            // The body is at rest. There may be no force at all, of which a share could be out of balance.
+            let saved = std::mem::replace(&mut self.state, indentation.rest.clone());
+            let tolerance = if indentation.prepared.is_tense() {
+                params.tolerance
+            } else {
+                REST_TOLERANCE
+            };
+            let params = SolveParams {
+                tolerance,
+                ..*params
+            };
+            let workspace = &mut self.workspace;
+            let report = equilibrate(model, &mut self.state, workspace, &load, &params);
+            if report.outcome == Outcome::Converged {
+                return report;
+            }
+            self.state = saved;
+        }
+        let guess = (self.earlier.guess(waypoint.phase)).filter(|_| indentation.dynamics.is_none());
+        if let Some(guess) = guess {
+            let saved = self.state.clone();
+            self.state.displacements = guess;
+            let workspace = &mut self.workspace;
+            let report = equilibrate(model, &mut self.state, workspace, &load, params);
+            if report.outcome == Outcome::Converged {
+                return report;
+            }
+            self.state = saved;
+        }
+        let workspace = &mut self.workspace;
+        advance(model, &mut self.state, workspace, &before, &load, params)
+    }
+
+    /// What a step has led to, in the units of the table.
+    fn measured(&self, waypoint: &Waypoint, report: &StepReport) -> Sample {
+        let indentation = self.indentation;
+        let direction = &indentation.place().direction;
+        let (pull, area, n_touching) = match &indentation.grip {
+            Grip::Bond { nodes, areas } => (report.held_force, areas.iter().sum(), nodes.len()),
+            Grip::Contact(_) => {
+                let touching = self.state.touches.iter().filter(|t| t.tool().is_some());
+                let n_touching = touching.count();
+                (report.tool_forces[0], report.tool_areas[0], n_touching)
+            }
+        };
+        let max_pressure = match &indentation.grip {
+            Grip::Bond { areas, .. } if areas.iter().all(|&area| area == 0.0) => None,
+            _ => Some((indentation.skin_pressure(self).into_iter()).fold(0.0, f64::max)),
+        };
+        let fields = prism_fields(&indentation.model, &self.state, &self.workspace);
+        let ratios = fields.iter().map(|field| field.volume_ratio);
+        let contact = &report.contact;
+        // Plus zero: no sample is "minus nothing".
+        let force_n = -pull.dot(direction) + 0.0;
+        let depth_mm = waypoint.depth * 1e3;
+        let work_mj = self.last.as_ref().map_or(0.0, |last| {
+            last.work_mj + 0.5 * (last.force_n + force_n) * (depth_mm - last.depth_mm)
+        });
+        Sample {
+            run: self.index,
+            speed_mm_s: tidy(indentation.speeds[self.index] * 1e3),
+            phase: waypoint.phase,
+            cycle: waypoint.cycle,
+            time_s: waypoint.time,
+            depth_mm,
+            force_n,
+            force_x_n: pull.x,
+            force_y_n: pull.y,
+            force_z_n: pull.z,
+            contact_area_mm2: area * 1e6 + 0.0,
+            max_pressure_kpa: max_pressure.map(|p| p * 1e-3),
+            n_touching,
+            gap_um: contact.gap * 1e6,
+            penetration_um: contact.penetration * 1e6,
+            tension_n: contact.tension,
+            cone_n: contact.cone,
+            slip: contact.slip,
+            friction_smoothing_um: report.friction_smoothing * 1e6,
+            residual: report.residual,
+            iterations: report.iterations,
+            substeps: report.substeps,
+            outcome: SampleOutcome::Converged,
+            energy_mj: report.energy * 1e3,
+            work_mj,
+            volume_ratio_min: ratios.clone().fold(f64::INFINITY, f64::min),
+            volume_ratio_max: ratios.fold(0.0, f64::max),
+            layer_thickness_mm: (indentation.thicknesses(&self.state).iter())
+                .map(|t| t * 1e3)
+                .collect(),
+        }
+    }
+}
