@@ -5,3 +5,4 @@ pub mod export;
 pub mod reproduce;
 pub mod trace;
 pub mod verify;
+pub mod z_width;

@@ -14,6 +14,7 @@ mod frame;
 pub mod gallery;
 mod game;
 pub mod hand;
+mod notes;
 mod recording;
 mod remote;
 mod run;

@@ -24,11 +24,12 @@ use crate::fields::Fields;
 use crate::figures::Figures;
 use crate::game::Game;
 use crate::hand::{Goal, HandDriver, Place};
+use crate::notes::shown;
 use crate::recording::{self, MeshBytes, Recording};
 use crate::remote::{Material, Order, Remote};
 use crate::world::{BEFORE_THE_BROWSER, Running, World};
 use palpa::live::{Look, Seen, notes_of, once_from};
-use palpa::{Note, one_paragraph};
+use palpa::one_paragraph;
 
 const PERIOD: Duration = Duration::from_micros(16_667);
 const MOST_ORDERS: u32 = 1000;
@@ -519,7 +520,7 @@ impl Body {
         state.notes = (world.notes.iter())
             // A note on a lump says where it is.
             .filter(|note| !(hides && note.is_about_lumps()))
-            .map(Note::to_string)
+            .map(shown)
             .collect();
         state.n_nodes = world.n_nodes() as u32;
     }

@@ -209,6 +209,17 @@ pub enum NoticeLevel {
     Error,
 }
 
+/// Something to know about the scene: its kind, and the names and numbers in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Note {
+    /// The kind of note. Pages have words for each kind in each of their languages.
+    pub kind: String,
+    /// Names and numbers, in SI units.
+    pub values: serde_json::Map<String, Value>,
+    /// The note in English, for clients without words of their own.
+    pub text: String,
+}
+
 /// All that pages show beside the moving body.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct State {
@@ -245,7 +256,7 @@ pub struct State {
     /// Why the last scene could not be built, or the engine stopped.
     pub problem: Option<String>,
     /// What a user should know of the scene.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Whether the scene's motion runs.
     pub is_motion_running: bool,
     /// The field that frames carry.

@@ -249,6 +249,11 @@ impl Note {
     }
 }
 
+/// The JSON Schema (2020-12) of [`Note`].
+pub fn note_schema() -> serde_json::Value {
+    schemars::schema_for!(Note).to_value()
+}
+
 /// Three coordinates, for a note.
 pub(crate) fn xyz(p: Vec3) -> [f64; 3] {
     p.into()

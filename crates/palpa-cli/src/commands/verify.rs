@@ -1,6 +1,5 @@
 //! `palpa verify`: problems with known answers, and how near the continuum model comes.
 
-mod picture;
 mod report;
 
 use std::fs;
@@ -15,6 +14,7 @@ use self::report::say_case;
 use super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
+use palpa_lab::verify::picture;
 use palpa_plot::output::OutDir;
 
 /// Compare the continuum model with known answers

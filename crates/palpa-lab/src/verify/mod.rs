@@ -20,6 +20,7 @@ mod half_space;
 mod layer;
 mod lump_map;
 mod patch;
+pub mod picture;
 mod plane;
 mod press;
 mod prony;

@@ -36,3 +36,12 @@ pub const SMALL_LUMP: f64 = 0.15;
 pub const PENETRATION: f64 = 1e-6;
 /// Elastic force on different load steps.
 pub const LOAD_STEPS: f64 = 0.001;
+
+/// A tolerance as a person reads it: a round share.
+pub fn share(value: f64) -> String {
+    if value < 5e-5 {
+        format!("{value:.0e}")
+    } else {
+        format!("{} %", (value * 1e6).round() / 1e4)
+    }
+}

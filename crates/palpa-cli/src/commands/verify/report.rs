@@ -4,6 +4,7 @@ use palpa_lab::verify::{Case, Findings, Row};
 
 use crate::cli::Context;
 use crate::table::Table;
+use palpa_lab::verify::tolerance::share;
 
 /// Up to this many figures a case is shown in full.
 const SHOWN_IN_FULL: usize = 24;
@@ -130,15 +131,6 @@ fn signed_share(value: f64) -> String {
         format!("{value:+.1e}")
     } else {
         format!("{:+.2} %", value * 1e2)
-    }
-}
-
-/// A tolerance: a round share.
-pub(super) fn share(value: f64) -> String {
-    if value < 5e-5 {
-        format!("{value:.0e}")
-    } else {
-        format!("{} %", (value * 1e6).round() / 1e4)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use palpa_lab::verify::{Findings, StudyPoint};
+use super::{Findings, StudyPoint};
 
-use super::report::share;
-use palpa_lab::reproduce::fit::line;
+use super::tolerance::share;
+use crate::reproduce::fit::line;
 use palpa_plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 
 /// Up to this many curves are told apart by name; of more, what counts is shown: the worst and the mean.
@@ -97,7 +97,7 @@ fn summary(curves: &[Curve<'_>]) -> Option<[Vec<Placed>; 2]> {
 }
 
 /// Draws the study of all cases that have one.
-pub(super) fn draw(found: &Findings) -> Picture {
+pub fn draw(found: &Findings) -> Picture {
     let mut names: Vec<&str> = Vec::new();
     for point in &found.study {
         if !names.contains(&point.case) {
@@ -141,7 +141,7 @@ fn panel(case: &str, found: &Findings) -> Chart {
     let high = errors()
         .chain(tolerances.iter().copied())
         .fold(low, f64::max);
-    let what = palpa_lab::verify::cases().iter().find(|c| c.name == case);
+    let what = crate::verify::cases().iter().find(|c| c.name == case);
     let mut chart = Chart::new(
         Axis::log("nodes that can move"),
         Axis::log("|error| [%]").with_range(LEAST_SHARE * low * 1e2, high * 1e2),

@@ -1,0 +1,193 @@
+//! How stiff and how damped a wall each simulated device renders without rattling.
+//!
+//! A wall of one spring and a damper is pressed by 3 mm with the coupling off, in simulated time.
+
+use palpa_device::{DeviceModel, Grip, z_width};
+use palpa_plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
+use serde::Serialize;
+
+/// The hands that hold the devices.
+pub const GRIPS: [(&str, Grip); 3] = [
+    ("soft", Grip::SOFT),
+    ("medium", Grip::MEDIUM),
+    ("stiff", Grip::STIFF),
+];
+/// Least and largest stiffness that is tried, N/m, and the factor from one to the next.
+const SOFTEST: f64 = 50.0;
+const STIFFEST: f64 = 51_200.0;
+const FACTOR: f64 = std::f64::consts::SQRT_2;
+/// The border is then halved so often: to 2 %.
+const HALVINGS: usize = 4;
+/// Dampings that are tried: from none, in shares of the largest that the law asks of the device.
+const DAMPING_SHARES: [f64; 9] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0];
+
+/// What is written to `z_width.json`.
+#[derive(Debug, Serialize)]
+pub struct Found {
+    /// Whether it was not interrupted.
+    pub is_complete: bool,
+    /// One for each device, hand, observer and damping.
+    pub rows: Vec<Row>,
+}
+
+/// The largest stable stiffness at one damping.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the device.
+    pub device: &'static str,
+    /// Name of the hand.
+    pub grip: &'static str,
+    /// Whether the energy observer injects damping, as in use.
+    pub has_observer: bool,
+    /// Damping that the wall has. N s/m
+    pub damping: f64,
+    /// All walls that were tried up to this are stable; 0 if none is. N/m
+    pub stiffness: f64,
+    /// Whether the stiffest wall that is tried is stable, too.
+    pub is_open: bool,
+}
+
+/// Which devices and hands are tried.
+#[derive(Debug, Clone, Default)]
+pub struct Study {
+    /// Names of devices; all if empty.
+    pub devices: Vec<String>,
+    /// Names of hands; all if empty.
+    pub grips: Vec<String>,
+}
+
+impl Study {
+    fn devices(&self) -> impl Iterator<Item = (&'static str, DeviceModel)> + '_ {
+        DeviceModel::ALL
+            .into_iter()
+            .filter(|d| is_asked(&self.devices, d.0))
+    }
+
+    fn grips(&self) -> impl Iterator<Item = (&'static str, Grip)> + Clone + '_ {
+        GRIPS.into_iter().filter(|g| is_asked(&self.grips, g.0))
+    }
+
+    /// Number of rows that a whole run finds.
+    pub fn n_rows(&self) -> usize {
+        self.devices().count() * self.grips().count() * 2 * DAMPING_SHARES.len()
+    }
+
+    /// Finds the rows one after the other, as long as `goes_on` says so after each.
+    pub fn run(&self, mut goes_on: impl FnMut() -> bool) -> Found {
+        let mut rows = Vec::with_capacity(self.n_rows());
+        'all: for (device, model) in self.devices() {
+            for (grip_name, grip) in self.grips() {
+                for has_observer in [false, true] {
+                    for share in DAMPING_SHARES {
+                        if !goes_on() {
+                            break 'all;
+                        }
+                        let damping = share * model.spec.max_damping;
+                        let (stiffness, is_open) = largest(&model, &grip, damping, has_observer);
+                        rows.push(Row {
+                            device,
+                            grip: grip_name,
+                            has_observer,
+                            damping,
+                            stiffness,
+                            is_open,
+                        });
+                    }
+                }
+            }
+        }
+        Found {
+            is_complete: rows.len() == self.n_rows(),
+            rows,
+        }
+    }
+}
+
+fn is_asked(asked: &[String], name: &str) -> bool {
+    asked.is_empty() || asked.iter().any(|a| a == name)
+}
+
+/// The stiffness up to which all walls are stable, N/m, and whether that is the stiffest that is tried.
+fn largest(model: &DeviceModel, grip: &Grip, damping: f64, has_observer: bool) -> (f64, bool) {
+    let is_stable =
+        |stiffness| z_width(model, grip, &[stiffness], &[damping], has_observer)[0].is_stable;
+    let mut stable = 0.0;
+    let mut tried = SOFTEST;
+    while is_stable(tried) {
+        stable = tried;
+        tried *= FACTOR;
+        if tried > STIFFEST * 1.001 {
+            return (stable, true);
+        }
+    }
+    if stable > 0.0 {
+        for _ in 0..HALVINGS {
+            let middle = (stable * tried).sqrt();
+            if is_stable(middle) {
+                stable = middle;
+            } else {
+                tried = middle;
+            }
+        }
+    }
+    (stable, false)
+}
+
+/// A chart for each device: below its line a hand is safe.
+pub fn picture(rows: &[Row]) -> Picture {
+    let stable = rows.iter().map(|row| row.stiffness.max(SOFTEST));
+    let (low, high) = stable.fold((STIFFEST, SOFTEST), |(low, high), k| {
+        (low.min(k), high.max(k))
+    });
+    let limits = DeviceModel::ALL.map(|(_, model)| model.spec.max_stiffness);
+    let low = limits.into_iter().fold(low, f64::min);
+    let charts: Vec<Chart> = (DeviceModel::ALL.iter())
+        .filter(|(device, _)| rows.iter().any(|row| row.device == *device))
+        .map(|(device, model)| {
+            let mut chart = Chart::new(
+                Axis::linear("damping of the wall [N s/m]").with_zero(),
+                Axis::log("largest stable stiffness [N/m]").with_range(0.8 * low, 1.25 * high),
+            )
+            .title(title(device));
+            for has_observer in [false, true] {
+                for ((grip, _), color) in GRIPS.into_iter().zip(PALETTE) {
+                    let points: Vec<[f64; 2]> = rows
+                        .iter()
+                        .filter(|r| {
+                            r.device == *device && r.grip == grip && r.has_observer == has_observer
+                        })
+                        .map(|r| [r.damping, r.stiffness.max(SOFTEST)])
+                        .collect();
+                    if points.is_empty() {
+                        continue;
+                    }
+                    let series = if has_observer {
+                        Series::new(format!("{grip}, observer"), points).dashed()
+                    } else {
+                        Series::new(grip, points)
+                    };
+                    chart = chart.series(series.with_color(color));
+                }
+            }
+            let spec = model.spec;
+            chart
+                .guide(Guide::y(spec.max_stiffness, "relied on"))
+                .guide(Guide::x(spec.max_damping, ""))
+        })
+        .collect();
+    panels(
+        "Stable walls: stiffness and damping that each device renders quietly",
+        &charts,
+        2,
+    )
+}
+
+/// The name that a person knows a device by.
+fn title(device: &str) -> &'static str {
+    match device {
+        "falcon" => "Novint Falcon",
+        "touch" => "3D Systems Touch",
+        "inverse3" => "Haply Inverse3",
+        _ => "ideal device",
+    }
+}

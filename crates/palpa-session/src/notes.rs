@@ -1,0 +1,39 @@
+//! Notes of the engine as pages get them.
+
+use palpa::Note;
+use palpa_viewer::control;
+use serde_json::{Map, Value};
+
+/// The note as its kind, its numbers, and its English words.
+pub(crate) fn shown(note: &Note) -> control::Note {
+    let mut values = match serde_json::to_value(note) {
+        Ok(Value::Object(values)) => values,
+        _ => Map::new(),
+    };
+    let kind = match values.remove("kind") {
+        Some(Value::String(kind)) => kind,
+        _ => String::new(),
+    };
+    control::Note {
+        kind,
+        values,
+        text: note.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_note_is_shown_by_its_kind_and_numbers() {
+        let shown = shown(&Note::CoarserForTouch { edge: 0.003 });
+        assert_eq!(shown.kind, "coarser_for_touch");
+        assert_eq!(shown.values["edge"], 0.003);
+        assert!(shown.text.contains("3.0 mm"), "{}", shown.text);
+        assert_eq!(
+            super::shown(&Note::PressOnCutFace).kind,
+            "press_on_cut_face"
+        );
+    }
+}
