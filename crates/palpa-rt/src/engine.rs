@@ -114,7 +114,7 @@ impl Engine {
                 period: params.period,
             });
         }
-        let specs: Vec<DeviceSpec> = devices.iter().map(|d| d.spec()).collect();
+        let specs: Vec<DeviceSpec> = devices.iter().map(HapticDevice::spec).collect();
         let (tick_writer, tick_view) = mailbox([(); 3].map(|()| Box::<TickEntry>::default()));
         let (step_writer, step_view) = mailbox([(); 3].map(|()| Box::<StepRecord>::default()));
         let mut engine = Self {
