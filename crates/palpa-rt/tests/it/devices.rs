@@ -15,7 +15,7 @@ use std::{
 };
 
 /// A condition that does not come true in this time is a hang. No outcome depends on it otherwise.
-const HANG: Duration = Duration::from_secs(120);
+const HANG: Duration = Duration::from_mins(2);
 
 /// Waits until something is so. It is asked whenever the loop reads a device of [`announced`], which
 /// wakes the thread that made the device.

@@ -94,7 +94,7 @@ fn a_damaged_log_says_so_and_reads_up_to_there() {
     let mut bytes = fs::read(&path).unwrap();
     // In the middle of a chunk that has others before and after it.
     let chunks = chunks(&bytes);
-    let middle = (chunks[1].0 + chunks[2].0) / 2;
+    let middle = usize::midpoint(chunks[1].0, chunks[2].0);
     for byte in &mut bytes[middle..middle + 40] {
         *byte ^= 0x5a;
     }
