@@ -1,14 +1,15 @@
-//! A bed of tissue for trials of the loop: small, dense, stiffening, with friction, and solved without the servo's help.
+//! A bed of tissue for trials of the loop: small, dense, stiffening, with friction, and solved
+//! without the servo's help.
 //!
 //! ```text
 //! W_ij = s_i s_j a / √(|p_i − p_j|² + a²) · 1 / (1 + κ δ)        a softened 1/r, as of an elastic half-space
 //! ```
-//! δ is the tool's depth; κ makes the tissue stiffen; `s` is smaller over a lump. Its contact is solved by plain
-//! Gauss–Seidel to convergence, which makes it an oracle too.
+//! δ is the tool's depth; κ makes the tissue stiffen; `s` is smaller over a lump. Its contact is
+//! solved by plain Gauss–Seidel to convergence, which makes it an oracle too.
 
 use palpa_servo::{Candidate, ContactPatch, MAX_CONTACTS, Mat3, Pose, ToolContact, Vec3};
 
-/// What the bed is like.
+/// Settings of a bed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BedParams {
     /// Compliance of one vertex, m/N; the tool feels several at once.
@@ -23,7 +24,7 @@ pub struct BedParams {
     pub radius: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// For `x > 0`, how much stiffer it is.
+    /// Stiffness where `x > 0` over that elsewhere.
     pub edge: f64,
 }
 
@@ -41,7 +42,8 @@ impl Default for BedParams {
     }
 }
 
-/// The bed: its surface is `z = 0` about the origin, the tool a sphere about the device's position, pressed along −z.
+/// The bed: its surface is `z = 0` about the origin, the tool a sphere about the device's position,
+/// pressed along −z.
 #[derive(Debug, Clone)]
 pub struct Bed {
     params: BedParams,

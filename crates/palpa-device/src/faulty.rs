@@ -5,17 +5,17 @@ use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Vec3};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What goes wrong.
+/// A fault of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The position is off by this, m.
+    /// The position is wrong by this vector, m.
     Jump(Vec3),
     /// The position is not a number.
     NotANumber,
-    /// The same reading again and again.
+    /// Every reading is the same.
     Stall,
-    /// Nothing there.
+    /// The device is not there.
     Unplug,
     /// No answer in time.
     Late,
@@ -32,10 +32,10 @@ impl FaultSwitch {
     }
 }
 
-/// When a fault is there.
+/// The time in which a fault is there.
 #[derive(Debug, Clone)]
 enum When {
-    /// From one moment of the loop's clock to another, s.
+    /// From the first to the second moment of the loop's clock, s.
     Between(f64, f64),
     Switched(FaultSwitch),
 }
@@ -49,7 +49,7 @@ impl When {
     }
 }
 
-/// A device with faults: at moments that are known before, or whenever somebody turns them on.
+/// A device with faults: between given moments, or while a switch is on.
 #[derive(Debug, Clone)]
 pub struct Faulty<D> {
     inner: D,
@@ -74,7 +74,7 @@ impl<D> Faulty<D> {
         self
     }
 
-    /// With one more fault, there while the switch is on.
+    /// With one more fault, while the switch is on.
     #[must_use]
     pub fn with_switch(mut self, switch: &FaultSwitch, fault: Fault) -> Self {
         self.faults.push((When::Switched(switch.clone()), fault));
@@ -97,6 +97,10 @@ impl<D> Faulty<D> {
 impl<D: HapticDevice> HapticDevice for Faulty<D> {
     fn spec(&self) -> DeviceSpec {
         self.inner.spec()
+    }
+
+    fn resolution(&self) -> f64 {
+        self.inner.resolution()
     }
 
     fn read(&mut self, now: f64) -> Result<DeviceState, DeviceFault> {

@@ -17,17 +17,26 @@
 //! # Ok::<(), palpa_device::DeviceFault>(())
 //! ```
 
-mod bed;
 mod device;
 mod faulty;
+mod hand;
+mod model;
+mod open;
 mod path;
+mod scripted;
 mod simulated;
+
+mod bed;
 mod trial;
 
 pub use bed::{Bed, BedParams};
 pub use device::{DeviceFault, HapticDevice};
 pub use faulty::{Fault, FaultSwitch, Faulty};
+pub use hand::{Grip, HandTarget, LiveTarget};
+pub use model::DeviceModel;
+pub use open::{DeviceSetup, Driver};
 pub use palpa_servo::Vec3;
 pub use path::Path;
-pub use simulated::{DeviceModel, Grip, LiveTarget, Scripted, SimulatedDevice};
+pub use scripted::Scripted;
+pub use simulated::SimulatedDevice;
 pub use trial::{Latest, Sample, Trial, TrialReport, ZWidthPoint, band_rms, z_width};

@@ -1,4 +1,5 @@
-//! Trials of the closed loop in simulated time: servo, device, hand and a bed of tissue whose patches come late.
+//! Trials of the closed loop in simulated time: servo, device, hand and a bed of tissue whose
+//! patches come late.
 
 use crate::{Bed, BedParams, DeviceModel, Grip, HapticDevice, Path, SimulatedDevice};
 use palpa_servo::{
@@ -58,20 +59,20 @@ impl PatchSource for Latest {
     }
 }
 
-/// What is tried.
+/// Settings of a trial.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// The device.
     pub device: DeviceModel,
-    /// How it is held.
+    /// The grip of the hand.
     pub grip: Grip,
-    /// What it presses.
+    /// The tissue.
     pub bed: BedParams,
-    /// What the hand wants.
+    /// The path of the hand.
     pub path: Path,
     /// Patches in a second, each one period late.
     pub patch_rate: f64,
-    /// How long, s.
+    /// Duration, s.
     pub duration: f64,
     /// The law's settings.
     pub servo: ServoParams,
@@ -82,24 +83,26 @@ pub struct Trial {
 pub struct Sample {
     /// Clock, s.
     pub time: f64,
-    /// Where the hand-piece truly is, m.
+    /// True position of the hand-piece, m.
     pub position: Vec3,
-    /// What was commanded, N.
+    /// Commanded force, N.
     pub force: Vec3,
-    /// What the law says.
+    /// Report of the law.
     pub report: TickReport,
 }
 
-/// What came of a trial.
+/// Result of a trial.
 #[derive(Debug, Clone)]
 pub struct TrialReport {
     /// All ticks.
     pub samples: Vec<Sample>,
     /// Root of the mean square of the force between 20 and 400 Hz over the last 2 s, N.
     pub rms: f64,
-    /// Largest deficit of energy at any time: given out beyond what was taken in, J, as true positions have it.
+    /// Largest deficit of energy at any time: given out beyond what was taken in, J, as true
+    /// positions have it.
     pub deficit: f64,
-    /// Largest change of force in a tick at which a patch came, N, while the force was fully let through.
+    /// Largest change of force in a tick at which a patch came, N, while the force was fully let
+    /// through.
     pub arrival_step: f64,
     /// 99.9th percentile of the change in the other ticks, N.
     pub other_step: f64,
@@ -112,8 +115,8 @@ impl Trial {
         self.run_with(device, SimulatedDevice::position, |_| 0.0)
     }
 
-    /// Runs it with another device, such as a faulty one; `position` says where it truly is, and `hiccup` how long the
-    /// loop stands still before a tick, s.
+    /// Runs it with another device, such as a faulty one; `position` says where it truly is, and
+    /// `hiccup` how long the loop stands still before a tick, s.
     pub fn run_with<D: HapticDevice>(
         &self,
         mut device: D,
@@ -213,7 +216,8 @@ fn steps(samples: &[Sample]) -> (f64, f64) {
     )
 }
 
-/// Root of the mean square, over a band of frequencies in Hz, of samples `dt` apart, less their straight line.
+/// Root of the mean square, over a band of frequencies in Hz, of samples `dt` apart, less their
+/// straight line.
 pub fn band_rms(samples: &[Vec3], dt: f64, from: f64, to: f64) -> f64 {
     let n = samples.len();
     if n < 2 {
@@ -264,9 +268,11 @@ pub struct ZWidthPoint {
     pub is_stable: bool,
 }
 
-/// The stable range of stiffness and damping: a wall of one vertex is pressed with the coupling off, for each pair.
+/// The stable range of stiffness and damping: a wall of one vertex is pressed with the coupling
+/// off, for each pair.
 ///
-/// With `guard` the energy observer is on, as it is in use; without, the device and the hand are on their own.
+/// With `guard` the energy observer is on, as it is in use; without, the device and the hand are on
+/// their own.
 pub fn z_width(
     device: &DeviceModel,
     grip: &Grip,

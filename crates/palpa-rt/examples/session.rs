@@ -1,5 +1,5 @@
-//! A session of ten seconds with the tests' bed of springs and scripted hand: what the loop, the hand-over and the recorder
-//! cost on this machine, and a log to look at.
+//! A session of ten seconds with the tests' bed of springs and scripted hand: what the loop, the
+//! hand-over and the recorder cost on this machine, and a log to look at.
 //!
 //! `cargo run --release -p palpa-rt --example session -- session.mcap`
 #![expect(

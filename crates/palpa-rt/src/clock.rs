@@ -18,7 +18,8 @@ pub trait Clock: Clone + Send + 'static {
 
 /// The machine's monotonic clock.
 ///
-/// Waiting sleeps until an absolute moment less `spin`, and spins for the rest: 0 leaves the core to others.
+/// Waiting sleeps until an absolute moment less `spin`, and spins for the rest: 0 leaves the core
+/// to others.
 #[derive(Debug, Clone, Copy)]
 pub struct RealClock {
     origin: origin::Origin,
@@ -124,7 +125,8 @@ mod origin {
             (t.tv_sec - self.0.tv_sec) as f64 + (t.tv_nsec - self.0.tv_nsec) as f64 * 1e-9
         }
 
-        /// Absolute, so that what happens between reading the clock and falling asleep adds nothing.
+        /// Absolute, so that what happens between reading the clock and falling asleep adds
+        /// nothing.
         pub(super) fn sleep_until(self, moment: f64) {
             let ns = self.0.tv_nsec + (moment * 1e9) as i64;
             let at = Timespec {

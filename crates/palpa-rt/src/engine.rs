@@ -1,27 +1,29 @@
 //! The engine: threads, mailboxes and rings put together, started, watched and stopped.
 
+mod params;
+mod report;
+
+pub use self::params::{EngineParams, StartError};
+pub use self::report::{Report, Snapshot};
+
 use crate::{
-    clock::RealClock,
-    event::{Level, Speaker},
+    clock::{Clock, RealClock},
+    event::Speaker,
     fault::FaultHooks,
     findings::Board,
-    histogram::Quantiles,
     mailbox::{Reader, mailbox},
     record::StepRecord,
-    recorder::{EventRow, LogFile, Recorder, RecorderParams},
+    recorder::{LogFile, Recorder, RecorderParams},
     servo_loop::{LoopStats, Now, ServoLoop, TickEntry},
-    smoothness::{ForceReport, ForceStats},
-    threads::{Granted, Priority, Wish, lock_memory},
+    smoothness::ForceStats,
+    threads::{Granted, Wish, lock_memory},
     tissue::{Tissue, empty_patch},
-    tissue_thread::{
-        Background, PoseSample, TissueParams, TissueStats, TissueThread, run_background,
-    },
+    tissue_thread::{Background, PoseSample, TissueStats, TissueThread, run_background},
 };
 use palpa_device::HapticDevice;
 use palpa_servo::{DeviceSpec, MAX_TOOLS, Servo, ServoParams};
 use rtrb::{Producer, RingBuffer};
 use std::{
-    io,
     path::PathBuf,
     sync::{
         Arc,
@@ -38,80 +40,6 @@ const EVENT_RING: usize = 1024;
 const TISSUE_STACK: usize = 16 << 20;
 const SMALL_STACK: usize = 2 << 20;
 
-/// How an engine runs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EngineParams {
-    /// Period of the loop, s.
-    pub period: f64,
-    /// The law; its period is set to the loop's.
-    pub servo: ServoParams,
-    /// The tissue's thread.
-    pub tissue: TissueParams,
-    /// How long the loop spins before each tick instead of sleeping, s: less lateness for more CPU.
-    pub spin: f64,
-    /// What the loop's thread wishes for.
-    pub servo_wish: Wish,
-    /// What the tissue's thread wishes for.
-    pub tissue_wish: Wish,
-    /// What the background's thread wishes for: zones that come late hold the tissue back, so it is no less than others.
-    pub background_wish: Wish,
-    /// What the recorder's thread wishes for.
-    pub recorder_wish: Wish,
-    /// Whether memory shall be kept in RAM.
-    pub lock_memory: bool,
-}
-
-impl Default for EngineParams {
-    fn default() -> Self {
-        Self {
-            period: 1e-3,
-            servo: ServoParams::default(),
-            tissue: TissueParams::default(),
-            spin: 0.0,
-            servo_wish: Wish {
-                priority: Priority::RealTime(80),
-                core: None,
-            },
-            tissue_wish: Wish::NORMAL,
-            background_wish: Wish::NORMAL,
-            recorder_wish: Wish {
-                priority: Priority::Nice(10),
-                core: None,
-            },
-            lock_memory: true,
-        }
-    }
-}
-
-/// Why an engine cannot start.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StartError {
-    /// No device, or more than the law can serve.
-    #[error("{found} devices; from 1 to {MAX_TOOLS} can be served")]
-    Devices {
-        /// How many there were.
-        found: usize,
-    },
-    /// The period is no time, s.
-    #[error("a period of {period} s; expected more than 0 and at most 0.1 s")]
-    Period {
-        /// What it was.
-        period: f64,
-    },
-    /// The log cannot be created.
-    #[error("{}: the log cannot be created: {source}", path.display())]
-    Log {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: mcap::McapError,
-    },
-    /// The system gives no thread.
-    #[error("no thread: {0}")]
-    Thread(#[from] io::Error),
-}
-
 /// A running engine. Dropping it stops it: forces ramp down, devices are let go, the log is closed.
 #[derive(Debug)]
 pub struct Engine {
@@ -125,8 +53,8 @@ pub struct Engine {
     tick_view: Reader<TickEntry>,
     step_view: Reader<StepRecord>,
     log: Option<PathBuf>,
-    /// In the order of their start: recorder, background, tissue, loop. Stopped from the last to the first, so that
-    /// whoever is spoken to outlives who speaks.
+    /// In the order of their start: recorder, background, tissue, loop. Stopped from the last to
+    /// the first, so that whoever is spoken to outlives who speaks.
     threads: Vec<Running>,
     panicked: Vec<&'static str>,
 }
@@ -144,64 +72,6 @@ struct Rings {
     steps: Producer<StepRecord>,
     servo: Speaker,
     tissue: Speaker,
-}
-
-/// The latest that is known of a running engine.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Snapshot {
-    /// The last tick; tick 0 before the first.
-    pub tick: TickEntry,
-    /// The tissue's last step; step 0 before the first.
-    pub step: StepRecord,
-}
-
-/// How a run went.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Report {
-    /// How long it ran, s.
-    pub duration: f64,
-    /// Ticks done.
-    pub ticks: u64,
-    /// Ticks left out: missed deadlines.
-    pub skipped: u64,
-    /// CPU time of a tick, s.
-    pub tick_cpu: Quantiles,
-    /// Lateness of a tick, s.
-    pub lateness: Quantiles,
-    /// Histogram of the CPU time of ticks: lower end, upper end (s), count.
-    pub tick_cpu_histogram: Vec<(f64, f64, u64)>,
-    /// Histogram of lateness.
-    pub lateness_histogram: Vec<(f64, f64, u64)>,
-    /// Force of each device.
-    pub forces: Vec<ForceReport>,
-    /// Steps of the tissue.
-    pub steps: u64,
-    /// Steps per second.
-    pub step_rate: f64,
-    /// CPU time of a step, s.
-    pub step_cpu: Quantiles,
-    /// Wall time of a step, s.
-    pub step_wall: Quantiles,
-    /// Steps whose patch was held back.
-    pub held_back: u64,
-    /// CPU time of background jobs, s each.
-    pub jobs: Quantiles,
-    /// CPU time of all background jobs as a share of the run.
-    pub background_cpu_share: f64,
-    /// Ticks and steps that are not in the log because a ring was full.
-    pub lost_records: [u64; 2],
-    /// Whether the log could not be written to its end.
-    pub has_log_failed: bool,
-    /// Threads that panicked.
-    pub panicked: Vec<&'static str>,
-    /// What happened.
-    pub events: Vec<EventRow>,
-    /// What the threads were granted.
-    pub granted: Vec<Granted>,
-    /// Whether memory was locked, or why not.
-    pub memory_locked: Result<(), String>,
-    /// The log.
-    pub log: Option<PathBuf>,
 }
 
 impl Engine {
@@ -223,8 +93,8 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Starts all threads but that of the loop: whoever gets the [`ServoLoop`] calls it, as from a vendor's callback,
-    /// with times of [`Engine::now`].
+    /// Starts all threads but that of the loop: whoever gets the [`ServoLoop`] calls it, as from a
+    /// vendor's callback, with times of [`Engine::now`].
     ///
     /// # Errors
     /// [`StartError`]; then nothing runs.
@@ -244,7 +114,7 @@ impl Engine {
                 period: params.period,
             });
         }
-        let specs: Vec<DeviceSpec> = devices.iter().map(|d| d.spec()).collect();
+        let specs: Vec<DeviceSpec> = devices.iter().map(HapticDevice::spec).collect();
         let (tick_writer, tick_view) = mailbox([(); 3].map(|()| Box::<TickEntry>::default()));
         let (step_writer, step_view) = mailbox([(); 3].map(|()| Box::<StepRecord>::default()));
         let mut engine = Self {
@@ -385,7 +255,6 @@ impl Engine {
 
     /// Seconds since the start.
     pub fn now(&self) -> f64 {
-        use crate::clock::Clock;
         self.clock.now()
     }
 
@@ -404,34 +273,36 @@ impl Engine {
         &self.faults
     }
 
-    /// How the loop fares.
+    /// Statistics of the loop.
     pub fn loop_stats(&self) -> &LoopStats {
         &self.loop_stats
     }
 
-    /// How the tissue fares.
+    /// Statistics of the tissue.
     pub fn tissue_stats(&self) -> &TissueStats {
         &self.tissue_stats
     }
 
-    /// What the threads were granted.
+    /// What the system granted the threads.
     pub fn granted(&self) -> &[Granted] {
         &self.granted
     }
 
-    /// Threads that ended by themselves: without the tissue's there is no force any more, and the engine is to be started anew.
+    /// Threads that ended by themselves: without the tissue's there is no force any more, and the
+    /// engine is to be started anew.
     pub fn ended(&self) -> Vec<&'static str> {
         let is_over = |running: &&Running| running.handle.is_finished();
         (self.threads.iter().filter(is_over).map(|r| r.name)).collect()
     }
 
-    /// Stops: forces ramp down, devices are let go, what is in the rings is written, the log is closed.
+    /// Stops: forces ramp down, devices are let go, what is in the rings is written, the log is
+    /// closed.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.report()
     }
 
-    /// How the run went so far.
+    /// Report of the run so far.
     pub fn report(&self) -> Report {
         let findings = self.findings.lock();
         let duration = self.now();
@@ -508,12 +379,5 @@ impl Engine {
 impl Drop for Engine {
     fn drop(&mut self) {
         self.shut_down();
-    }
-}
-
-impl Report {
-    /// What happened that was an error or worse than it should be.
-    pub fn warnings(&self) -> impl Iterator<Item = &EventRow> {
-        self.events.iter().filter(|e| e.level >= Level::Warning)
     }
 }

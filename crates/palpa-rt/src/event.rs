@@ -1,10 +1,10 @@
-//! What happened, as fixed-size records that cross a ring and become text elsewhere.
+//! Events: fixed-size records that cross a ring and become text elsewhere.
 
 use palpa_servo::Faults;
 use rtrb::Producer;
 use std::fmt;
 
-/// How grave it is.
+/// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Worth knowing.
@@ -15,7 +15,7 @@ pub enum Level {
     Error,
 }
 
-/// What happened.
+/// The kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Happening {

@@ -4,8 +4,9 @@
 mod parquet;
 
 use crate::{
+    layout::{Record, Value},
     log::{Ending, LogError, Row, Rows},
-    record::{DeviceRecord, Record, StepRecord, TickRecord, Value},
+    record::{DeviceRecord, StepRecord, TickRecord},
     recorder::EventRow,
 };
 use palpa_servo::MAX_TOOLS;
@@ -15,13 +16,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Kinds of table files.
+/// Format of table files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Table {
     /// Comma-separated text; reals with as many digits as it takes to read the same bits.
     Csv,
-    /// Apache Parquet, compressed with Snappy.
+    /// Apache Parquet, compressed with Snappy. Needs the feature `parquet`.
     #[cfg(feature = "parquet")]
     Parquet,
 }
@@ -52,8 +53,9 @@ pub struct Exported {
     pub ending: Ending,
 }
 
-/// Writes a log as tables `ticks`, `device0`…, `steps` and, always as text, `events.csv` into a folder, which is made
-/// if need be. The log is read as it goes; memory does not grow with its length. Returns the files.
+/// Writes a log as tables `ticks`, `device0`…, `steps` and, always as text, `events.csv` into a
+/// folder, which is made if need be. The log is read as it goes; memory does not grow with its
+/// length. Returns the files.
 ///
 /// # Errors
 /// [`ExportError`]
@@ -114,10 +116,10 @@ pub fn export(
 struct Sink {
     path: PathBuf,
     values: Vec<Value>,
-    file: Writer,
+    file: TableFile,
 }
 
-enum Writer {
+enum TableFile {
     Csv(Box<csv::Writer<File>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<parquet::ParquetTable>),
@@ -132,14 +134,14 @@ impl Sink {
                 writer
                     .write_record(R::columns())
                     .map_err(|e| failed(&path, &e))?;
-                (path, Writer::Csv(Box::new(writer)))
+                (path, TableFile::Csv(Box::new(writer)))
             }
             #[cfg(feature = "parquet")]
             Table::Parquet => {
                 let path = folder.join(format!("{name}.parquet"));
                 let writer =
                     parquet::ParquetTable::create::<R>(&path).map_err(|e| failed(&path, &e))?;
-                (path, Writer::Parquet(Box::new(writer)))
+                (path, TableFile::Parquet(Box::new(writer)))
             }
         };
         Ok(Self {
@@ -153,7 +155,7 @@ impl Sink {
         self.values.clear();
         record.values(&mut self.values);
         let result = match &mut self.file {
-            Writer::Csv(writer) => {
+            TableFile::Csv(writer) => {
                 let texts = self.values.iter().map(|value| match value {
                     Value::F64(v) => v.to_string(),
                     Value::U64(v) => v.to_string(),
@@ -162,16 +164,16 @@ impl Sink {
                 writer.write_record(texts).map_err(|e| e.to_string())
             }
             #[cfg(feature = "parquet")]
-            Writer::Parquet(writer) => writer.add(&self.values).map_err(|e| e.to_string()),
+            TableFile::Parquet(writer) => writer.add(&self.values).map_err(|e| e.to_string()),
         };
         result.map_err(|reason| failed(&self.path, &reason))
     }
 
     fn finish(self) -> Result<PathBuf, ExportError> {
         let result = match self.file {
-            Writer::Csv(mut writer) => writer.flush().map_err(|e: io::Error| e.to_string()),
+            TableFile::Csv(mut writer) => writer.flush().map_err(|e: io::Error| e.to_string()),
             #[cfg(feature = "parquet")]
-            Writer::Parquet(writer) => writer.finish().map_err(|e| e.to_string()),
+            TableFile::Parquet(writer) => writer.finish().map_err(|e| e.to_string()),
         };
         result.map_err(|reason| failed(&self.path, &reason))?;
         Ok(self.path)

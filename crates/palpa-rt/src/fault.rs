@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-/// Switches that the threads look at. Each use is said in the log.
+/// Switches that the threads look at. Each use is an event in the log.
 #[derive(Debug, Default)]
 pub struct FaultHooks {
     is_paused: AtomicBool,
     panics: AtomicBool,
     to_spoil: AtomicU32,
-    /// Bits of seconds; taken by whom it concerns.
+    /// Bits of a time, s; the thread that it concerns takes it.
     tissue_delay: AtomicU64,
     loop_delay: AtomicU64,
 }
@@ -49,7 +49,8 @@ impl FaultHooks {
     }
 
     pub(crate) fn take_spoil(&self) -> bool {
-        // Only the tissue thread takes; a new order meanwhile wins or is counted down by one, both harmless.
+        // Only the tissue thread takes; a new order meanwhile wins or is counted down by one, both
+        // harmless.
         let n = self.to_spoil.load(Ordering::Relaxed);
         if n > 0 {
             self.to_spoil.store(n - 1, Ordering::Relaxed);

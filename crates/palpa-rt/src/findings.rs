@@ -1,4 +1,4 @@
-//! What the recorder has found so far, for whoever asks.
+//! Results of the recorder so far, which anyone may read.
 #![expect(
     clippy::disallowed_types,
     reason = "shared by the recorder and those who ask it; no thread of the 1 kHz path knows of it"
@@ -7,7 +7,7 @@
 use crate::{recorder::EventRow, smoothness::ForceReport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What was found.
+/// Results of the recorder.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
     pub(crate) forces: Vec<ForceReport>,
@@ -15,7 +15,7 @@ pub(crate) struct Findings {
     pub(crate) has_file_failed: bool,
 }
 
-/// Where it is kept.
+/// The place where they are kept.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Board(Arc<Mutex<Findings>>);
 

@@ -14,7 +14,8 @@ const N_BUCKETS: usize = SUB * (DOUBLINGS + 1);
 
 /// A log-linear histogram of durations, s, counted in nanoseconds, with a resolution of 3 %.
 ///
-/// [`Histogram::add`] neither allocates nor waits, and only one thread may call it; others may read meanwhile.
+/// [`Histogram::add`] neither allocates nor waits, and only one thread may call it; others may read
+/// meanwhile.
 pub struct Histogram {
     buckets: Box<[AtomicU64]>,
     count: AtomicU64,
@@ -78,7 +79,8 @@ impl Histogram {
         self.count.load(Ordering::Relaxed)
     }
 
-    /// The duration, s, below which a share `q` in 0…1 of all lie: the upper end of its bucket, at most the maximum.
+    /// The duration, s, below which a share `q` in 0…1 of all lie: the upper end of its bucket, at
+    /// most the maximum.
     pub fn quantile(&self, q: f64) -> f64 {
         let counts: Vec<u64> = self
             .buckets

@@ -9,8 +9,9 @@
 //!
 //!  palpa-recorder    ticks, steps, events ◄── rings ── all     MCAP file, statistics
 //! ```
-//! Nothing that is slow can hold what is fast: a mailbox keeps the latest, a full ring counts what it lost. A log holds all
-//! that both layers were told, so [`replay`] runs them again in one thread and compares to the bit.
+//! Nothing that is slow can hold what is fast: a mailbox keeps the latest, a full ring counts what
+//! it lost. A log holds all that both layers were told, so [`replay`] runs them again in one thread
+//! and compares to the bit.
 //!
 //! # Example
 //! A tissue that lets everything through, under a hand that stands still:
@@ -54,11 +55,11 @@
 //!
 //! # How the hand-over and the loop are checked
 //! - Loom runs all interleavings of the mailbox:
-//!   `RUSTFLAGS="--cfg loom" cargo test -p palpa-rt --release --no-default-features --lib --target-dir target/loom proof`
+//!   `RUSTFLAGS="--cfg loom" cargo test -p palpa-rt --release --lib --target-dir target/loom proof`
 //! - The real-time sanitizer watches the loop's body:
 //!   ```text
 //!   RTSAN_ENABLE=1 RTSAN_LIB_PATH=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/lib/librustc-stable_rt.rtsan.a \
-//!   cargo test -p palpa-rt --no-default-features --features rtsan --target-dir target/rtsan --test it realtime
+//!   cargo test -p palpa-rt --features rtsan --target-dir target/rtsan --test it realtime
 //!   ```
 //! - Ordinary tests run the body under an allocator that aborts, and the mailbox under load.
 
@@ -68,7 +69,9 @@ mod histogram;
 mod mailbox;
 mod threads;
 #[macro_use]
+mod layout;
 mod record;
+
 mod engine;
 mod event;
 mod export;
@@ -78,7 +81,6 @@ mod recorder;
 mod replay;
 mod servo_loop;
 mod smoothness;
-
 mod tissue;
 mod tissue_thread;
 
@@ -88,11 +90,10 @@ pub use event::{Event, Happening, Level};
 pub use export::{ExportError, Exported, Table, export};
 pub use fault::FaultHooks;
 pub use histogram::{Histogram, Quantiles};
+pub use layout::{Field, Record, Value};
 pub use log::{Ending, Header, Log, LogError, Row, Rows};
 pub use mailbox::{Reader, Writer, mailbox};
-pub use record::{
-    DeviceRecord, Field, Record, ServoRecord, SpecRecord, StepRecord, TickRecord, Value,
-};
+pub use record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord};
 pub use recorder::{EventRow, RecorderParams, cpu_features};
 pub use replay::{ForceDifference, ReplayParams, ReplayReport, Verdict, replay, replay_watched};
 pub use servo_loop::{LoopStats, ServoLoop, TickEntry};

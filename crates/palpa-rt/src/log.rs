@@ -2,7 +2,8 @@
 
 use crate::{
     event::Level,
-    record::{DeviceRecord, Record, ServoRecord, SpecRecord, StepRecord, TickRecord},
+    layout::Record,
+    record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
     recorder::{
         EventRow, FORMAT, TOPIC_DEVICE, TOPIC_EVENT, TOPIC_HEADER, TOPIC_SERVO, TOPIC_SPEC,
         TOPIC_STEP, TOPIC_TICK,
@@ -65,7 +66,7 @@ pub enum Row {
     Event(EventRow),
 }
 
-/// What a log was made with.
+/// Header of a log.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Header {
     /// Version of palpa.
@@ -76,7 +77,7 @@ pub struct Header {
     pub period: f64,
     /// The scene, as text.
     pub scene: String,
-    /// Whatever else was noted.
+    /// Notes by name.
     pub notes: BTreeMap<String, String>,
 }
 
@@ -348,7 +349,7 @@ fn header_of(bytes: &[u8]) -> Result<Header, String> {
 }
 
 fn event_of(mut bytes: &[u8]) -> Option<EventRow> {
-    use crate::record::Field;
+    use crate::layout::Field;
     let time = f64::get(&mut bytes)?;
     let level = match u8::get(&mut bytes)? {
         0 => Level::Info,

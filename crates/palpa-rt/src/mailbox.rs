@@ -3,9 +3,10 @@
 //! ```text
 //! writer's slot  ──publish──►  middle slot  ──take──►  reader's slot
 //! ```
-//! Publishing and taking each swap an index with the middle one: a single atomic exchange, so neither side ever waits
-//! or retries, and a value of any size crosses without a copy. What is overwritten before it was taken is lost:
-//! that is what "latest" means. Proved under loom; the command is in the crate's documentation.
+//! Publishing and taking each swap an index with the middle one: a single atomic exchange, so
+//! neither side ever waits or retries, and a value of any size crosses without a copy. What is
+//! overwritten before it was taken is lost: that is what "latest" means. Proved under loom; the
+//! command is in the crate's documentation.
 
 #[cfg(loom)]
 use loom::{
@@ -40,9 +41,11 @@ pub struct Reader<T> {
     slot: u8,
 }
 
-/// Makes a mailbox of three slots; what they hold at first is what the reader sees until something is published.
+/// Makes a mailbox of three slots; what they hold at first is what the reader sees until something
+/// is published.
 ///
-/// The boxes have been written when they come here, so their pages are there: no first touch on either thread.
+/// The boxes have been written when they come here, so their pages are there: no first touch on
+/// either thread.
 pub fn mailbox<T: Send>(slots: [Box<T>; 3]) -> (Writer<T>, Reader<T>) {
     let shared = Arc::new(Shared {
         slots: slots.map(UnsafeCell::new),
@@ -58,7 +61,8 @@ pub fn mailbox<T: Send>(slots: [Box<T>; 3]) -> (Writer<T>, Reader<T>) {
 }
 
 impl<T> Writer<T> {
-    /// The slot to write to. It holds what was published two or three times ago: overwrite all that counts.
+    /// The slot to write to. It holds what was published two or three times ago: overwrite all that
+    /// counts.
     #[inline]
     pub fn slot(&mut self) -> &mut T {
         self.shared.get_mut(self.slot)
@@ -117,9 +121,10 @@ impl<T> fmt::Debug for Reader<T> {
 mod slots {
     use super::{INDEX, Shared};
 
-    // SAFETY: a slot is reached only through an index. The three indices (writer's, middle, reader's) start as 0, 1, 2
-    // and change only by exchange, so no two are ever equal; the exchanges are acquire and release, so whoever gets an
-    // index sees all that was written to its slot. `T` crosses threads, hence `Send`; it is never seen by two at once.
+    // SAFETY: a slot is reached only through an index. The three indices (writer's, middle,
+    // reader's) start as 0, 1, 2 and change only by exchange, so no two are ever equal; the
+    // exchanges are acquire and release, so whoever gets an index sees all that was written to its
+    // slot. `T` crosses threads, hence `Send`; it is never seen by two at once.
     unsafe impl<T: Send> Sync for Shared<T> {}
     // SAFETY: as above; loom's cell is not `Send` by itself.
     unsafe impl<T: Send> Send for Shared<T> {}
@@ -133,7 +138,8 @@ mod slots {
         )]
         pub(super) fn get_mut(&self, slot: u8) -> &mut T {
             let cell = &self.slots[usize::from(slot & INDEX) % 3];
-            // SAFETY: only the writer calls this, with its own index and itself borrowed exclusively.
+            // SAFETY: only the writer calls this, with its own index and itself borrowed
+            // exclusively.
             unsafe { &mut *cell.get() }
         }
 
@@ -141,7 +147,8 @@ mod slots {
         #[inline]
         pub(super) fn get(&self, slot: u8) -> &T {
             let cell = &self.slots[usize::from(slot & INDEX) % 3];
-            // SAFETY: only the reader calls this, with its own index; while that borrow lasts it cannot take another.
+            // SAFETY: only the reader calls this, with its own index; while that borrow lasts it
+            // cannot take another.
             unsafe { &*cell.get() }
         }
 
@@ -171,8 +178,8 @@ mod proof {
     use super::mailbox;
     use loom::thread;
 
-    /// All interleavings of three publications with three takes: what is read is whole, never older than before, and
-    /// the last value arrives once the writer is done.
+    /// All interleavings of three publications with three takes: what is read is whole, never older
+    /// than before, and the last value arrives once the writer is done.
     #[test]
     fn what_is_taken_is_whole_and_never_older() {
         loom::model(|| {

@@ -1,180 +1,22 @@
-//! Records of fixed size, and how they stand in a log: packed, little-endian, in the order of their fields.
-//!
-//! The layout is that of ROS 1 messages, which MCAP knows by name: the schema in the file is the list of fields, and
-//! tools that know nothing of us (Foxglove, the `mcap` packages) read and plot the channels.
+//! The rows of a log: a tick, a device in a tick, a step of the tissue, and the settings at the
+//! start.
 
 use palpa_servo::ServoParams;
-
-/// A number as it stands in a table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value {
-    /// A real number.
-    F64(f64),
-    /// A count or an identifier.
-    U64(u64),
-    /// Yes or no.
-    Bool(bool),
-}
-
-/// A type that a record can hold.
-pub trait Field: Sized {
-    /// Its name in a schema.
-    const TYPE: &'static str;
-    /// Of how many numbers it is made.
-    const WIDTH: usize;
-    /// Appends it to `out`.
-    fn put(&self, out: &mut Vec<u8>);
-    /// Takes it off the front of `bytes`; `None` when they end too early.
-    fn get(bytes: &mut &[u8]) -> Option<Self>;
-    /// Its numbers, in order.
-    fn values(&self, out: &mut Vec<Value>);
-}
-
-macro_rules! number {
-    ($type:ty, $name:literal, $value:expr) => {
-        impl Field for $type {
-            const TYPE: &'static str = $name;
-            const WIDTH: usize = 1;
-            fn put(&self, out: &mut Vec<u8>) {
-                out.extend_from_slice(&self.to_le_bytes());
-            }
-            fn get(bytes: &mut &[u8]) -> Option<Self> {
-                let (head, rest) = bytes.split_first_chunk()?;
-                *bytes = rest;
-                Some(Self::from_le_bytes(*head))
-            }
-            fn values(&self, out: &mut Vec<Value>) {
-                let value: fn($type) -> Value = $value;
-                out.push(value(*self));
-            }
-        }
-    };
-}
-number!(f64, "float64", Value::F64);
-number!(u64, "uint64", Value::U64);
-number!(u32, "uint32", |v| Value::U64(v.into()));
-number!(u8, "uint8", |v| Value::U64(v.into()));
-
-impl Field for bool {
-    const TYPE: &'static str = "bool";
-    const WIDTH: usize = 1;
-    fn put(&self, out: &mut Vec<u8>) {
-        out.push(u8::from(*self));
-    }
-    fn get(bytes: &mut &[u8]) -> Option<Self> {
-        u8::get(bytes).map(|b| b != 0)
-    }
-    fn values(&self, out: &mut Vec<Value>) {
-        out.push(Value::Bool(*self));
-    }
-}
-
-/// Only reals come in arrays: positions, quaternions and the like.
-impl<const N: usize> Field for [f64; N] {
-    const TYPE: &'static str = "float64";
-    const WIDTH: usize = N;
-    fn put(&self, out: &mut Vec<u8>) {
-        for v in self {
-            v.put(out);
-        }
-    }
-    fn get(bytes: &mut &[u8]) -> Option<Self> {
-        let mut all = [0.0; N];
-        for v in &mut all {
-            *v = f64::get(bytes)?;
-        }
-        Some(all)
-    }
-    fn values(&self, out: &mut Vec<Value>) {
-        out.extend(self.map(Value::F64));
-    }
-}
-
-/// A row of a log's table.
-pub trait Record: Sized + Default + Copy + Send + 'static {
-    /// Its name, also of its schema.
-    const NAME: &'static str;
-    /// Its fields: name, type, number of numbers.
-    const FIELDS: &'static [(&'static str, &'static str, usize)];
-    /// Appends it to `out`.
-    fn encode(&self, out: &mut Vec<u8>);
-    /// Reads it from `bytes`; `None` when they end too early.
-    fn decode(bytes: &[u8]) -> Option<Self>;
-    /// Its numbers, field by field.
-    fn values(&self, out: &mut Vec<Value>);
-
-    /// The schema, as text.
-    fn schema() -> String {
-        (Self::FIELDS.iter())
-            .map(|(name, of, width)| match width {
-                1 => format!(
-                    "{of} {name}
-"
-                ),
-                _ => format!(
-                    "{of}[{width}] {name}
-"
-                ),
-            })
-            .collect()
-    }
-
-    /// Names of the columns of a table: the fields' own, numbered from 0 where a field is an array.
-    fn columns() -> Vec<String> {
-        let mut names = Vec::new();
-        for (name, _, width) in Self::FIELDS {
-            match width {
-                1 => names.push((*name).to_owned()),
-                3 => names.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}"))),
-                _ => names.extend((0..*width).map(|k| format!("{name}_{k}"))),
-            }
-        }
-        names
-    }
-}
-
-/// Makes a struct with its fields' documentation, and its [`Record`].
-macro_rules! record {
-    ($(#[$doc:meta])* $name:ident as $label:literal { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Default)]
-        pub struct $name { $($(#[$field_doc])* pub $field: $type,)* }
-
-        impl $crate::record::Record for $name {
-            const NAME: &'static str = $label;
-            const FIELDS: &'static [(&'static str, &'static str, usize)] = &[$((
-                stringify!($field),
-                <$type as $crate::record::Field>::TYPE,
-                <$type as $crate::record::Field>::WIDTH,
-            ),)*];
-            fn encode(&self, out: &mut Vec<u8>) {
-                $($crate::record::Field::put(&self.$field, out);)*
-            }
-            fn decode(mut bytes: &[u8]) -> Option<Self> {
-                let bytes = &mut bytes;
-                Some(Self { $($field: $crate::record::Field::get(bytes)?,)* })
-            }
-            fn values(&self, out: &mut Vec<$crate::record::Value>) {
-                $($crate::record::Field::values(&self.$field, out);)*
-            }
-        }
-    };
-}
 
 record! {
     /// One tick of the 1 kHz loop.
     TickRecord as "palpa/Tick" {
         /// Counts ticks from 1.
         tick: u64,
-        /// When it began, s: what the law was told.
+        /// Time at which it began, s; the law's clock.
         now: f64,
-        /// How much later that was than it was due, s; more than a period if ticks were left out.
+        /// Lateness, s: time from when it was due; more than a period if ticks were left out.
         lateness: f64,
         /// CPU time that it took, s.
         cpu: f64,
         /// Ticks left out for that lateness: they were due after it was, and before it began.
         skipped: u32,
-        /// Whether a newer patch lay there when it began.
+        /// Whether a newer patch was there when it began.
         offered: bool,
         /// Whether the law took it.
         taken: bool,
@@ -194,7 +36,7 @@ record! {
         gain: f64,
         /// Energy that may be given out beyond what was taken in, J.
         energy_budget: f64,
-        /// What was wrong: bits of `palpa_servo::Faults`.
+        /// Faults: bits of `palpa_servo::Faults`.
         faults: u32,
         /// Limits that were met: bits of `palpa_servo::Limits`.
         limits: u32,
@@ -220,19 +62,19 @@ record! {
         velocity: [f64; 3],
         /// A bit per button.
         buttons: u32,
-        /// Force it was told to exert, N.
+        /// Commanded force, N.
         force: [f64; 3],
-        /// Moment it was told to exert, N m.
+        /// Commanded moment, N m.
         torque: [f64; 3],
         /// Whether it took the command.
         is_written: bool,
         /// Force of the tissue by the local model, before anything is done to it, N.
         tissue_force: [f64; 3],
-        /// What of the force still bridges to the patch before, N.
+        /// Transfer from the patch before, N; part of the force.
         transfer: [f64; 3],
         /// Stiffness of the tissue against the tool, N/m.
         stiffness: f64,
-        /// How far the tool stands off the device's position, m.
+        /// Distance of the tool from the device by the coupling, m.
         stretch: f64,
         /// Share of the tissue's stiffness that the coupling takes away.
         softening: f64,
@@ -242,9 +84,9 @@ record! {
         energy_in: f64,
         /// Energy given to the hand since the start, J.
         energy_out: f64,
-        /// What the observer has banked, J.
+        /// Bank of the energy observer, J; negative is energy generated.
         bank: f64,
-        /// What of this device was wrong: bits of `palpa_servo::Faults`.
+        /// Faults of this device: bits of `palpa_servo::Faults`.
         faults: u32,
         /// Limits that its force met: bits of `palpa_servo::Limits`.
         limits: u32,
@@ -274,7 +116,7 @@ record! {
         positions: [f64; 3 * palpa_servo::MAX_TOOLS],
         /// Their orientations, i, j, k, w, one after the other.
         orientations: [f64; 4 * palpa_servo::MAX_TOOLS],
-        /// Whether what a background job had done was installed before it.
+        /// Whether the result of a background job was installed before it.
         installed: bool,
         /// Whether a background job was taken after it.
         job_taken: bool,
@@ -308,7 +150,7 @@ record! {
 }
 
 record! {
-    /// What a device said it can do, when the log began.
+    /// Limits of a device, at the start of the log.
     SpecRecord as "palpa/DeviceSpec" {
         /// Which device.
         device: u32,
@@ -348,7 +190,7 @@ record! {
         late_after: f64,
         /// Time of equal readings that is a stall, s.
         stall_after: f64,
-        /// Speed that is no hand's, m/s.
+        /// Speed that counts as a jump, m/s.
         max_speed: f64,
         /// Time to fall to zero, s.
         ramp_down: f64,
@@ -436,6 +278,7 @@ impl From<&ServoRecord> for ServoParams {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::Record;
 
     #[test]
     fn what_is_written_is_read_to_the_bit() {

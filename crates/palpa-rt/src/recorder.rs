@@ -1,13 +1,15 @@
 //! The recorder: drains the rings into an MCAP file and keeps the statistics that need every tick.
 //!
-//! Chunks are finished and handed to the system at least every quarter of a second: a killed process loses no more than
-//! what was recorded since. Memory is bounded by the rings and one chunk.
+//! Chunks are finished and handed to the system at least every quarter of a second: a killed
+//! process loses no more than what was recorded since. Memory is bounded by the rings and one
+//! chunk.
 
 use crate::{
     clock::rest,
     event::{Event, Happening, Level},
     findings::Board,
-    record::{DeviceRecord, Record, ServoRecord, SpecRecord, StepRecord, TickRecord},
+    layout::Record,
+    record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
     servo_loop::TickEntry,
     smoothness::ForceStats,
 };
@@ -38,25 +40,25 @@ const DRAIN_EVERY: Duration = Duration::from_millis(10);
 /// Events kept for the report; later ones are only in the file.
 const MAX_EVENTS: usize = 10_000;
 
-/// Where and with what a run is recorded.
+/// The file of a recording, and its header.
 #[derive(Debug, Clone, Default)]
 pub struct RecorderParams {
     /// The file; none records nothing but still keeps statistics and events.
     pub path: Option<PathBuf>,
     /// The scene, as text: with it a replay can build the same body.
     pub scene: String,
-    /// Whatever else a replay needs or a reader wants to know.
+    /// Notes by name, for a replay or a reader.
     pub notes: BTreeMap<String, String>,
 }
 
-/// Something that happened, in words.
+/// An event in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EventRow {
-    /// When, s.
+    /// Time, s.
     pub time: f64,
-    /// How grave it is.
+    /// Severity.
     pub level: Level,
-    /// What.
+    /// Text.
     pub text: String,
 }
 
@@ -196,7 +198,8 @@ impl LogFile {
         let options = WriteOptions::new()
             .compression(None)
             .chunk_size(None)
-            // A chunk is put together in memory and written whole: no header is patched in what is there already.
+            // A chunk is put together in memory and written whole: no header is patched in what is
+            // there already.
             .disable_seeking(true)
             .library(format!("palpa {}", env!("CARGO_PKG_VERSION")));
         let mut writer = options.create(file)?;
@@ -327,7 +330,7 @@ impl SpecRecord {
     }
 }
 
-/// What this machine's processor can do, as far as results may depend on it.
+/// Features of this machine's processor that results may depend on.
 pub fn cpu_features() -> String {
     #[cfg(target_arch = "x86_64")]
     {

@@ -14,13 +14,15 @@ use palpa_servo::{ContactPatch, DeviceState, ForceCommand, MAX_TOOLS, PatchSourc
 /// How a replay compares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReplayParams {
-    /// Largest difference of a force that is accepted on another processor, N. On the same one it is none.
+    /// Largest difference of a force that is accepted on another processor, N. On the same one it
+    /// is none.
     pub tolerance: f64,
 }
 
 impl Default for ReplayParams {
     fn default() -> Self {
-        // A thousandth of what a hand can tell: other instructions round otherwise, and contact amplifies that.
+        // A thousandth of what a hand can tell: other instructions round otherwise, and contact
+        // amplifies that.
         Self { tolerance: 1e-4 }
     }
 }

@@ -1,5 +1,9 @@
 //! The 1 kHz loop: read the devices, ask the law, write the devices, leave a record.
 
+mod entry;
+
+pub use self::entry::TickEntry;
+
 use crate::{
     clock::{Clock, thread_cpu},
     event::{Happening, Speaker},
@@ -12,7 +16,7 @@ use crate::{
 use palpa_device::{DeviceFault, HapticDevice};
 use palpa_servo::{
     ContactPatch, DeviceState, Faults, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo,
-    TickReport, ToolReport, Vec3,
+    TickReport, Vec3,
 };
 use rtrb::Producer;
 use std::{
@@ -23,26 +27,17 @@ use std::{
     },
 };
 
-/// When the loop is told to stop, forces ramp down for at most so many ticks before the devices are let go.
+/// Largest number of ticks in which forces ramp down before the devices are let go.
 const LAST_TICKS: u32 = 200;
-/// Missed deadlines are said at most so often, s.
+/// Least time between two events of missed deadlines, s.
 const SAY_EVERY: f64 = 0.1;
 
-/// Everything that a tick leaves behind.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TickEntry {
-    /// The tick.
-    pub tick: TickRecord,
-    /// Its devices; those past `tick.n_devices` mean nothing.
-    pub devices: [DeviceRecord; MAX_TOOLS],
-}
-
-/// How the loop fared; read by anyone at any time.
+/// Statistics of the loop; any thread may read them at any time.
 #[derive(Debug, Default)]
 pub struct LoopStats {
-    /// CPU time of ticks.
+    /// CPU time of ticks, s.
     pub cpu: Histogram,
-    /// How late ticks began.
+    /// Lateness of ticks, s.
     pub lateness: Histogram,
     /// Ticks done.
     pub ticks: AtomicU64,
@@ -52,8 +47,8 @@ pub struct LoopStats {
     pub lost_records: AtomicU64,
 }
 
-/// The 1 kHz loop without its thread: whoever owns the moment of a tick, we or a vendor's callback, calls
-/// [`ServoLoop::tick_once`]. Dropping it writes zero to the devices.
+/// The 1 kHz loop without its thread: whoever owns the moment of a tick, we or a vendor's callback,
+/// calls [`ServoLoop::tick_once`]. Dropping it writes zero to the devices.
 pub struct ServoLoop {
     pub(crate) servo: Box<Servo>,
     pub(crate) devices: Vec<Box<dyn HapticDevice>>,
@@ -66,7 +61,7 @@ pub struct ServoLoop {
     pub(crate) now: Now,
 }
 
-/// What lasts from tick to tick.
+/// Memory from tick to tick.
 pub(crate) struct Now {
     tick: u64,
     time: f64,
@@ -109,10 +104,11 @@ impl Now {
 }
 
 impl ServoLoop {
-    /// One tick. `now` is the moment it begins, s; `lateness` how much that is past the moment it was due, s; `skipped`
-    /// how many ticks are left out for that lateness.
+    /// One tick. `now` is the moment it begins, s; `lateness` how much that is past the moment it
+    /// was due, s; `skipped` how many ticks are left out for that lateness.
     ///
-    /// Does not allocate, wait or panic, whatever the devices and the tissue say; a device's driver has its own rules.
+    /// Does not allocate, wait or panic, whatever the devices and the tissue say; a device's driver
+    /// has its own rules.
     #[cfg_attr(feature = "rtsan", rtsan_standalone::nonblocking)]
     pub fn tick_once(&mut self, now: f64, lateness: f64, skipped: u32) {
         let cpu_t0 = thread_cpu();
@@ -158,7 +154,8 @@ impl ServoLoop {
 
     /// Ticks every `period` seconds until told to stop, then ramps down.
     ///
-    /// A tick that comes too late for the next ones leaves them out: it never makes up for them in a burst.
+    /// A tick that comes too late for the next ones leaves them out: it never makes up for them in
+    /// a burst.
     pub(crate) fn run(
         &mut self,
         clock: &impl Clock,
@@ -255,7 +252,8 @@ impl ServoLoop {
         }
     }
 
-    /// Tells the tissue where the tools are; one that is away or says nonsense stays where it was last.
+    /// Tells the tissue where the tools are; one that is away or says nonsense stays where it was
+    /// last.
     fn post_poses(&mut self, now: f64) {
         let n = &mut self.now;
         n.sample.tick = n.tick;
@@ -336,55 +334,8 @@ impl fmt::Debug for ServoLoop {
     }
 }
 
-impl TickRecord {
-    fn of(report: &TickReport) -> Self {
-        Self {
-            patch_age: report.patch_age,
-            n_active: report.n_active,
-            n_sliding: report.n_sliding,
-            sweeps: report.sweeps,
-            residual: report.residual,
-            gain: report.gain,
-            energy_budget: report.energy_budget,
-            faults: report.faults.bits().into(),
-            limits: report.limits.bits().into(),
-            ..Self::default()
-        }
-    }
-}
-
-impl DeviceRecord {
-    fn of(tool: &ToolReport) -> Self {
-        Self {
-            tissue_force: tool.tissue_force.into(),
-            transfer: tool.transfer.into(),
-            stiffness: tool.stiffness,
-            stretch: tool.stretch.norm(),
-            softening: tool.softening,
-            damping: tool.damping,
-            energy_in: tool.energy_in,
-            energy_out: tool.energy_out,
-            bank: tool.bank,
-            faults: tool.faults.bits().into(),
-            limits: tool.limits.bits().into(),
-            ..Self::default()
-        }
-    }
-
-    fn set_state(&mut self, state: Option<&DeviceState>) {
-        self.is_there = state.is_some();
-        if let Some(s) = state {
-            self.time = s.time;
-            self.position = s.pose.translation.vector.into();
-            self.orientation = s.pose.rotation.coords.into();
-            self.velocity = s.velocity.into();
-            self.buttons = s.buttons;
-        }
-    }
-}
-
-/// A mailbox seen by the law during one tick: what is offered is decided when the tick begins, so that the log can say
-/// all there is to know of it.
+/// A mailbox seen by the law during one tick: what is offered is decided when the tick begins, so
+/// that the log can say all there is to know of it.
 struct Arrival<'a> {
     patches: &'a mut Reader<ContactPatch>,
     offered: bool,

@@ -8,7 +8,8 @@ const BAND: [f64; 2] = [20.0, 400.0];
 /// The RMS is taken over so many seconds.
 const WINDOW: f64 = 2.0;
 
-/// Smoothness and energy of one device's force. Changes of force are counted in [`Histogram`]s with newtons for seconds.
+/// Smoothness and energy of one device's force. Changes of force are counted in [`Histogram`]s with
+/// newtons for seconds.
 #[derive(Debug)]
 pub struct ForceStats {
     period: f64,
@@ -34,11 +35,13 @@ pub struct ForceReport {
     pub rms_band: f64,
     /// The largest such RMS over any 2 s, N.
     pub rms_band_worst: f64,
-    /// Largest change of force from one tick to the next where a patch arrived, N; as all changes here, without those of ramps.
+    /// Largest change of force from one tick to the next where a patch arrived, N; as all changes
+    /// here, without those of ramps.
     pub arrival_max: f64,
     /// The change that 999 of 1000 such ticks stay below, N.
     pub arrival_p999: f64,
-    /// Largest change at such a tick beyond what the device's own displacement makes with the tissue's stiffness, N.
+    /// Largest change at such a tick beyond what the device's own displacement makes with the
+    /// tissue's stiffness, N.
     pub arrival_alone_max: f64,
     /// The change that 999 of 1000 other ticks stay below, N.
     pub other_p999: f64,
@@ -48,7 +51,8 @@ pub struct ForceReport {
     pub max_force: f64,
     /// Work done on the hand in all, J: positive if the device gave more than it took.
     pub work: f64,
-    /// The most that this work ever was since the last fault, J: a ramp takes energy and gives it on purpose.
+    /// The most that this work ever was since the last fault, J: a ramp takes energy and gives it
+    /// on purpose.
     pub max_work: f64,
 }
 
@@ -153,7 +157,8 @@ fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// A second-order Butterworth filter, direct form II transposed. From the bilinear transform: Zölzer, DAFX (2011), 2.3.
+/// A second-order Butterworth filter, direct form II transposed. From the bilinear transform:
+/// Zölzer, DAFX (2011), 2.3.
 #[derive(Debug, Clone, Copy)]
 struct Biquad {
     b: [f64; 3],
@@ -274,7 +279,8 @@ mod tests {
     #[test]
     fn what_a_ramp_does_is_no_jump_and_begins_the_count_of_energy_anew() {
         let mut stats = ForceStats::new(1e-3);
-        // Pushed away by 1 mm with 1 N, then let go and taken back within a ramp, then pushed again.
+        // Pushed away by 1 mm with 1 N, then let go and taken back within a ramp, then pushed
+        // again.
         let place = |t: f64| if (0.1..0.3).contains(&t) { 1e-3 } else { 0.0 };
         let force = |t: f64| if (0.2..0.4).contains(&t) { 0.0 } else { 1.0 };
         let gain = |tick: u64| {

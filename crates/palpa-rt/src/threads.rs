@@ -53,7 +53,8 @@ impl Wish {
     }
 }
 
-/// Keeps the memory of the process in RAM: what it has now, and, where the system sets no limit, what is to come.
+/// Keeps the memory of the process in RAM: what it has now, and, where the system sets no limit,
+/// what is to come.
 ///
 /// # Errors
 /// The system's reason.
@@ -97,7 +98,8 @@ mod system {
     pub(super) fn schedule(priority: Priority) -> Result<(), String> {
         match priority {
             Priority::RealTime(p) => {
-                // Without the privilege, at least the sleep of an ordinary thread shall end on time.
+                // Without the privilege, at least the sleep of an ordinary thread shall end on
+                // time.
                 let _ = set_current_timer_slack(NonZeroU64::new(1));
                 let value = ThreadPriorityValue::try_from(p)?;
                 let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -128,7 +130,8 @@ mod system {
     }
 
     pub(super) fn lock_memory() -> Result<(), String> {
-        // With a limit, memory to come must not be locked: past the limit the allocation itself would fail.
+        // With a limit, memory to come must not be locked: past the limit the allocation itself
+        // would fail.
         let is_unlimited = getrlimit(Resource::Memlock).current.is_none();
         let flags = if is_unlimited {
             MlockAllFlags::CURRENT | MlockAllFlags::FUTURE

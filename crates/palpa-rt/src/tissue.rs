@@ -4,7 +4,8 @@ use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
 
-/// What a step of the tissue is made from; together with the jobs installed before it, everything it depends on.
+/// What a step of the tissue is made from; together with the jobs installed before it, everything
+/// it depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueInput {
     /// Counts steps from 1.
@@ -60,7 +61,8 @@ impl StepStatus {
     }
 }
 
-/// What a step says of itself; goes to the log, and must not depend on anything that a replay does not have (no times).
+/// What a step says of itself; goes to the log, and must not depend on anything that a replay does
+/// not have (no times).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TissueStep {
     /// How it went.
@@ -81,17 +83,20 @@ pub struct TissueStep {
 
 /// A body under tools, as seen by the engine.
 ///
-/// The same inputs, jobs and installations in the same order give the same patches to the bit: replay rests on it.
+/// The same inputs, jobs and installations in the same order give the same patches to the bit:
+/// replay rests on it.
 pub trait Tissue: Send {
     /// Work for the background, with all that it needs: it shares nothing with the tissue.
     type Job: Send + 'static;
     /// What came of it.
     type Done: Send + 'static;
 
-    /// Called once on the tissue thread before the first step: touches memory and warms up what is per thread.
+    /// Called once on the tissue thread before the first step: touches memory and warms up what is
+    /// per thread.
     fn prepare(&mut self) {}
 
-    /// Moves the tissue on and writes the patch in place, all of it that counts: the slot holds an older one.
+    /// Moves the tissue on and writes the patch in place, all of it that counts: the slot holds an
+    /// older one.
     ///
     /// The engine stamps the patch's `id`, `sampled_at` and `period` afterwards.
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep;

@@ -21,12 +21,14 @@ use std::{
     time::Duration,
 };
 
-/// How the tissue thread goes about its steps.
+/// Settings of the tissue thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueParams {
-    /// Steps are at least this far apart, s: no more than the device can feel, and a core that others may use too.
+    /// Steps are at least this far apart, s: no more than the device can feel, and a core that
+    /// others may use too.
     pub min_period: f64,
-    /// Cap on the time that the tissue is moved on by in a step, s. Beyond it a stall would inject a jump.
+    /// Cap on the time that the tissue is moved on by in a step, s. Beyond it a stall would inject
+    /// a jump.
     pub max_dt: f64,
 }
 
@@ -59,7 +61,7 @@ impl PoseSample {
     }
 }
 
-/// How the tissue thread fared; read by anyone at any time.
+/// Statistics of the tissue thread; any thread may read them at any time.
 #[derive(Debug, Default)]
 pub struct TissueStats {
     /// CPU time of steps.
@@ -132,7 +134,8 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             period += 0.1 * (elapsed.min(self.params.max_dt) - period);
             lost.add(elapsed - self.params.max_dt, now, &mut self.speaker);
             step += 1;
-            // Its state may be half changed after a panic, so there is no going on; the loop ramps down as patches age.
+            // Its state may be half changed after a panic, so there is no going on; the loop ramps
+            // down as patches age.
             let result = catch_unwind(AssertUnwindSafe(|| self.step(step, now, elapsed, period)));
             let Ok((new_status, record)) = result else {
                 self.speaker
@@ -258,7 +261,8 @@ pub(crate) fn run_background<T: Tissue>(
             let t0 = thread_cpu();
             let result = catch_unwind(AssertUnwindSafe(|| T::run(job))).ok();
             stats.background.add(thread_cpu() - t0);
-            // As many places as jobs that may be under way; and if the tissue is gone, nobody wants it.
+            // As many places as jobs that may be under way; and if the tissue is gone, nobody wants
+            // it.
             let _ = done.push(result);
         } else if stop.load(Ordering::Relaxed) {
             return;

@@ -1,6 +1,8 @@
-//! The one kernel that counts: three columns of the compliance onto the positions.
+//! The kernel that takes most of a tick's time: adds three columns of the compliance to the
+//! positions.
 //!
-//! The same operations in the same order with and without wide registers, so the same numbers to the bit.
+//! The same operations in the same order with and without wide registers, so the numbers are the
+//! same bit for bit.
 
 #[cfg(target_arch = "x86_64")]
 cpufeatures::new!(has_avx, "avx");

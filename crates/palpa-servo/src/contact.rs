@@ -6,19 +6,22 @@
 //! 0 ≤ r_n ⟂ g ≥ 0                                   pressed, never pulled
 //! min ½ r_tᵀ A_tt r_t + s0ᵀ r_t,  |r_t| ≤ μ r_n     sticks inside the cone, slides against the slip on it
 //! ```
-//! The minimum's conditions are Coulomb's law for the slip `s = s0 + A_tt r_t` since the anchor, on the round cone.
+//! The minimum's conditions are Coulomb's law for the slip `s = s0 + A_tt r_t` since the anchor, on
+//! the round cone.
 
 use crate::{Mat3, Pose, Vec3};
 use nalgebra::{Matrix2, Vector2};
 
-/// No vertex is taken for stiffer than this, m/N: it bounds what a force can be when a patch says zero compliance.
+/// Least compliance of a vertex, m/N: it bounds the force when a patch has zero compliance.
 const MIN_COMPLIANCE: f64 = 1e-8;
-/// Newton steps for the multiplier of the cone; from below they converge monotonically and quadratically.
+/// Newton steps for the multiplier of the cone; from below they converge monotonically and
+/// quadratically.
 const CONE_STEPS: usize = 8;
 /// Relative length to which the cone is met before the rest is scaled away.
 const CONE_TOLERANCE: f64 = 1e-6;
 
-/// A contact linearised where its vertex was last: `gap = n · y + h`, with `y` the vertex relative to the tool.
+/// A contact linearised where its vertex was last: `gap = n · y + h`, with `y` the vertex relative
+/// to the tool.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contact {
     /// Columns: normal and two tangents, in the world.
@@ -31,7 +34,7 @@ pub(crate) struct Contact {
     is_bonded: bool,
 }
 
-/// What a contact did in a sweep.
+/// The change of a contact in a sweep.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Change {
     /// Change of its force, N.
@@ -40,17 +43,17 @@ pub(crate) struct Change {
     pub(crate) is_sliding: bool,
 }
 
-/// What a contact is linearised from.
+/// The values that a contact is linearised from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ContactInput<'a> {
     pub(crate) candidate: &'a crate::Candidate,
-    /// Pose of the device.
+    /// Pose of the device's hand-piece.
     pub(crate) pose: &'a Pose,
-    /// Where the vertex is, relative to the displacement of the tool by its coupling.
+    /// Position of the vertex, m, relative to the displacement of the tool by its coupling.
     pub(crate) position: &'a Vec3,
-    /// Where friction holds it, in the tool's frame.
+    /// Anchor of the vertex, in the tool's frame, m.
     pub(crate) anchor: &'a Vec3,
-    /// Own compliance, the coupling's included.
+    /// Own compliance with that of the coupling, m/N.
     pub(crate) own: &'a Mat3,
     pub(crate) friction: f64,
     pub(crate) is_bonded: bool,
@@ -75,7 +78,8 @@ impl Contact {
             - candidate.surface;
         let bend = candidate.curvature * d;
         let gap = candidate.normal.dot(&d) + 0.5 * d.dot(&bend);
-        // Far from the nearest point the curvature may turn the gradient round; there the normal has to do.
+        // Far from the nearest point the curvature may turn the gradient round; there the normal
+        // has to do.
         let gradient = candidate.normal + bend;
         let slope = gradient.norm();
         let (gradient, slope) = if slope > 0.2 && gradient.dot(&candidate.normal) > 0.0 {
@@ -101,7 +105,8 @@ impl Contact {
         }
     }
 
-    /// Its force, as it is and with all others held, to the one that satisfies its conditions.
+    /// The change from its present force to the one that satisfies its conditions while all others
+    /// are held.
     ///
     /// `position` is relative to the displacement of the tool by its coupling.
     pub(crate) fn relax(&self, position: &Vec3, force: &Vec3) -> Change {
@@ -155,7 +160,7 @@ fn frame_about(n: &Vec3) -> Mat3 {
     ])
 }
 
-/// The least of `½ rᵀ A r + bᵀ r` over `|r| ≤ radius`, and whether it is on the border.
+/// The minimum of `½ rᵀ A r + bᵀ r` over `|r| ≤ radius`, and whether it is on the border.
 fn least_in_disc(a: &Matrix2<f64>, b: &Vector2<f64>, radius: f64) -> (Vector2<f64>, bool) {
     let solve = |shift: f64| {
         let (p, q, s) = (a.m11 + shift, a.m12, a.m22 + shift);
@@ -192,7 +197,8 @@ fn least_in_disc(a: &Matrix2<f64>, b: &Vector2<f64>, radius: f64) -> (Vector2<f6
     }
 }
 
-/// `A x = b` for a symmetric positive definite A; pivots that are not are raised to the least compliance.
+/// `A x = b` for a symmetric positive definite A; pivots that are not are raised to the least
+/// compliance.
 fn solve_spd3(a: &Mat3, b: &Vec3) -> Vec3 {
     let d1 = a.m11.max(MIN_COMPLIANCE);
     let (l21, l31) = (a.m21 / d1, a.m31 / d1);

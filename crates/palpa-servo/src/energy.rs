@@ -1,19 +1,22 @@
-//! The energy observer, and the damping that it asks for.
+//! The energy observer, and the damping that it injects.
 //!
-//! A force that is held over a tick gives out up to `½ K Δx²` that no tissue ever held, and a patch that comes late gives
-//! more. The observer banks what the hand put in, `−F·Δx`, less what the local model stores; friction and viscosity
-//! leave a surplus, which is forgotten, since it would hide what is generated later. A deficit is not forgotten. What the
-//! model says it stores is not exact from patch to patch; off the tissue it stores nothing, and the bank is put right by work alone.
+//! A force that is held over a tick gives out up to `½ K Δx²` that no tissue ever held, and a patch
+//! that comes late gives more. The observer banks what the hand put in, `−F·Δx`, less what the
+//! local model stores; friction and viscosity leave a surplus, which is forgotten, since it would
+//! hide what is generated later. A deficit is not forgotten. What the model says it stores is not
+//! exact from patch to patch; off the tissue it stores nothing, and the bank is put right by work
+//! alone.
 
 use crate::{DeviceSpec, ServoParams, Vec3};
 
 /// Surplus beyond this is not banked, J: as much as a hard push stores.
 const MAX_BANK: f64 = 0.05;
-/// Share of the budget beyond which a deficit is paid back, and times in which it is to be, s: gently while it is within the budget,
-/// and beyond that as quickly as is not felt as a knock.
+/// Share of the budget beyond which a deficit is paid back, and times in which it is to be, s:
+/// gently while it is within the budget, and beyond that as quickly as is not felt as a knock.
 const PAY_FROM: f64 = 0.6;
 const PAY_BACK: [f64; 2] = [0.2, 0.02];
-/// The gentle damping is at most this, N s/m: with the steps of a coarse encoder in the velocity, more would be felt.
+/// The gentle damping is at most this, N s/m: with the steps of a coarse encoder in the velocity,
+/// more would be felt.
 const GENTLE: f64 = 0.1;
 /// Time in which damping fades once it is no longer asked for, s.
 const FADE: f64 = 0.05;
@@ -22,12 +25,16 @@ const MIN_SPEED: f64 = 2e-3;
 /// Damping below this is cut to zero, N s/m.
 const DAMPING_DUST: f64 = 1e-4;
 
-/// Of one tool.
+/// The energy account of one tool, J.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Energy {
+    /// Taken from the hand since the start.
     pub(crate) taken: f64,
+    /// Given to the hand since the start.
     pub(crate) given: f64,
+    /// Surplus; negative is energy generated.
     bank: f64,
+    /// Damping that is injected, N s/m.
     pub(crate) damping: f64,
     /// Work of the hand since the tool was last off the tissue, and the bank then.
     ledger: f64,
@@ -44,18 +51,19 @@ impl Energy {
         }
     }
 
-    /// What is banked, J; negative is energy generated.
+    /// The bank, J; negative is energy generated.
     pub(crate) fn bank(&self) -> f64 {
         self.bank
     }
 
-    /// Begins anew with nothing banked: while the force ramps, work says nothing of the tissue.
+    /// Begins anew with an empty bank: while the force ramps, work says nothing of the tissue.
     pub(crate) fn forget(&mut self) {
         self.bank = 0.0;
         self.ledger = 0.0;
     }
 
-    /// Counts the tick that ended: force `held` over `travel`, and what the model's store grew by.
+    /// Counts the tick that ended: the force `held`, N, over `travel`, m, and the growth of the
+    /// model's store, J.
     pub(crate) fn count(
         &mut self,
         held: &Vec3,

@@ -1,17 +1,18 @@
-//! What a device says, checked: the border at which NaN, jumps and silence are stopped.
+//! Readings of a device, checked: NaN, jumps and silence end here.
 
 use crate::velocity::VelocityEstimate;
 use crate::{DeviceState, Faults, Pose, ServoParams, Vec3};
 
-/// A hand-piece as the law believes it to be: always finite.
+/// A hand-piece after the check: always finite.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HandPiece {
     pub(crate) pose: Pose,
     /// Estimated, m/s.
     pub(crate) velocity: Vec3,
-    /// How far it moved since the tick before, m; zero over anything that was no motion of a hand.
+    /// Its motion since the tick before, m; zero after a jump or a loss, which are no motion of a
+    /// hand.
     pub(crate) travel: Vec3,
-    /// When the reading last changed, by the loop's clock, and the device's time of that reading.
+    /// Loop's clock when the reading last changed, and the device's time of that reading, s.
     changed_at: f64,
     read_at: f64,
     is_known: bool,

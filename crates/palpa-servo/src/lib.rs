@@ -1,15 +1,17 @@
-//! The 1 kHz law: from where the tools are, and what the tissue last said of its contact, to forces.
+//! The 1 kHz law: computes the force on each device from the tools' poses and the tissue's newest
+//! contact patch.
 //!
 //! ```text
 //! readings ─► hand ─► contact problem ─► transfer ─► ramp ─► damping ─► limits ─► commands
 //!             NaN,    at the devices'    between     after   by the     size, slew
 //!             jumps   poses              patches     faults  energy
 //! ```
-//! One [`Servo::tick`] serves a loop of ours and a vendor's callback. While the force is ramped, the energy observer
-//! stands still: what a ramp up gives out is limited by its time, not by the budget.
+//! [`Servo::tick`] may be called from our own loop or from a vendor's callback. While the force is
+//! ramped, the energy observer stands still: the energy that a ramp up gives out is limited by its
+//! time, not by the budget.
 //!
-//! Nothing here allocates, waits or panics; the crate has no heap to do it with. All lengths are in metres, forces in
-//! newtons, times in seconds.
+//! Nothing here allocates, waits or panics; the crate has no heap. All lengths are in metres,
+//! forces in newtons, times in seconds.
 #![no_std]
 #![deny(
     clippy::indexing_slicing,
@@ -19,17 +21,24 @@
     clippy::unreachable
 )]
 
-mod axpy;
-mod contact;
-mod energy;
-mod hand;
+// Types that cross the border of the law.
 mod params;
 mod patch;
 mod report;
-mod servo;
-mod solver;
 mod types;
+
+// The law, in the order of a tick.
+mod servo;
+
+mod hand;
 mod velocity;
+
+mod solver;
+
+mod axpy;
+mod contact;
+
+mod energy;
 
 pub use params::ServoParams;
 pub use patch::{Candidate, ContactPatch, MAX_CONTACTS, PatchSource, ToolContact};

@@ -1,19 +1,21 @@
-//! What can be set in the law.
+//! Settings of the law.
 
 /// Settings of the law; the defaults are what the tests show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServoParams {
-    /// Period that the loop aims at, s. Lateness is counted from it.
+    /// Period of the loop, s.
     pub period: f64,
-    /// The contact problem is solved when a sweep changes the forces by less than this share of their sum.
+    /// The contact problem is solved when a sweep changes the forces by less than this share of
+    /// their sum.
     pub tolerance: f64,
-    /// Largest number of sweeps over the contacts in one tick.
+    /// Largest number of sweeps over the contacts in one solution, 1 to 200.
     pub max_sweeps: u32,
-    /// How often the gaps are linearised anew within a tick.
+    /// Number of linearisations of the gaps within a tick, 1 to 4.
     pub passes: u32,
     /// Time in which a new patch takes over from the old one, in patch periods.
     pub transfer_periods: f64,
-    /// Largest difference between two patches that is bridged, as a share of the device's largest force.
+    /// Largest difference between two patches that is bridged, as a share of the device's largest
+    /// force.
     pub max_transfer: f64,
     /// Age at which a patch is stale, in patch periods, and at least [`ServoParams::stale_after`].
     pub stale_periods: f64,
@@ -23,7 +25,7 @@ pub struct ServoParams {
     pub late_after: f64,
     /// Time for which a device may repeat the same reading before it counts as stalled, s.
     pub stall_after: f64,
-    /// Speed beyond which a change of position is no hand's, m/s.
+    /// Speed beyond which a change of position counts as a jump of the device, m/s.
     pub max_speed: f64,
     /// Time in which the force falls to zero after a fault, s.
     pub ramp_down: f64,
@@ -33,9 +35,10 @@ pub struct ServoParams {
     pub energy_budget: f64,
     /// Time in which energy that was lost in the tissue is forgotten by the observer, s.
     pub bank_time: f64,
-    /// Damping that is always rendered in contact, N s/m: 0 but for trials, since the tissue has its own.
+    /// Damping that is always rendered in contact, N s/m: 0 except in trials, because the tissue
+    /// has its own.
     pub damping: f64,
-    /// Step of the device's position sensor, m: differences below it say nothing of the velocity.
+    /// Step of the device's position sensor, m: differences below it give no velocity.
     pub resolution: f64,
 }
 

@@ -1,25 +1,27 @@
-//! What the tissue says of its contact: a local model that holds near the pose at which it was made.
+//! The contact patch: the tissue's local model of its contact, valid near the pose at which it was
+//! made.
 //!
 //! ```text
 //! x_i = x0_i + Σ_j W_ij (r_j − r0_j)          where candidate vertices go under forces r of the tool on them
 //! g_i = n · d + ½ dᵀ C d,  d = T⁻¹ x_i − c    their gap to the tool at pose T, with c, n, C in the tool's frame
 //! ```
-//! Candidates that do not touch have `r0 = 0`; they are there because the tool may reach them before the next patch.
+//! Candidates that do not touch have `r0 = 0`; they are there because the tool may reach them
+//! before the next patch.
 
 use crate::{MAX_TOOLS, Mat3, Pose, Vec3};
 
-/// How many vertices a patch may carry, active or not.
+/// Largest number of candidates in a patch, touching or not.
 pub const MAX_CONTACTS: usize = 60;
 const N: usize = 3 * MAX_CONTACTS;
 
 /// A vertex of the skin that touches a tool or is near one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// Which vertex of the body; the same number in every patch that has it.
+    /// Vertex of the body; the same number in every patch that has it.
     pub vertex: u32,
-    /// Which tool it is near.
+    /// Tool that it is near, index into the patch's tools.
     pub tool: u32,
-    /// Where it was, m, `x0`.
+    /// Position, m, `x0`.
     pub position: Vec3,
     /// Force of the tool on it there, N, `r0`.
     pub force: Vec3,
@@ -29,12 +31,13 @@ pub struct Candidate {
     pub normal: Vec3,
     /// The tool's curvature there, in the tool's frame, 1/m, `C`.
     pub curvature: Mat3,
-    /// Where friction holds it, in the tool's frame, m; of a vertex that slides or does not touch where it was.
+    /// Anchor of friction, in the tool's frame, m; for a vertex that slides or does not touch, its
+    /// position there.
     pub anchor: Vec3,
 }
 
 impl Candidate {
-    /// A vertex that is nowhere.
+    /// An unused entry.
     pub const NONE: Self = Self {
         vertex: u32::MAX,
         tool: 0,
@@ -47,10 +50,10 @@ impl Candidate {
     };
 }
 
-/// What a patch says of one tool.
+/// One tool in a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolContact {
-    /// Where the tool was.
+    /// Pose of the tool.
     pub pose: Pose,
     /// Coefficient of friction.
     pub friction: f64,
@@ -58,7 +61,8 @@ pub struct ToolContact {
     pub is_bonded: bool,
     /// Force of the tissue on the tool there, N.
     pub force: Vec3,
-    /// Derivative of that force by the tool's position, negated: what resists, N/m.
+    /// Stiffness against the tool, N/m: the derivative of that force by the tool's position,
+    /// negated.
     pub stiffness: Mat3,
 }
 
@@ -83,9 +87,9 @@ impl ToolContact {
 /// A local model of the tissue under the tools.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPatch {
-    /// Counts the tissue's steps from 1; 0 is a patch that was never written.
+    /// Number of the tissue's step, from 1; 0 is a patch that was never written.
     pub id: u64,
-    /// Clock at which the poses were taken that this patch was made for, s.
+    /// Loop's clock when the poses were taken for which this patch was made, s.
     pub sampled_at: f64,
     /// Time from one patch to the next that the tissue expects, s.
     pub period: f64,
@@ -135,7 +139,8 @@ impl ContactPatch {
         }
     }
 
-    /// Sets [`ContactPatch::block`] (i, j), and not its mirror image; does nothing beyond [`MAX_CONTACTS`].
+    /// Sets [`ContactPatch::block`] (i, j), and not its mirror image; does nothing beyond
+    /// [`MAX_CONTACTS`].
     pub fn set_block(&mut self, i: usize, j: usize, block: &Mat3) {
         if i < MAX_CONTACTS && j < MAX_CONTACTS {
             for (c, column) in block.column_iter().enumerate() {
@@ -150,7 +155,7 @@ impl ContactPatch {
     }
 }
 
-/// Where the law gets its patches from: the reader's end of a mailbox in which the latest wins. Nothing may wait.
+/// The source of patches: the reader's end of a mailbox in which the latest wins. No call may wait.
 pub trait PatchSource {
     /// The patch that the last [`PatchSource::take`] made current.
     fn current(&self) -> &ContactPatch;

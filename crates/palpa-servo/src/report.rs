@@ -1,4 +1,4 @@
-//! What one tick says of itself.
+//! The report of one tick: faults, limits, forces and energy.
 
 use crate::{MAX_TOOLS, Vec3};
 use core::fmt;
@@ -112,7 +112,7 @@ flags! {
     }
 }
 
-/// What one tick did for one tool.
+/// The report of one tick on one tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolReport {
     /// Force of the tissue on the tool by the local model, N, before anything is done to it.
@@ -121,16 +121,18 @@ pub struct ToolReport {
     pub tissue_torque: Vec3,
     /// Force that was commanded, N.
     pub force: Vec3,
-    /// What is still bridged from the patch before, N; part of the force.
+    /// Transfer from the patch before, N; part of the force.
     pub transfer: Vec3,
     /// Velocity as estimated, m/s.
     pub velocity: Vec3,
     /// Stiffness of the tissue against the tool, N/m; 0 without contact.
     pub stiffness: f64,
-    /// How far the tool stands off the device's position because of the coupling, m: the tissue's next step is to be made
-    /// where the tool is, for at the device's own place it would be pressed deeper, and be stiffer, than it is felt.
+    /// Displacement of the tool off the device's position by the coupling, m. The tissue's next
+    /// step is made where the tool is: at the device's own place the tissue would be pressed
+    /// deeper, and be stiffer, than it is felt.
     pub stretch: Vec3,
-    /// Share of the tissue's stiffness that the coupling takes away: 0 where the tissue's own is felt.
+    /// Share of the tissue's stiffness that the coupling takes away: 0 where the tissue's own is
+    /// felt.
     pub softening: f64,
     /// Damping that the energy observer injected, N s/m.
     pub damping: f64,
@@ -138,11 +140,11 @@ pub struct ToolReport {
     pub energy_in: f64,
     /// Energy given to the hand since the start, J.
     pub energy_out: f64,
-    /// What the observer has banked: negative is energy generated, J.
+    /// Bank of the energy observer, J; negative is energy generated.
     pub bank: f64,
     /// The limits that were met.
     pub limits: Limits,
-    /// What of this tool's device was wrong.
+    /// Faults of this tool's device.
     pub faults: Faults,
 }
 
@@ -166,20 +168,20 @@ impl ToolReport {
     };
 }
 
-/// What one tick did.
+/// The report of one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickReport {
     /// Clock of the tick, s.
     pub now: f64,
-    /// Patch that the force comes from.
+    /// Number of the patch that the force comes from.
     pub patch_id: u64,
     /// Whether that patch arrived in this tick.
     pub is_new_patch: bool,
     /// Time since the poses of the patch were taken, s.
     pub patch_age: f64,
-    /// Candidates that touch.
+    /// Number of candidates that touch.
     pub n_active: u32,
-    /// Of these, those that slide.
+    /// Number of these that slide.
     pub n_sliding: u32,
     /// Sweeps over the contacts.
     pub sweeps: u32,
@@ -189,7 +191,7 @@ pub struct TickReport {
     pub gain: f64,
     /// Energy that may be given out beyond what was taken in, J.
     pub energy_budget: f64,
-    /// What was wrong in this tick, over all tools.
+    /// Faults of this tick, over all tools.
     pub faults: Faults,
     /// Limits met, over all tools.
     pub limits: Limits,

@@ -1,19 +1,19 @@
-//! What crosses between a device and the law.
+//! The types between a device and the law.
 
 use crate::Vec3;
 
-/// How many tools may touch one body.
+/// Largest number of tools on one body.
 pub const MAX_TOOLS: usize = 2;
 
 /// Position and orientation of a tool: takes points of its own frame to the world.
 pub type Pose = nalgebra::Isometry3<f64>;
 
-/// What a device says of its hand-piece at a moment.
+/// One reading of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceState {
-    /// When it was read, on the clock of the loop, s.
+    /// Time of the reading on the loop's clock, s.
     pub time: f64,
-    /// Where the hand-piece is. The identity orientation for devices that have none.
+    /// Pose of the hand-piece. Devices without orientation give the identity.
     pub pose: Pose,
     /// Velocity of its position, m/s; zero where a device does not say.
     pub velocity: Vec3,
@@ -21,7 +21,7 @@ pub struct DeviceState {
     pub buttons: u32,
 }
 
-/// What a device shall exert on the hand.
+/// The force and moment that a device exerts on the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceCommand {
     /// Force, N, in the world's frame.
@@ -38,7 +38,7 @@ impl ForceCommand {
     };
 }
 
-/// What a device can do.
+/// Limits of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceSpec {
     /// Largest force, N.

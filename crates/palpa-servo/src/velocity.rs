@@ -1,8 +1,8 @@
 //! Velocity from positions that come in steps of an encoder.
 //!
-//! First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000): the longest window whose straight line passes
-//! all its readings within the resolution. A still hand gives exactly zero or the drift over the whole window, a fast one
-//! a short window and little lag.
+//! First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000): the longest window whose
+//! straight line passes all its readings within the resolution. A still hand gives exactly zero or
+//! the drift over the whole window, a fast one a short window and little lag.
 
 use crate::Vec3;
 

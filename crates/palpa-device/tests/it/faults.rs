@@ -1,4 +1,5 @@
-//! Faults in the closed loop: the force stays finite and limited in size and slew, ramps down, and comes back.
+//! Faults in the closed loop: the force stays finite and limited in size and slew, ramps down, and
+//! comes back.
 
 use palpa_device::{
     BedParams, DeviceModel, Fault, Faulty, Grip, Path, Sample, SimulatedDevice, Trial, TrialReport,

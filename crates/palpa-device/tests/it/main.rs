@@ -2,4 +2,5 @@
 
 mod device;
 mod faults;
+mod open;
 mod stability;

@@ -3,7 +3,8 @@
 use palpa_device::{BedParams, DeviceModel, Grip, Path, Trial, Vec3};
 use palpa_servo::ServoParams;
 
-/// What is pressed, by name: soft fat, skin over bone, an edge of a lump, all with friction or without.
+/// What is pressed, by name: soft fat, skin over bone, an edge of a lump, all with friction or
+/// without.
 fn beds() -> [(&'static str, BedParams); 4] {
     let soft = BedParams {
         compliance: 0.012,
@@ -176,7 +177,8 @@ fn the_stiffness_limits_hold_in_every_hand_without_the_guard() {
 
 #[test]
 fn softened_tissue_is_stepped_where_the_tool_is() {
-    // It stiffens so quickly that a step at the device's own place, deeper by the coupling, would be another tissue.
+    // It stiffens so quickly that a step at the device's own place, deeper by the coupling, would
+    // be another tissue.
     let bed = BedParams {
         compliance: 2e-3,
         stiffening: 2000.0,

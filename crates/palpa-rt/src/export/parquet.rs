@@ -1,6 +1,6 @@
 //! A table of numbers as a Parquet file, a row group at a time.
 
-use crate::record::{Record, Value};
+use crate::layout::{Record, Value};
 use parquet::{
     basic::{Compression, LogicalType, Repetition, Type as Physical},
     data_type::{BoolType, DoubleType, Int64Type},

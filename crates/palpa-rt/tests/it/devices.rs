@@ -10,7 +10,51 @@ use std::{
         Arc,
         atomic::{AtomicU8, AtomicU64, Ordering},
     },
+    thread::{self, Thread},
+    time::{Duration, Instant},
 };
+
+/// A condition that does not come true in this time is a hang. No outcome depends on it otherwise.
+const HANG: Duration = Duration::from_mins(2);
+
+/// Waits until something is so. It is asked whenever the loop reads a device of [`announced`], which
+/// wakes the thread that made the device.
+pub(crate) fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let since = Instant::now();
+    while !is_so() {
+        thread::park_timeout(HANG);
+        assert!(since.elapsed() < HANG, "still not so: {what}");
+    }
+}
+
+/// A device that wakes the thread that made it, for [`until`], whenever the loop reads it.
+#[derive(Debug)]
+struct Announced<D> {
+    inner: D,
+    waiter: Thread,
+}
+
+pub(crate) fn announced(device: impl HapticDevice + 'static) -> Box<dyn HapticDevice> {
+    Box::new(Announced {
+        inner: device,
+        waiter: thread::current(),
+    })
+}
+
+impl<D: HapticDevice> HapticDevice for Announced<D> {
+    fn spec(&self) -> DeviceSpec {
+        self.inner.spec()
+    }
+
+    fn read(&mut self, now: f64) -> Result<DeviceState, DeviceFault> {
+        self.waiter.unpark();
+        self.inner.read(now)
+    }
+
+    fn write(&mut self, now: f64, command: &ForceCommand) -> Result<(), DeviceFault> {
+        self.inner.write(now, command)
+    }
+}
 
 pub(crate) const SPEC: DeviceSpec = DeviceSpec {
     max_force: 3.0,
@@ -20,7 +64,7 @@ pub(crate) const SPEC: DeviceSpec = DeviceSpec {
     max_damping: 10.0,
 };
 
-/// What is wrong with a device.
+/// A fault of a scripted device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(u8)]
 pub(crate) enum Ill {
@@ -107,6 +151,7 @@ impl HapticDevice for Scripted {
             position.x += 0.02;
         }
         if is(Ill::Slow) {
+            // The fault itself is time that goes by: the loop's clock is the machine's.
             let clock = RealClock::new(0.0);
             clock.wait_until(clock.now() + 5e-3);
         }

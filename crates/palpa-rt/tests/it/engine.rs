@@ -1,13 +1,13 @@
 //! Whole runs: threads, forces, log, replay, tables.
 
 use crate::{
-    devices::{Hand, Ill, SPEC, Scripted},
+    devices::{Hand, Ill, SPEC, Scripted, announced, until},
     toy::{Bed, RADIUS},
 };
-use palpa_device::{DeviceModel, Grip, HapticDevice, Path as Path3, SimulatedDevice};
+use palpa_device::{DeviceModel, Grip, Path as Path3, SimulatedDevice};
 use palpa_rt::{
-    Clock, Ending, Engine, EngineParams, Log, RealClock, RecorderParams, ReplayParams, Report,
-    StartError, StepRecord, Verdict, replay,
+    Ending, Engine, EngineParams, Log, RecorderParams, ReplayParams, Report, StartError,
+    StepRecord, Verdict, replay,
 };
 use palpa_servo::Vec3;
 use std::path::Path;
@@ -28,15 +28,22 @@ pub(crate) fn recorder(path: &Path) -> RecorderParams {
     }
 }
 
-pub(crate) fn wait(seconds: f64) {
-    let clock = RealClock::new(0.0);
-    clock.wait_until(seconds);
+/// Waits until the loop has done so many ticks more, the tissue so many steps, and the background
+/// so many jobs.
+pub(crate) fn go_on(engine: &mut Engine, ticks: u64, steps: u64, jobs: u64) {
+    let begin = engine.snapshot();
+    until("ticks, steps and jobs are done", || {
+        let now = engine.snapshot();
+        now.tick.tick.tick >= begin.tick.tick.tick + ticks
+            && now.step.step >= begin.step.step + steps
+            && now.step.factor >= begin.step.factor + jobs
+    });
 }
 
 /// Runs the bed under a scripted hand; `act` does what it likes meanwhile.
 pub(crate) fn run(path: &Path, bed: Bed, act: impl FnOnce(&mut Engine, &Hand)) -> (Report, Log) {
     let hand = Hand::default();
-    let device = Box::new(Scripted::new(&hand));
+    let device = announced(Scripted::new(&hand));
     let mut engine = Engine::start(bed, vec![device], &params(), &recorder(path)).unwrap();
     act(&mut engine, &hand);
     let report = engine.stop();
@@ -44,7 +51,8 @@ pub(crate) fn run(path: &Path, bed: Bed, act: impl FnOnce(&mut Engine, &Hand)) -
     (report, Log::open(path).unwrap())
 }
 
-/// What holds in every run: nothing is lost or out of order, and each force is finite and within limits.
+/// What holds in every run: nothing is lost or out of order, and each force is finite and within
+/// limits.
 pub(crate) fn check_records(report: &Report, log: &Log) {
     assert_eq!(log.ending, Ending::Whole);
     assert_eq!(report.lost_records, [0, 0]);
@@ -83,22 +91,17 @@ pub(crate) fn check_records(report: &Report, log: &Log) {
 }
 
 #[test]
-fn two_seconds_are_recorded_whole_and_replayed_to_the_bit() {
+fn two_thousand_ticks_are_recorded_whole_and_replayed_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (report, log) = run(&path, Bed::new(), |engine, _| {
-        wait(1.0);
+        go_on(engine, 1000, 100, 0);
         let snapshot = engine.snapshot();
-        assert!(snapshot.tick.tick.tick > 100 && snapshot.step.step > 10);
         assert!(snapshot.tick.devices[0].position[2] < crate::toy::RADIUS);
-        wait(1.0);
+        go_on(engine, 1000, 101, 6);
     });
     check_records(&report, &log);
-    assert!(
-        report.ticks + report.skipped > 1900,
-        "{} ticks",
-        report.ticks
-    );
+    assert!(report.ticks >= 2000, "{} ticks", report.ticks);
     assert!(report.steps as usize == log.steps.len() && report.steps > 200);
     assert_eq!(report.tick_cpu.count, report.ticks);
     assert!(report.jobs.count > 5 && report.background_cpu_share > 0.0);
@@ -129,13 +132,12 @@ fn two_devices_are_recorded_and_replayed_side_by_side() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let hands = [Hand::default(), Hand::default()];
-    let devices = hands
-        .iter()
-        .map(|hand| Box::new(Scripted::new(hand)) as Box<dyn HapticDevice>);
-    let engine = Engine::start(Bed::new(), devices.collect(), &params(), &recorder(&path)).unwrap();
-    wait(0.3);
+    let devices = hands.iter().map(|hand| announced(Scripted::new(hand)));
+    let mut engine =
+        Engine::start(Bed::new(), devices.collect(), &params(), &recorder(&path)).unwrap();
+    go_on(&mut engine, 300, 20, 0);
     hands[1].make(Ill::Unplugged);
-    wait(0.3);
+    go_on(&mut engine, 300, 20, 0);
     let report = engine.stop();
     let log = Log::open(&path).unwrap();
     check_records(&report, &log);
@@ -163,18 +165,18 @@ fn a_simulated_device_in_a_simulated_hand_is_replayed_to_the_bit() {
     let above = Vec3::new(0.0, 0.0, RADIUS + 0.005);
     let press = Path3::press(above, -Vec3::z(), 0.009, 0.03, 5.0);
     let device = SimulatedDevice::new(DeviceModel::FALCON, Grip::MEDIUM, press);
-    let engine = Engine::start(
-        Bed::new(),
-        vec![Box::new(device)],
-        &params(),
-        &recorder(&path),
-    )
-    .unwrap();
-    wait(1.5);
+    let devices = vec![announced(device)];
+    let mut engine = Engine::start(Bed::new(), devices, &params(), &recorder(&path)).unwrap();
+    // The hand is held up by the bed.
+    until("the hand presses", || {
+        let tick = engine.snapshot().tick;
+        let force = tick.devices[0].force;
+        force.iter().map(|f| f * f).sum::<f64>() > 0.3 * 0.3
+    });
     let report = engine.stop();
     let log = Log::open(&path).unwrap();
     assert!(log.ending == Ending::Whole && log.ticks.len() as u64 == report.ticks);
-    // The hand is held up by the bed, with a force that the device can exert.
+    // With a force that the device can exert.
     let force = report.forces[0];
     assert!(
         force.max_force > 0.3 && force.max_force <= DeviceModel::FALCON.spec.max_force,
@@ -188,7 +190,7 @@ fn a_simulated_device_in_a_simulated_hand_is_replayed_to_the_bit() {
 fn a_replay_finds_what_was_changed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let (_, log) = run(&path, Bed::new(), |_, _| wait(0.7));
+    let (_, log) = run(&path, Bed::new(), |engine, _| go_on(engine, 700, 100, 5));
     let params = ReplayParams::default();
 
     // One bit of one reading in the middle: forces from there on, but no patch made of it.
@@ -241,7 +243,7 @@ fn what_cannot_start_says_why() {
     let start = |devices, params: &EngineParams, recorder: &RecorderParams| {
         Engine::start(Bed::new(), devices, params, recorder).unwrap_err()
     };
-    let device = || Box::new(Scripted::new(&Hand::default()));
+    let device = || announced(Scripted::new(&Hand::default()));
     let none = RecorderParams::default();
     assert!(matches!(
         start(vec![], &params(), &none),
@@ -268,19 +270,14 @@ fn what_cannot_start_says_why() {
 #[test]
 fn an_engine_that_is_dropped_lets_go_of_its_devices() {
     let hand = Hand::default();
-    let device = Box::new(Scripted::new(&hand));
     let engine = Engine::start(
         Bed::new(),
-        vec![device],
+        vec![announced(Scripted::new(&hand))],
         &params(),
         &RecorderParams::default(),
     )
     .unwrap();
-    let clock = RealClock::new(0.0);
-    while hand.force() < 0.1 {
-        clock.wait_until(clock.now() + 1e-3);
-        assert!(clock.now() < 20.0, "no force after 20 s");
-    }
+    until("a force is felt", || hand.force() > 0.1);
     drop(engine);
     assert!(hand.force() == 0.0);
 }

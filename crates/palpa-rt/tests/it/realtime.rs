@@ -1,12 +1,14 @@
-//! The loop's body neither allocates nor waits: under an allocator that aborts, and under the real-time sanitizer.
+//! The loop's body neither allocates nor waits: under an allocator that aborts, and under the
+//! real-time sanitizer.
 
 use crate::{
-    devices::{Hand, Ill, Scripted},
-    engine::{params, wait},
+    devices::{Hand, Ill, Scripted, until},
+    engine::params,
     toy::Bed,
 };
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use palpa_rt::{Engine, RecorderParams};
+use palpa_rt::{Engine, EngineParams, RecorderParams, TissueParams};
+use std::thread;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -15,18 +17,23 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 fn a_tick_never_allocates() {
     let hand = Hand::default();
     let device = Box::new(Scripted::new(&hand));
-    let (mut engine, mut servo_loop) = Engine::start_driven(
-        Bed::new(),
-        vec![device],
-        &params(),
-        &RecorderParams::default(),
-    )
-    .unwrap();
-    // The test owns the moments of the ticks, as a vendor's callback would. Every path is walked: devices that fail,
-    // patches that are spoilt or missing, ticks left out, and a ring that is full because nobody waits for the recorder.
+    let params = EngineParams {
+        tissue: TissueParams {
+            min_period: 1e-4,
+            ..TissueParams::default()
+        },
+        ..params()
+    };
+    let mut bed = Bed::new();
+    bed.waiter = Some(thread::current());
+    let (mut engine, mut servo_loop) =
+        Engine::start_driven(bed, vec![device], &params, &RecorderParams::default()).unwrap();
+    // The test owns the moments of the ticks, as a vendor's callback would. Every path is walked:
+    // devices that fail, patches that are spoilt or missing, ticks left out, and a ring that is
+    // full because nobody waits for the recorder.
     let mut most = 0.0_f64;
     for k in 0..30_000_u32 {
-        let now = engine.now();
+        let now = 1e-3 * f64::from(k + 1);
         match k % 3000 {
             0 | 1600 => hand.make(Ill::No),
             1000 => hand.make(Ill::Unplugged),
@@ -38,8 +45,11 @@ fn a_tick_never_allocates() {
         let skipped = u32::from(k % 500 == 0);
         assert_no_alloc(|| servo_loop.tick_once(now, 1e-5, skipped));
         most = most.max(hand.force());
+        // At first the tissue answers every tick; later ticks do not wait for it.
         if k < 3000 {
-            wait(2e-4);
+            until("the tissue answers", || {
+                engine.snapshot().step.tick > u64::from(k)
+            });
         }
     }
     assert!(most > 0.1, "no force was made: {most} N");

@@ -1,7 +1,9 @@
-//! A bed of springs that harden and creep, pressed by a sphere: small, nonlinear, with history and background jobs.
+//! A bed of springs that harden and creep, pressed by a sphere: small, nonlinear, with history and
+//! background jobs.
 
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
 use palpa_servo::{Candidate, ContactPatch, MAX_TOOLS, Mat3, ToolContact, Vec3};
+use std::thread::Thread;
 
 /// Radius of the tool, m.
 pub(crate) const RADIUS: f64 = 0.01;
@@ -15,7 +17,8 @@ const CREEP_TIME: f64 = 0.1;
 /// A vertex so close to the tool is a candidate, m.
 const NEAR: f64 = 0.004;
 
-/// Springs at the vertices of a grid round the origin, in the plane z = 0; the tool comes from above.
+/// Springs at the vertices of a grid round the origin, in the plane z = 0; the tool comes from
+/// above.
 #[derive(Debug, Clone)]
 pub(crate) struct Bed {
     /// How much each spring has crept, m.
@@ -30,6 +33,8 @@ pub(crate) struct Bed {
     /// Which job panics.
     pub(crate) panics_in: Option<u64>,
     jobs: u64,
+    /// A thread to wake at every step, for `until`.
+    pub(crate) waiter: Option<Thread>,
 }
 
 impl Bed {
@@ -43,6 +48,7 @@ impl Bed {
             fails_at: None,
             panics_in: None,
             jobs: 0,
+            waiter: None,
         }
     }
 }
@@ -52,6 +58,9 @@ impl Tissue for Bed {
     type Done = (u64, f64);
 
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
+        if let Some(waiter) = &self.waiter {
+            waiter.unpark();
+        }
         self.steps += 1;
         patch.n_tools = input.n_tools;
         patch.n_contacts = 0;

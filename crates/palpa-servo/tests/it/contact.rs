@@ -11,14 +11,15 @@ fn pressed(bed: &HalfSpace, centre: Vec3, from: Vec3) -> (Vec3, ContactPatch, u3
         ..ServoParams::default()
     };
     let mut servo = Loop::new(&params, SPEC);
-    // Comes back in the air, with friction's memory there, then goes where it is asked to in one tick.
+    // Comes back in the air, with friction's memory there, then goes where it is asked to in one
+    // tick.
     servo.settle(&patch, from, 700);
     servo.send(patch.clone());
     servo.tick(Some(from));
     let mut report = servo.tick(Some(centre));
     assert_eq!(report.faults, Faults::NONE);
-    // A millimetre in one tick and 60 contacts on fine skin: what friction is left to settle takes a second tick, in
-    // which no anchor moves that is not to.
+    // A millimetre in one tick and 60 contacts on fine skin: what friction is left to settle takes
+    // a second tick, in which no anchor moves that is not to.
     if bed.friction == 0.0 || bed.n > 36 {
         report = servo.tick(Some(centre));
     }
@@ -150,7 +151,8 @@ fn a_pressing_hand_is_followed_within_a_thousandth() {
 
 #[test]
 fn friction_remembers_across_patches() {
-    // Pressed and dragged with patches that know nothing of friction: the force stays on the cone, and stays when at rest.
+    // Pressed and dragged with patches that know nothing of friction: the force stays on the cone,
+    // and stays when at rest.
     let bed = HalfSpace {
         spacing: 2e-3,
         compliance: 4e-3,
@@ -303,55 +305,4 @@ fn the_coupling_is_a_spring_in_series() {
     servo.send(patch);
     let report = servo.tick(Some(Vec3::new(0.0, 0.0, RADIUS - 1e-3)));
     assert_eq!(report.tools[0].stretch, Vec3::zeros());
-}
-
-#[test]
-#[ignore = "prints times, which say nothing on a busy machine"]
-fn times_of_a_tick() {
-    for (n, spacing) in [(25, 2e-3), (60, 1.2e-3), (60, 0.5e-3)] {
-        let bed = HalfSpace {
-            spacing,
-            compliance: 4e-3,
-            friction: 0.4,
-            n,
-        };
-        let from = Vec3::new(0.0, 0.0, RADIUS + 1e-5);
-        let mut patch = Box::new(ContactPatch::EMPTY);
-        bed.fill(from, 1, &mut patch);
-        let mut servo = Loop::new(&ServoParams::default(), SPEC);
-        servo.settle(&patch, from, 700);
-        for speed in [1e-5, 5e-5, 1e-4] {
-            let mut at = from;
-            servo.settle(&patch, at, 1);
-            let (mut plain, mut arrival, mut active) = (Vec::new(), Vec::new(), 0);
-            for k in 0..(1.5e-3 / speed) as usize {
-                at += Vec3::new(0.3, 0.0, -1.0) * speed;
-                if k % 5 == 0 {
-                    servo.send(patch.clone());
-                }
-                let begin = std::time::Instant::now();
-                let report = servo.tick(Some(at));
-                let time = begin.elapsed().as_secs_f64() * 1e6;
-                if report.is_new_patch {
-                    &mut arrival
-                } else {
-                    &mut plain
-                }
-                .push(time);
-                active = report.n_active;
-            }
-            for times in [&mut plain, &mut arrival] {
-                times.sort_by(f64::total_cmp);
-            }
-            let at = |times: &[f64], share: f64| times[(times.len() as f64 * share) as usize];
-            println!(
-                "n {n} at {:.0} mm/s, at most {active} active: median {:.1}, p95 {:.1} us; with a patch {:.1}, {:.1} us",
-                speed * 1e6,
-                at(&plain, 0.5),
-                at(&plain, 0.95),
-                at(&arrival, 0.5),
-                at(&arrival, 0.95),
-            );
-        }
-    }
 }

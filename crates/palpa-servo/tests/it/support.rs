@@ -42,7 +42,8 @@ impl PatchSource for Mail {
     }
 }
 
-/// A sphere of 8 mm over a grid of `n` vertices `spacing` apart on an elastic half-space, nothing pressed yet.
+/// A sphere of 8 mm over a grid of `n` vertices `spacing` apart on an elastic half-space, nothing
+/// pressed yet.
 pub(crate) struct HalfSpace {
     pub(crate) spacing: f64,
     pub(crate) compliance: f64,
@@ -68,7 +69,8 @@ impl HalfSpace {
             .collect()
     }
 
-    /// Boussinesq and Cerruti with `ν = 0.45`, a vertex's own as of a disc: coupled between directions.
+    /// Boussinesq and Cerruti with `ν = 0.45`, a vertex's own as of a disc: coupled between
+    /// directions.
     pub(crate) fn block(&self, a: &Vec3, b: &Vec3) -> Mat3 {
         let nu = 0.45;
         let d = a - b;
@@ -117,7 +119,8 @@ impl HalfSpace {
         }
     }
 
-    /// The forces on the vertices by plain relaxation until nothing moves, with the patch's own gaps.
+    /// The forces on the vertices by plain relaxation until nothing moves, with the patch's own
+    /// gaps.
     pub(crate) fn oracle(&self, patch: &ContactPatch, centre: Vec3, anchors: &[Vec3]) -> Vec<Vec3> {
         let places = self.places();
         let n = places.len();

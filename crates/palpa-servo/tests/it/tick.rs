@@ -178,7 +178,8 @@ fn without_devices_or_patches_nothing_happens() {
 
 #[test]
 fn two_tools_press_one_body() {
-    // A second tool far away feels its own; one near feels that the first pushes the skin down under it.
+    // A second tool far away feels its own; one near feels that the first pushes the skin down
+    // under it.
     let spec = [SPEC, SPEC];
     let mut forces = [[0.0; 2]; 2];
     for (case, apart) in [1.0, 0.0].into_iter().enumerate() {
@@ -220,4 +221,28 @@ fn two_tools_press_one_body() {
         forces[1][0] < 0.98 * forces[0][0] && forces[1][1] < 0.9 * forces[0][1],
         "{forces:?}"
     );
+}
+
+#[test]
+fn no_period_makes_a_tick_panic() {
+    let bed = HalfSpace {
+        spacing: 2e-3,
+        compliance: 4e-3,
+        friction: 0.3,
+        n: 9,
+    };
+    let at = Vec3::new(0.0, 0.0, RADIUS - 1e-3);
+    let mut patch = Box::new(ContactPatch::EMPTY);
+    bed.fill(at, 1, &mut patch);
+    // 0.1 s is the longest that a loop may have; there twice the period is longer than any patch's.
+    for period in [0.1, 1e3, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let params = ServoParams {
+            period,
+            ..ServoParams::default()
+        };
+        let mut servo = Loop::new(&params, SPEC);
+        let report = servo.settle(&patch, at, 700);
+        assert!(report.faults.is_empty(), "{period} s: {report:?}");
+        assert!(servo.command[0].force.z > 0.1, "{period} s: {report:?}");
+    }
 }

@@ -1,0 +1,52 @@
+//! A device that goes along a path, whatever the force.
+
+use crate::{DeviceFault, HapticDevice, Path};
+use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Pose, Vec3};
+
+/// An ideal device whose pose *is* the path, whatever the force: for tests of accuracy.
+#[derive(Debug, Clone)]
+pub struct Scripted {
+    path: Path,
+    spec: DeviceSpec,
+    began: Option<f64>,
+    last: ForceCommand,
+}
+
+impl Scripted {
+    /// Along the path from the first reading on.
+    pub fn new(path: Path, spec: DeviceSpec) -> Self {
+        Self {
+            path,
+            spec,
+            began: None,
+            last: ForceCommand::ZERO,
+        }
+    }
+
+    /// The last command.
+    pub fn command(&self) -> ForceCommand {
+        self.last
+    }
+}
+
+impl HapticDevice for Scripted {
+    fn spec(&self) -> DeviceSpec {
+        self.spec
+    }
+
+    fn read(&mut self, now: f64) -> Result<DeviceState, DeviceFault> {
+        let began = *self.began.get_or_insert(now);
+        let at = self.path.at(now - began);
+        Ok(DeviceState {
+            time: now,
+            pose: Pose::translation(at.x, at.y, at.z),
+            velocity: Vec3::zeros(),
+            buttons: 0,
+        })
+    }
+
+    fn write(&mut self, _now: f64, command: &ForceCommand) -> Result<(), DeviceFault> {
+        self.last = *command;
+        Ok(())
+    }
+}

@@ -1,0 +1,83 @@
+//! Settings of an engine, and why it cannot start.
+
+use crate::{
+    threads::{Priority, Wish},
+    tissue_thread::TissueParams,
+};
+use palpa_servo::{MAX_TOOLS, ServoParams};
+use std::{io, path::PathBuf};
+
+/// Settings of an engine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EngineParams {
+    /// Period of the loop, s.
+    pub period: f64,
+    /// The law; its period is set to the loop's.
+    pub servo: ServoParams,
+    /// The tissue's thread.
+    pub tissue: TissueParams,
+    /// How long the loop spins before each tick instead of sleeping, s: less lateness for more CPU.
+    pub spin: f64,
+    /// Priority and core of the loop's thread, if the system grants them.
+    pub servo_wish: Wish,
+    /// The same for the tissue's thread.
+    pub tissue_wish: Wish,
+    /// The same for the background's thread: zones that come late hold the tissue back, so it is no
+    /// lower than the others.
+    pub background_wish: Wish,
+    /// The same for the recorder's thread.
+    pub recorder_wish: Wish,
+    /// Whether memory is locked in RAM.
+    pub lock_memory: bool,
+}
+
+impl Default for EngineParams {
+    fn default() -> Self {
+        Self {
+            period: 1e-3,
+            servo: ServoParams::default(),
+            tissue: TissueParams::default(),
+            spin: 0.0,
+            servo_wish: Wish {
+                priority: Priority::RealTime(80),
+                core: None,
+            },
+            tissue_wish: Wish::NORMAL,
+            background_wish: Wish::NORMAL,
+            recorder_wish: Wish {
+                priority: Priority::Nice(10),
+                core: None,
+            },
+            lock_memory: true,
+        }
+    }
+}
+
+/// Why an engine cannot start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StartError {
+    /// No device, or more than the law can serve.
+    #[error("{found} devices; from 1 to {MAX_TOOLS} can be served")]
+    Devices {
+        /// How many there were.
+        found: usize,
+    },
+    /// The period is no time, s.
+    #[error("a period of {period} s; expected more than 0 and at most 0.1 s")]
+    Period {
+        /// What it was.
+        period: f64,
+    },
+    /// The log cannot be created.
+    #[error("{}: the log cannot be created: {source}", path.display())]
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: mcap::McapError,
+    },
+    /// The system gives no thread.
+    #[error("no thread: {0}")]
+    Thread(#[from] io::Error),
+}

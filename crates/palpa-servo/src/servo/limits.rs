@@ -1,0 +1,91 @@
+//! The limits of the device: size and slew of what is commanded.
+
+use crate::{DeviceSpec, ForceCommand, Limits, Vec3};
+
+/// Forces below this are cut to zero where they decay, N: far below what any device resolves.
+const FORCE_DUST: f64 = 1e-6;
+
+/// Limits of a device that is not there.
+pub(super) const NO_DEVICE: DeviceSpec = DeviceSpec {
+    max_force: 0.0,
+    max_torque: 0.0,
+    max_slew: 0.0,
+    max_stiffness: 0.0,
+    max_damping: 0.0,
+};
+
+/// Limits that are no positive numbers become zero.
+pub(super) fn checked_spec(spec: &DeviceSpec) -> DeviceSpec {
+    let positive = |x: f64| if x > 0.0 && x < 1e9 { x } else { 0.0 };
+    DeviceSpec {
+        max_force: positive(spec.max_force),
+        max_torque: positive(spec.max_torque),
+        max_slew: positive(spec.max_slew),
+        max_stiffness: positive(spec.max_stiffness),
+        max_damping: positive(spec.max_damping),
+    }
+}
+
+/// The command nearest to `wanted` that the device allows `dt` seconds after the `last` one, and
+/// the limits that it met.
+pub(super) fn limited(
+    wanted: &ForceCommand,
+    last: &ForceCommand,
+    spec: &DeviceSpec,
+    dt: f64,
+) -> (ForceCommand, Limits) {
+    let mut limits = Limits::NONE;
+    let force = shortened(&wanted.force, spec.max_force);
+    let torque = shortened(&wanted.torque, spec.max_torque);
+    if force != wanted.force {
+        limits |= Limits::FORCE;
+    }
+    // A device without moments leaves them out; that is no limit met.
+    if torque != wanted.torque && spec.max_torque > 0.0 {
+        limits |= Limits::TORQUE;
+    }
+    let slew = spec.max_slew * dt;
+    let turn = if spec.max_force > 0.0 {
+        slew * spec.max_torque / spec.max_force
+    } else {
+        0.0
+    };
+    let by = force - last.force;
+    let by_slewed = shortened(&by, slew);
+    if by != by_slewed {
+        limits |= Limits::SLEW;
+    }
+    let by_torque = shortened(&(torque - last.torque), turn);
+    let next = ForceCommand {
+        force: without_dust(last.force + by_slewed),
+        torque: without_dust(last.torque + by_torque),
+    };
+    // Two finite forces within the limits make one within them; this is for rounding and for
+    // oversights.
+    let command = ForceCommand {
+        force: shortened(&next.force, spec.max_force),
+        torque: shortened(&next.torque, spec.max_torque),
+    };
+    (command, limits)
+}
+
+/// The vector, or the one of that length in its direction; zero for one that is not finite.
+pub(super) fn shortened(v: &Vec3, length: f64) -> Vec3 {
+    let norm = v.norm();
+    if norm <= length {
+        *v
+    } else if norm.is_finite() {
+        v * (length / norm)
+    } else {
+        Vec3::zeros()
+    }
+}
+
+/// The vector, or zero if all its entries are below [`FORCE_DUST`].
+pub(super) fn without_dust(v: Vec3) -> Vec3 {
+    if v.amax() < FORCE_DUST {
+        Vec3::zeros()
+    } else {
+        v
+    }
+}

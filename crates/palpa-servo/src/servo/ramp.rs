@@ -1,0 +1,74 @@
+//! The ramp: after a fault the force falls to zero, and some time after the last fault it returns.
+
+use crate::{Faults, ServoParams};
+
+/// Time at zero force without a fault before the force comes back, s.
+const QUIET: f64 = 0.05;
+
+/// The share of the force that is let through, and whether it rises or falls.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ramp {
+    gain: f64,
+    way: Way,
+}
+
+/// What a ramp does. `quiet_for` is the time at zero force without a fault, s.
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    /// The share rises to one, or is there. The force is this tick's.
+    Up,
+    /// Only the patch is old. The share falls to zero, but the force is this tick's: it still lets
+    /// go of a hand that draws back.
+    DownLive { quiet_for: f64 },
+    /// There was another fault. The share falls to zero, of the last good force.
+    DownHeld { quiet_for: f64 },
+}
+
+impl Ramp {
+    pub(super) const fn new() -> Self {
+        Self {
+            gain: 0.0,
+            way: Way::DownHeld { quiet_for: 0.0 },
+        }
+    }
+
+    /// The share, 0 to 1, as it moves: along a straight line.
+    pub(super) fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// The share with a smooth beginning and end.
+    pub(super) fn smoothed(&self) -> f64 {
+        self.gain * self.gain * (3.0 - 2.0 * self.gain)
+    }
+
+    /// Whether the last good force is let through rather than this tick's.
+    pub(super) fn is_held(&self) -> bool {
+        matches!(self.way, Way::DownHeld { .. })
+    }
+
+    /// Moves on by `dt`, s. Returns whether the force begins to come back in this tick.
+    pub(super) fn update(&mut self, faults: Faults, dt: f64, params: &ServoParams) -> bool {
+        if !faults.is_empty() {
+            self.way = if self.is_held() || faults != Faults::STALE_PATCH {
+                Way::DownHeld { quiet_for: 0.0 }
+            } else {
+                Way::DownLive { quiet_for: 0.0 }
+            };
+        }
+        let (Way::DownLive { quiet_for } | Way::DownHeld { quiet_for }) = &mut self.way else {
+            self.gain = (self.gain + dt / params.ramp_up.max(1e-3)).min(1.0);
+            return false;
+        };
+        self.gain = (self.gain - dt / params.ramp_down.max(1e-3)).max(0.0);
+        if self.gain > 0.0 || !faults.is_empty() {
+            return false;
+        }
+        *quiet_for += dt;
+        let comes_back = *quiet_for > QUIET;
+        if comes_back {
+            self.way = Way::Up;
+        }
+        comes_back
+    }
+}

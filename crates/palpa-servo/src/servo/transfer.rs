@@ -1,0 +1,62 @@
+//! The transfer: a new patch gives another force at the same pose, and the difference fades out
+//! instead of jumping.
+
+use super::limits::{shortened, without_dust};
+use crate::solver::ToolLoad;
+use crate::{DeviceSpec, ForceCommand};
+
+/// The difference of one tool that still fades.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Transfer {
+    /// Part of the force, N and N m.
+    pub(super) force: ForceCommand,
+    /// Time in which it fades, s.
+    left: f64,
+}
+
+impl Transfer {
+    pub(super) const NONE: Self = Self {
+        force: ForceCommand::ZERO,
+        left: 0.0,
+    };
+
+    /// Adds the difference from the old to the new patch, cut to the share `most` of the device's
+    /// limits, to fade in `time`, s. Returns whether the force was cut.
+    pub(super) fn bridge(
+        &mut self,
+        old: &ToolLoad,
+        new: &ToolLoad,
+        spec: &DeviceSpec,
+        most: f64,
+        time: f64,
+    ) -> bool {
+        let max_force = most * spec.max_force;
+        let max_torque = most * spec.max_torque;
+        let force = self.force.force + old.force - new.force;
+        self.force = ForceCommand {
+            force: shortened(&force, max_force),
+            torque: shortened(&(self.force.torque + old.torque - new.torque), max_torque),
+        };
+        self.left = time;
+        force.norm() > max_force
+    }
+
+    /// Moves on by `dt`, s, along a straight line to zero in the time that is left.
+    pub(super) fn fade(&mut self, dt: f64) {
+        let share = if self.left > dt {
+            1.0 - dt / self.left
+        } else {
+            0.0
+        };
+        self.left = (self.left - dt).max(0.0);
+        self.force = ForceCommand {
+            force: without_dust(self.force.force * share),
+            torque: without_dust(self.force.torque * share),
+        };
+    }
+
+    /// Forgets the difference.
+    pub(super) fn drop_force(&mut self) {
+        self.force = ForceCommand::ZERO;
+    }
+}

@@ -1,0 +1,114 @@
+//! A new patch: forces and anchors go on where a vertex is known.
+
+use super::{ContactSolver, add_columns, tool_of};
+use crate::{Candidate, ContactPatch, MAX_CONTACTS, Vec3};
+
+/// Identity of a contact from patch to patch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Key {
+    vertex: u32,
+    tool: u32,
+}
+
+impl Key {
+    pub(super) const NONE: Self = Self {
+        vertex: u32::MAX,
+        tool: 0,
+    };
+
+    fn of(candidate: &Candidate) -> Self {
+        Self {
+            vertex: candidate.vertex,
+            tool: candidate.tool,
+        }
+    }
+}
+
+/// A contact of the patch before.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    key: Key,
+    force: Vec3,
+    anchor: Vec3,
+}
+
+impl ContactSolver {
+    /// Takes a patch over. Vertices of the patch before keep their forces and anchors; the others
+    /// have the new patch's.
+    pub(crate) fn adopt(&mut self, patch: &ContactPatch) {
+        self.carry_over(patch);
+        for (i, own) in self.own.iter_mut().enumerate().take(self.n) {
+            *own = patch.block(i, i);
+        }
+        self.place_vertices(patch);
+    }
+
+    fn carry_over(&mut self, patch: &ContactPatch) {
+        let mut known = [Known {
+            key: Key::NONE,
+            force: Vec3::zeros(),
+            anchor: Vec3::zeros(),
+        }; MAX_CONTACTS];
+        let n_known = self.n;
+        for (((known, key), force), anchor) in known
+            .iter_mut()
+            .zip(&self.key)
+            .zip(&self.force)
+            .zip(&self.anchor)
+        {
+            *known = Known {
+                key: *key,
+                force: *force,
+                anchor: *anchor,
+            };
+        }
+        let known = known.get(..n_known).unwrap_or_default();
+        self.n = patch.n_contacts.min(MAX_CONTACTS);
+        for (i, ((candidate, force), anchor)) in patch
+            .contacts
+            .iter()
+            .zip(&mut self.force)
+            .zip(&mut self.anchor)
+            .take(self.n)
+            .enumerate()
+        {
+            let is_bonded = tool_of(patch, candidate.tool).is_some_and(|tool| tool.is_bonded);
+            // The order is mostly the same from patch to patch: the search starts at the same
+            // place.
+            let (before, after) = known.split_at(i.min(known.len()));
+            let found = after
+                .iter()
+                .chain(before)
+                .find(|k| k.key == Key::of(candidate));
+            (*force, *anchor) = match found {
+                Some(found) if is_bonded => (found.force, candidate.anchor),
+                Some(found) => (found.force, found.anchor),
+                None => (candidate.force, candidate.anchor),
+            };
+        }
+        for (key, candidate) in self.key.iter_mut().zip(&patch.contacts) {
+            *key = Key::of(candidate);
+        }
+    }
+
+    /// Positions without forces, and with those that were carried over.
+    fn place_vertices(&mut self, patch: &ContactPatch) {
+        for (free, candidate) in self.free.chunks_exact_mut(3).zip(&patch.contacts) {
+            free.copy_from_slice(candidate.position.as_slice());
+        }
+        let used = 3 * self.n;
+        for (j, candidate) in patch.contacts.iter().enumerate().take(self.n) {
+            add_columns(
+                &patch.compliance,
+                j,
+                used,
+                &-candidate.force,
+                &mut self.free,
+            );
+        }
+        self.position = self.free;
+        for (j, force) in self.force.iter().enumerate().take(self.n) {
+            add_columns(&patch.compliance, j, used, force, &mut self.position);
+        }
+    }
+}
