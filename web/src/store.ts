@@ -2,9 +2,9 @@
 
 import { batch, computed, effect, signal } from '@preact/signals';
 import type { EngineFigures, Hello, Message, NoticeLevel, State } from './generated/api';
+import type { SceneTable } from './generated/scene';
 import { SNAPSHOT_VERSION, type FrameSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
 import { Connection, type ConnectionStatus, type Request } from './connection';
-import type { SceneTable } from './ui/scene_table';
 import { History } from './ui/history';
 
 export type Vec3 = [number, number, number];
