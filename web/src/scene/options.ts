@@ -4,7 +4,14 @@ import type { ColourBy } from './quantities';
 
 export type Vec3 = [number, number, number];
 
+/** Names for screen readers. */
+export interface ViewWords {
+  canvas: string;
+  plane: string;
+}
+
 export interface ViewOptions {
+  words: ViewWords;
   theme: 'light' | 'dark';
   colourBy: ColourBy;
   /** Range of the colour map, SI; null is automatic: it grows at once and shrinks slowly. */
@@ -26,6 +33,7 @@ export interface ViewOptions {
 }
 
 export const DEFAULT_OPTIONS: ViewOptions = {
+  words: { canvas: '', plane: '' },
   theme: 'light',
   colourBy: 'tissue',
   range: null,

@@ -104,7 +104,6 @@ export class PlaneGrip {
     element.className = 'scene-grip';
     element.tabIndex = 0;
     element.setAttribute('role', 'slider');
-    element.setAttribute('aria-label', 'Cutaway plane');
     element.setAttribute('aria-valuemin', '0');
     element.setAttribute('aria-valuemax', '100');
     element.hidden = true;

@@ -75,7 +75,6 @@ export class BodyView {
     canvas.id = 'body-canvas';
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');
-    canvas.setAttribute('aria-label', 'Body: press with mouse, finger or keys');
     const isSoftware = isSoftwareWebGL();
     const gl = isSoftware === null ? null : canvas.getContext('webgl2', { antialias: !isSoftware, alpha: true, powerPreference: 'high-performance' });
     if (!gl) throw new NoWebGL2();
@@ -106,6 +105,7 @@ export class BodyView {
     this.stage.scene.add(this.tool.group, this.marks.group, this.lumps.group);
     this.theme = this.stage.theme(this.options.theme);
     this.paintBackground();
+    this.nameParts();
 
     const { signal } = this.stop;
     canvas.addEventListener('webglcontextlost', (event) => {
@@ -157,6 +157,7 @@ export class BodyView {
     const before = this.options;
     this.options = { ...before, ...options };
     this.rig.reducedMotion = this.options.reducedMotion;
+    this.nameParts();
     if (before.theme !== this.options.theme) {
       this.theme = this.stage.theme(this.options.theme);
       this.paintBackground();
@@ -233,6 +234,12 @@ export class BodyView {
     this.renderer.forceContextLoss();
     this.body = null;
     this.root.remove();
+  }
+
+  private nameParts(): void {
+    const { canvas, plane } = this.options.words;
+    this.canvas.setAttribute('aria-label', canvas);
+    this.cutaway.grip.element.setAttribute('aria-label', plane);
   }
 
   private paintBackground(): void {

@@ -2,6 +2,7 @@
 
 import { batch, computed, effect, signal, type Signal } from '@preact/signals';
 import { DEFAULT_OPTIONS, quantityOf, type ColourBy, type ViewOptions } from '../scene';
+import { t } from '../i18n';
 import { galleryKey, isHiding, state, type Vec3 } from '../store';
 import type { Field } from '../generated/api';
 
@@ -65,7 +66,7 @@ export const isPanelOpen = remembered('panel', true, isBoolean);
 
 // How the body is touched.
 
-export type HandMode = 'press' | 'orbit';
+type HandMode = 'press' | 'orbit';
 export const handMode = signal<HandMode>('press');
 /** Depth of a press, m; null until it is chosen: then the scene's own. */
 export const chosenDepth = signal<number | null>(null);
@@ -97,7 +98,8 @@ export function showsLumps(colourBy: ColourBy): boolean {
 
 /** The options in force: during a game, nothing that shows hidden lumps. */
 export const view = computed<ViewOptions>(() => {
-  const options = { ...wanted.value, theme: theme.value, reducedMotion: reducedMotion.value };
+  const words = { canvas: t('app.canvas'), plane: t('view.cutaway_plane') };
+  const options = { ...wanted.value, words, theme: theme.value, reducedMotion: reducedMotion.value };
   if (!isHiding.value) return options;
   return {
     ...options,

@@ -12,7 +12,7 @@ import { picking, show, view } from '../settings';
 const wantedLumps = signal<'1' | '2' | '3'>('1');
 const wantedSeed = signal('');
 
-export function startGame(n_lumps: number, seed: number | null): void {
+function startGame(n_lumps: number, seed: number | null): void {
   picking.value = null;
   void askAloud({ type: 'start_game', n_lumps, seed });
 }
