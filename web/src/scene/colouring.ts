@@ -79,7 +79,7 @@ export class Colouring {
     }
   }
 
-  /** For the shader: in decades when logarithmic. */
+  /** The range for the shader: decimal logarithms if `isLog`. */
   get range(): [number, number] {
     return this.isLog ? [Math.log10(this.min), Math.log10(this.max)] : [this.min, this.max];
   }
@@ -95,7 +95,7 @@ export class Colouring {
     return { title: by, unit, min: this.min, max: this.max, isLog: this.isLog, stops: mapOf(by).stops };
   }
 
-  /** Stiffness of nodes: the mean of the prisms round them. */
+  /** Stiffness of nodes: the mean over the prisms around them. */
   private nodalStiffness(body: Body): Float32Array {
     if (this.stiffnessOf === body && this.stiffnessNodes) return this.stiffnessNodes;
     const { triangles, nLevels, stiffness, nNodes } = body;
@@ -141,7 +141,7 @@ function quantiles(values: Float32Array, share: number): [number, number] {
   return [low + i / scale, low + (k + 1) / scale];
 }
 
-/** The next number that reads well, so that legends stand still. */
+/** The next round number, so that legends change rarely. */
 function niceUp(x: number): number {
   const decade = 10 ** Math.floor(Math.log10(x));
   const step = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((s) => s * decade >= x * 0.9999) ?? 10;

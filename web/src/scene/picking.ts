@@ -44,7 +44,7 @@ function cast(ray: Ray, x: Float32Array, triangles: Uint32Array | number[], n: n
   return best;
 }
 
-/** What a ray may meet beside the skin. */
+/** What a ray may meet besides the skin. */
 export interface Pickable {
   section: { section: Section; plane: CutPlane } | null;
   bones: boolean;
@@ -68,7 +68,7 @@ export function pickNearest(ray: Ray, body: Body, { section, bones, isKept }: Pi
   return best;
 }
 
-/** Skin as it lies now, or at rest; the part that is cut away is not met. */
+/** Picks the skin, deformed or at rest, outside the part that is cut away. */
 export function pickSkin(ray: Ray, body: Body, atRest: boolean, isKept: (p: Vector3) => boolean): Hit | null {
   const hit = cast(ray, atRest ? body.rest : body.positions, body.triangles, body.triangles.length, body.nLevels, false, isKept);
   return hit && { ...hit, ...skinAt(body, hit.triangle, hit.shares) };

@@ -82,7 +82,7 @@ export class Quality {
     }
   }
 
-  /** What to draw now: all of it when nothing has changed for a while, less while pictures follow each other. */
+  /** The detail of the next picture: full when nothing has changed for a while, less while pictures follow each other. */
   begin(isRefinement: boolean): Detail {
     this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);
     const usual = Math.min(window.devicePixelRatio || 1, 2);
@@ -99,7 +99,7 @@ export class Quality {
     if (!this.isFull) this.wait();
   }
 
-  /** Something has changed: what stands still is drawn in full later. */
+  /** Something has changed: the full picture is put off. */
   wait(): void {
     window.clearTimeout(this.timer);
     if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, this.stillStep > 0 ? STILL_MS_SLOW : STILL_MS);

@@ -205,7 +205,7 @@ export class BodyView {
     return this.rig.metresPerPixel(this.size.y);
   }
 
-  /** The place that the scene presses. */
+  /** The press point of the scene. */
   get home(): { point: Vec3; normal: Vec3 } | null {
     const home = this.state?.home;
     return home ? { point: home.point as Vec3, normal: home.normal as Vec3 } : null;

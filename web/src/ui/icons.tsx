@@ -1,4 +1,4 @@
-// Line icons of 20 × 20, drawn here so that the page asks nobody else.
+// Line icons of 20 × 20, drawn here so that the page loads nothing from elsewhere.
 
 import type { Tab } from './settings';
 

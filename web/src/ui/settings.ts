@@ -64,7 +64,7 @@ export type Tab = (typeof TABS)[number];
 export const tab = remembered<Tab>('tab', 'scene', isOneOf(...TABS));
 export const isPanelOpen = remembered('panel', true, isBoolean);
 
-// How the body is touched.
+// How the hand presses.
 
 type HandMode = 'press' | 'orbit';
 export const handMode = signal<HandMode>('press');
@@ -78,7 +78,7 @@ export const pressDepth = computed(() => {
 /** The purpose of the next click on the body. */
 export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };
 export const picking = signal<Picking | null>(null);
-/** Whether the hand holds the tool as deep as it goes. */
+/** Whether the tool is at the greatest depth. */
 export const isDeepest = signal(false);
 /** The last place of the hand on the skin, m. */
 export const lastTouched = signal<Vec3 | null>(null);
@@ -115,7 +115,7 @@ export const view = computed<ViewOptions>(() => {
 export const neededField = computed<Field>(() => quantityOf(view.value.colourBy)?.field?.name ?? 'none');
 
 effect(() => {
-  // Another body has other layers, another usual depth, other places.
+  // Layers, depth and places of one body mean nothing for another.
   void galleryKey.value;
   batch(() => {
     chosenDepth.value = null;

@@ -1,4 +1,4 @@
-// Find the lump: lumps are hidden, felt for, marked, and shown.
+// The game: start a round, follow it, and read its result.
 
 import { signal } from '@preact/signals';
 import { useId } from 'preact/hooks';

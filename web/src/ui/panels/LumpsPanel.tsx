@@ -12,7 +12,7 @@ import { lastTouched, picking, show, wanted } from '../settings';
 /** Opacity of layers that are seen through. */
 const CLEAR = 0.3;
 
-/** What the next lump is to be; a firm nodule a little under the skin. */
+/** The values of the next lump: at first a firm nodule under the skin. */
 const next = signal({ depth: '10 mm', radius: '6 mm', young: '150 kPa' });
 
 export function LumpsPanel() {
@@ -36,7 +36,7 @@ export function LumpsPanel() {
   );
 }
 
-/** Lumps lie inside: what is over them is made clear, or full again. */
+/** Makes all layers transparent, or opaque again. */
 function SeeThrough() {
   const layers = state.value?.layers ?? [];
   const isClear = wanted.value.layers.some((layer) => layer.opacity < 1);
@@ -50,7 +50,7 @@ function SeeThrough() {
   );
 }
 
-/** Only kept here until it is added: any text is taken. */
+/** Keeps a value of the new lump; the engine checks it when the lump is added. */
 function keep(key: 'depth' | 'radius' | 'young'): (text: string) => Promise<null> {
   return (text) => {
     next.value = { ...next.value, [key]: withUnit(text, key === 'young' ? 'pressure' : 'length') };
@@ -155,7 +155,7 @@ function LumpFields({ index, lump }: { index: number; lump: LumpTable }) {
   );
 }
 
-/** A lump of another shape and about the same size; keys that the shape does not have would be refused. */
+/** The lump in another shape of about the same size. The engine refuses keys of other shapes. */
 function reshaped(lump: LumpTable, shape: 'sphere' | 'ellipsoid' | 'capsule'): LumpTable {
   const size = lump.radius ?? lump.radii?.[0] ?? '6 mm';
   const { radius: _, radii: __, length: ___, axis: ____, ...rest } = lump;

@@ -1,4 +1,4 @@
-// How the body is shown: colours, layers, the cutaway.
+// The view: colours, layers, the cutaway.
 
 import { named, t } from '../../i18n';
 import { isHiding, isWatching, notify, state } from '../../store';
