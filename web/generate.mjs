@@ -1,12 +1,12 @@
 // TypeScript from what the server generates: the control API (an OpenAPI document) and the scene file (a JSON Schema).
 //
 // npm run generate: reads both files and writes src/generated/api.ts and src/generated/scene.ts. The two inputs are made by
-// Rust tests, which also compare them: PALPA_BLESS=1 cargo test -p palpa-viewer -p palpa-tissue.
+// Rust tests, which also compare them: PALPA_BLESS=1 cargo test -p palpa-viewer -p palpa-scene.
 
 import { readFile, writeFile } from 'node:fs/promises';
 import openapiTS, { astToString, COMMENT_HEADER } from 'openapi-typescript';
 
-const SCENE_SCHEMA = new URL('../crates/palpa-tissue/schema/scene.schema.json', import.meta.url);
+const SCENE_SCHEMA = new URL('../crates/palpa-scene/schema/scene.schema.json', import.meta.url);
 const GENERATED = new URL('src/generated/', import.meta.url);
 
 /** Name of the type of the whole file. */

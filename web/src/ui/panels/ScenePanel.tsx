@@ -88,7 +88,7 @@ export function ScenePanel() {
             <dt>{t('scene.max_force')}</dt>
             <dd>{formatNumber(now.max_force)} N</dd>
           </dl>
-          {now.notes.length > 0 && <ul class="notes">{now.notes.map((note) => <li key={note}>{note}</li>)}</ul>}
+          {now.notes.length > 0 && <ul class="notes">{now.notes.map(({ text }) => <li key={text}>{text}</li>)}</ul>}
         </Section>
       )}
     </>
