@@ -1,4 +1,4 @@
-// For everybody: screen readers, languages, themes, tablets. Pictures are kept on the way.
+// Accessibility: screen readers, languages, themes, tablets. Saves screenshots on the way.
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -7,7 +7,7 @@ import { test } from 'node:test';
 import { PalpaPage } from './page.mjs';
 import { sharedBrowser, sharedPage, sharedViewer } from './session.mjs';
 import { saveShot } from './shots.mjs';
-import { until } from './viewer.mjs';
+import { sceneOf, until } from './viewer.mjs';
 import { extent, readBody } from './vtu.mjs';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
@@ -46,7 +46,7 @@ test('axe finds nothing serious in any panel, light or dark', async () => {
   assert.deepEqual(found, []);
 });
 
-test('all that can be done can be reached by Tab', async () => {
+test('every control can be reached by Tab', async () => {
   const palpa = await sharedPage();
   await palpa.tab('view');
   await palpa.page.evaluate(() => /** @type {HTMLElement} */ (document.activeElement)?.blur());
@@ -66,11 +66,11 @@ test('all that can be done can be reached by Tab', async () => {
 test('pictures in both themes, and in Japanese', async () => {
   const palpa = await sharedPage();
   await palpa.have('forearm_lump');
-  // Menus take the focus, and with it the hand: while pictures are taken the motion of the scene presses.
+  // Menus take the focus from the hand, so the motion of the scene presses while pictures are taken.
   await palpa.tab('motion');
   await palpa.by('motion-kind').selectOption('press');
-  await palpa.viewer.running('the motion is a press', (state) => /** @type {any} */ (state.scene).motion.kind === 'press');
-  await palpa.type('motion-hold', '60 s', (state) => /** @type {any} */ (state.scene).motion.hold === '60 s');
+  await palpa.viewer.running('the motion is a press', (state) => sceneOf(state).motion?.kind === 'press');
+  await palpa.type('motion-hold', '60 s', (state) => sceneOf(state).motion?.hold === '60 s');
   await palpa.by('motion-run').click();
   await palpa.reads('a force', ({ newtons }) => newtons > 0.3);
   await saveShot(palpa, 'press');

@@ -18,7 +18,7 @@ const HINT = `no browser was found. Install Chromium (on Debian: apt-get install
 const PACKAGES = ['chromium', 'fonts-ipafont-gothic'];
 
 /** Quiet, and drawing in software: the tests run where there is no graphics card. */
-export const ARGS = [
+const ARGS = [
   '--no-sandbox',
   '--disable-quic',
   '--no-first-run',
@@ -26,7 +26,7 @@ export const ARGS = [
   '--disable-component-update',
   '--disable-sync',
 ];
-export const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
 export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
 
 /** @param {string} path */
@@ -46,7 +46,7 @@ function inPath(name) {
 }
 
 /** Path of a browser, or none. */
-export function findBrowser() {
+function findBrowser() {
   const told = process.env.PALPA_CHROMIUM;
   if (told !== undefined && told !== '') {
     if (!canRun(told)) throw new Error(`PALPA_CHROMIUM=${told} cannot be run`);

@@ -1,4 +1,4 @@
-// The cutaway: what it shows is the slice of what is exported.
+// The cutaway: its section is the slice of the exported body.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -7,7 +7,7 @@ import { until } from './viewer.mjs';
 import { extent, readBody, sliceAreas } from './vtu.mjs';
 
 const AXES = /** @type {const} */ (['x', 'y', 'z']);
-/** Share of the way through the body that is left at both ends. */
+/** Share of the way through the body that the plane leaves out at either end. */
 const MARGIN = 0.002;
 /** ms. */
 const SECTION_WAIT = 20_000;
@@ -26,7 +26,7 @@ function planeAt(body, axis = 0, position = 0.5) {
   return low + (high - low) * (MARGIN + (1 - 2 * MARGIN) * position);
 }
 
-/** How far what is shown is from the slice of what is exported just now. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis */
+/** Compares the shown section with the slice of the body exported now. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis */
 async function compared(palpa, axis) {
   const position = Number(await palpa.by('cutaway-position').inputValue());
   const body = await exported(palpa);

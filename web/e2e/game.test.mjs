@@ -1,4 +1,4 @@
-// Find the lump: hidden, felt, marked, shown.
+// The game: a lump is hidden, felt for, marked and shown.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

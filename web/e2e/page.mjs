@@ -1,16 +1,16 @@
-// The page as a person has it: seen, clicked, typed into.
+// The page as a user has it: seen, clicked, typed into.
 
 import assert from 'node:assert/strict';
 import { LONG, until } from './viewer.mjs';
 
-export const DESKTOP = { width: 1280, height: 720 };
+const DESKTOP = { width: 1280, height: 720 };
 
 /** @typedef {{ newtons: number, tick: number, metres: number }} Readout */
 
 export class PalpaPage {
-  /** What the console complained of. @type {string[]} */
+  /** Errors on the console. @type {string[]} */
   complaints = [];
-  /** Hosts that were asked. @type {Set<string>} */
+  /** Hosts that got requests. @type {Set<string>} */
   hosts = new Set();
 
   /**
@@ -53,13 +53,13 @@ export class PalpaPage {
     return this.page.getByTestId(id);
   }
 
-  /** Until a body is drawn. @returns {Promise<number>} since the page was asked for, ms */
+  /** Waits until a body is drawn. @returns {Promise<number>} ms since the page was requested */
   async drawn() {
     await this.page.waitForFunction(() => document.querySelector('[data-testid=first-body-ms]')?.getAttribute('data-ms') !== '');
     return Number(await this.by('first-body-ms').getAttribute('data-ms'));
   }
 
-  /** Until the page says that the engine runs, and knows as much of it as others do. */
+  /** Waits until the page shows that the engine runs, and has the newest state. */
   async running() {
     const { revision } = await this.viewer.state();
     await this.page.waitForFunction((least) => {
@@ -97,12 +97,12 @@ export class PalpaPage {
     await this.page.mouse.up();
   }
 
-  /** The canvas has the focus, and no place was clicked. */
+  /** Focuses the canvas without a click. */
   async focus() {
     await this.canvas.focus();
   }
 
-  /** What is read, all of one moment. @returns {Promise<Readout>} */
+  /** Force, depth and tick as shown, all of one frame. @returns {Promise<Readout>} */
   readout() {
     return this.page.evaluate(() => {
       const force = /** @type {HTMLElement} */ (document.querySelector('[data-testid=force-number]'));
@@ -122,11 +122,11 @@ export class PalpaPage {
     });
   }
 
-  /** Until the force stands, as it does once the hand is where it goes, and all of it is let through. */
+  /** Waits until the force is steady: the hand is at rest and the force is not reduced. `tolerance` is a share of the force. */
   async steady(tolerance = 0.01) {
     /** @type {Readout[]} */
     let last = [];
-    return until('the force stands', async () => {
+    return until('the force is steady', async () => {
       const now = await this.readout();
       const isHeldBack = (await this.page.locator('.held-back').count()) > 0;
       if (isHeldBack || now.newtons === 0) last = [];
@@ -139,13 +139,34 @@ export class PalpaPage {
     });
   }
 
-  /** No force: nobody presses, and the body is at rest. */
+  /** Waits until nobody presses and the body is at rest. */
   atRest() {
     return this.reads('no force', ({ newtons, metres }) => newtons === 0 && metres < 0);
   }
 
+  /** Reads every frame for so many ticks of the loop and asserts that none has a force. @param {number} ticks */
+  async feelsNothing(ticks) {
+    const { tick: begin } = await this.readout();
+    await this.reads('frames without a force', ({ newtons, tick }) => {
+      assert.equal(newtons, 0, `a force at tick ${tick}`);
+      return tick > begin + ticks;
+    });
+  }
+
+  /** Opens a scene file, given as its text. @param {string} name @param {string | Buffer} text */
+  async openFile(name, text) {
+    await this.tab('scene');
+    await this.by('scene-file').setInputFiles({ name, mimeType: 'text/plain', buffer: Buffer.from(text) });
+  }
+
+  /** Opens a file that is no scene, and waits until its name is in a notice. */
+  async openBrokenFile() {
+    await this.openFile('broken.toml', '[layer');
+    await this.by('toast').filter({ hasText: 'broken.toml' }).first().waitFor();
+  }
+
   /**
-   * Chooses a scene anew, as it is in the gallery.
+   * Loads a scene of the gallery, unchanged.
    * @param {string} key
    */
   async choose(key) {
@@ -158,7 +179,7 @@ export class PalpaPage {
   }
 
   /**
-   * A scene that tests before this one may have pressed, and left as it was.
+   * Loads a scene of the gallery unless it is loaded. Tests leave it as they found it.
    * @param {string} key
    */
   async have(key) {
@@ -179,7 +200,7 @@ export class PalpaPage {
     return state;
   }
 
-  /** What the section's area is said to be, m². */
+  /** Areas of the section as shown, m². */
   async sectionArea() {
     const element = this.by('section-area');
     await element.waitFor();

@@ -1,4 +1,4 @@
-// What is recorded is what was shown, and can be shown again and taken along.
+// Recordings: equal to what was shown, replayed, downloaded.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -7,7 +7,7 @@ import { sharedPage } from './session.mjs';
 import { until } from './viewer.mjs';
 import { readBody } from './vtu.mjs';
 
-/** A slow machine keeps a frame of a recording so often, s. */
+/** Longest time between two frames of a recording on a slow machine, s. */
 const FRAME = 0.4;
 
 /** @param {string} text @returns {{ tick: number, time: number, force: number }[]} */
@@ -32,7 +32,7 @@ async function download(palpa, link) {
   return { name: file.suggestedFilename(), bytes: await readFile(await file.path()) };
 }
 
-test('what was recorded is what was shown, tick by tick, and is shown again', async (t) => {
+test('a recording equals what was shown, tick by tick, and replays', async (t) => {
   const palpa = await sharedPage();
   await palpa.have('block');
   await palpa.atRest();
@@ -116,10 +116,8 @@ test('scene, body and picture can be saved', async () => {
   assert.ok(width > 300 && height > 200 && picture.bytes.length > 10_000, `${width} × ${height}, ${picture.bytes.length} bytes`);
 
   // What was saved can be opened.
-  await palpa.tab('scene');
-  await palpa.by('scene-file').setInputFiles({ name: 'mine.toml', mimeType: 'text/plain', buffer: scene.bytes });
+  await palpa.openFile('mine.toml', scene.bytes);
   await palpa.viewer.running('the saved scene is there', (state) => state.gallery_key == null);
-  await palpa.by('scene-file').setInputFiles({ name: 'broken.toml', mimeType: 'text/plain', buffer: Buffer.from('[layer') });
-  await palpa.page.getByTestId('toast').filter({ hasText: 'broken.toml' }).waitFor();
+  await palpa.openBrokenFile();
   await palpa.choose('block');
 });

@@ -1,4 +1,4 @@
-// What the body is made of, and what presses it, changed while it lies there: on a block, which is built soonest.
+// Tissues, lumps, tool and motion, changed on the page: on the block, which builds fastest.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -6,7 +6,7 @@ import { sharedPage } from './session.mjs';
 import { until } from './viewer.mjs';
 import { extent, readBody } from './vtu.mjs';
 
-/** The force of the same press by keys. @param {import('./page.mjs').PalpaPage} palpa */
+/** Force and depth of a press by keys. @param {import('./page.mjs').PalpaPage} palpa */
 async function forceOfPress(palpa) {
   await palpa.atRest();
   await palpa.focus();
@@ -45,12 +45,10 @@ test('a press that keys hold stays held while a tissue is changed under it', asy
   await palpa.choose('block');
 });
 
-test('a layer is put back to what it was, though a broken file came between', async () => {
+test('reset restores a layer, even after a broken file', async () => {
   const palpa = await sharedPage();
   await palpa.have('block');
-  await palpa.tab('scene');
-  await palpa.by('scene-file').setInputFiles({ name: 'broken.toml', mimeType: 'text/plain', buffer: Buffer.from('[layer') });
-  await palpa.page.getByTestId('toast').filter({ hasText: 'broken.toml' }).first().waitFor();
+  await palpa.openBrokenFile();
   await palpa.tab('tissues');
   await palpa.type('layer-0-young', '20 kPa', ({ layers }) => Math.abs(layers[0].stiffness - 20e3) < 100);
   await palpa.by('layer-0-reset').click();
@@ -58,7 +56,7 @@ test('a layer is put back to what it was, though a broken file came between', as
   await palpa.running();
 });
 
-test('a value that cannot be is refused in words at its field', async () => {
+test('an invalid value is refused with a message at its field', async () => {
   const palpa = await sharedPage();
   await palpa.have('block');
   await palpa.tab('tissues');
@@ -71,7 +69,7 @@ test('a value that cannot be is refused in words at its field', async () => {
   await palpa.by('layer-0-young').press('Escape');
 });
 
-test('a lump is added, seen in the section, and taken away', async () => {
+test('a lump is added, seen in the section, and removed', async () => {
   const palpa = await sharedPage();
   await palpa.have('block');
   await palpa.tab('lumps');

@@ -1,4 +1,4 @@
-// One viewer, one browser and one page that tests share: each of them costs seconds.
+// One viewer, one browser and one page that all tests share, because each of them takes seconds to start.
 
 import { after } from 'node:test';
 import { launch } from './browser.mjs';
@@ -22,11 +22,15 @@ export function sharedBrowser() {
   return browser;
 }
 
-/** The page that controls the shared viewer; nothing is held. */
+/** The page that controls the shared viewer, with nothing held. */
 export async function sharedPage() {
-  page ??= open();
+  // One that failed to open is tried again: the tests after it shall not all fail with its error.
+  page ??= open().catch((error) => {
+    page = undefined;
+    throw error;
+  });
   const palpa = await page;
-  // A test before that failed may hold something.
+  // An earlier test that failed may hold something.
   await palpa.page.mouse.up();
   await palpa.page.keyboard.up('Shift');
   await palpa.page.keyboard.press('Escape');
@@ -40,7 +44,7 @@ async function open() {
   return palpa;
 }
 
-/** Ends the shared page and viewer: a test that has its own needs the cores for them. */
+/** Ends the shared page and viewer, so that a test with its own has the cores. */
 export async function endShared() {
   const [before, served] = [await page, await viewer];
   page = viewer = undefined;

@@ -1,14 +1,14 @@
-// A body is there, and answers to mouse, wheel and keys.
+// A body is drawn, and responds to mouse, wheel and keys.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
 import { LONG, until } from './viewer.mjs';
 
-/** Each a little under a pixel's worth of another: the picture is looked at, not the scene. @param {Buffer} png */
+/** A PNG too large for an empty canvas. @param {Buffer} png */
 const isPicture = (png) => png.subarray(1, 4).toString() === 'PNG' && png.length > 20_000;
 
-test('the page loads, draws a body, and asks nobody else', async (t) => {
+test('the page loads, draws a body, and sends requests to the viewer only', async (t) => {
   const palpa = await sharedPage();
   const ms = await palpa.drawn();
   t.diagnostic(`page to first drawn body: ${ms.toFixed(0)} ms`);
@@ -19,7 +19,7 @@ test('the page loads, draws a body, and asks nobody else', async (t) => {
   assert.deepEqual(palpa.complaints, []);
 });
 
-test('a press with the mouse is felt, and nothing after it', async () => {
+test('a press with the mouse gives a force, and none after it', async () => {
   const palpa = await sharedPage();
   await palpa.atRest();
   await palpa.press();
@@ -92,7 +92,7 @@ test('keys press, step, deepen and lift', async () => {
   // 2.5 mm, of which the hand's spring takes more than a half.
   for (let k = 0; k < 5; k++) await palpa.page.keyboard.press('PageDown');
   await palpa.reads('a greater depth and force', ({ metres, newtons }) => metres > first.metres + 0.8e-3 && newtons > 1.2 * first.newtons);
-  // Deeper than the tissue is: said, and the first step back is one.
+  // At the greatest depth the page says so, and the first step back takes effect.
   for (let k = 0; k < 60; k++) await palpa.page.keyboard.press('PageDown');
   const deepest = palpa.page.getByTestId('deepest');
   await deepest.waitFor({ timeout: LONG });

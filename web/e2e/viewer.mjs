@@ -17,16 +17,16 @@ function binary() {
   return path;
 }
 
-/** How long a slow machine may take for what a person would wait for, ms. */
+/** Time limit of each wait, ms; generous, for slow machines. */
 export const LONG = 120_000;
-/** How long it may take to end when it is asked to, ms. */
+/** Time that the viewer may take to end, ms. */
 const END = 20_000;
 
 /** @param {number} ms */
 export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 /**
- * Waits until something is so, and returns it.
+ * Waits until `look` finds something, and returns it.
  * @template T
  * @param {string} what
  * @param {() => Promise<T | false | null | undefined> | T | false | null | undefined} look
@@ -38,10 +38,13 @@ export async function until(what, look, timeout = LONG) {
   for (;;) {
     const found = await look();
     if (found) return found;
-    if (performance.now() > end) throw new Error(`in ${timeout / 1000} s it did not come that ${what}`);
+    if (performance.now() > end) throw new Error(`not within ${timeout / 1000} s: ${what}`);
     await pause(50);
   }
 }
+
+/** The scene of a state, as its file writes it. @param {import('../src/generated/api').State} state */
+export const sceneOf = (state) => /** @type {import('../src/generated/scene').SceneTable} */ (state.scene);
 
 export class Viewer {
   /** Standard error, for a test that fails. */
@@ -84,17 +87,17 @@ export class Viewer {
     return response;
   }
 
-  /** All of the state. @returns {Promise<import('../src/generated/api').State>} */
+  /** @returns {Promise<import('../src/generated/api').State>} */
   async state() {
     return (await this.get('api/state')).json();
   }
 
-  /** How the engine fares. @returns {Promise<import('../src/generated/api').EngineFigures>} */
+  /** @returns {Promise<import('../src/generated/api').EngineFigures>} */
   async engine() {
     return (await this.get('api/engine')).json();
   }
 
-  /** The body as it is exported; of a new scene there is none for a moment. @returns {Promise<string>} */
+  /** The exported body; a new scene has none for a moment. @returns {Promise<string>} */
   body() {
     return until('there is a body to export', async () => {
       const response = await fetch(new URL('api/body.vtu', this.url));
@@ -102,7 +105,7 @@ export class Viewer {
     });
   }
 
-  /** A request of a program, as a page's own would be; or any text. @param {object | string} request */
+  /** Sends a request, or any text, as a program does. @param {object | string} request */
   async control(request) {
     const response = await fetch(new URL('api/control', this.url), {
       method: 'POST',
@@ -113,7 +116,7 @@ export class Viewer {
   }
 
   /**
-   * Waits for a state of the engine in which it runs.
+   * Waits until the engine runs and its state is as expected.
    * @param {string} what
    * @param {(state: import('../src/generated/api').State) => boolean} isSo
    */

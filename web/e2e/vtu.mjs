@@ -8,7 +8,7 @@
  * @param {string} text
  * @returns {Map<string, ArrayLike<number | bigint>>}
  */
-export function arrays(text) {
+function arrays(text) {
   const found = new Map();
   for (const [, type, name, inside] of text.matchAll(/<DataArray type="(\w+)" Name="([^"]*)"[^>]*>\s*([^<]*)<\/DataArray>/g)) {
     const bytes = Buffer.from(inside.trim(), 'base64');

@@ -1,9 +1,10 @@
-// The connection to the engine: snapshots and messages in, requests out. It comes back by itself when it is lost.
+// The connection to the engine: snapshots and messages in, requests out. It reconnects by itself.
 
 import type { Envelope, Message } from './generated/api';
 import { readSnapshot, type Snapshot } from './generated/wire';
+import { t } from './i18n';
 
-/** What may be asked; an envelope without its number. */
+/** A request: an envelope without its number. */
 export type Request = DistributiveOmit<Envelope, 'id'>;
 type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
 
@@ -11,19 +12,21 @@ export type ConnectionStatus = 'connecting' | 'open' | 'lost';
 
 export interface ConnectionListener {
   onStatus(status: ConnectionStatus): void;
-  /** The engine is there, and does not let this page in: the token is missing or another one. */
+  /** The engine refuses this page: the token is missing or wrong. */
   onRefused(): void;
   onMessage(message: Message): void;
   onSnapshot(snapshot: Snapshot): void;
 }
 
+/** Before a new attempt to connect, ms; doubled after each failure. */
 const FIRST_WAIT = 500;
 const LONGEST_WAIT = 5000;
-/** A connection that says nothing for so long is lost: the engine speaks twice a second. */
+/** Silence after which a connection counts as lost, ms: the engine sends something twice a second. */
 const SILENCE = 6000;
+/** ms. */
 const REPLY_WAIT = 35_000;
 
-/** An address of the engine's, with the token that the page was opened with. */
+/** An address of the engine, with the token of the page's own address. */
 export function apiUrl(path: string): string {
   const token = new URLSearchParams(location.search).get('token');
   return token === null ? path : `${path}?token=${encodeURIComponent(token)}`;
@@ -42,15 +45,15 @@ export class Connection {
     this.open();
   }
 
-  /** Asks, and resolves to why it was refused, or null. */
+  /** Sends a request; resolves to the reason of a refusal, or null. */
   request(request: Request): Promise<string | null> {
     const id = this.nextId++;
     return new Promise((resolve) => {
       if (!this.send({ id, ...request } as Envelope)) {
-        resolve('not connected');
+        resolve(t('connection.not_connected'));
         return;
       }
-      const timer = window.setTimeout(() => this.answer(id, 'no answer'), REPLY_WAIT);
+      const timer = window.setTimeout(() => this.answer(id, t('connection.no_answer', { seconds: REPLY_WAIT / 1000 })), REPLY_WAIT);
       this.waiting.set(id, (error) => {
         window.clearTimeout(timer);
         resolve(error);
@@ -58,7 +61,7 @@ export class Connection {
     });
   }
 
-  /** Asks without waiting for the answer, as for every move of the hand. Says whether it was sent. */
+  /** Sends without waiting for the answer, as every move of the hand does; true if it was sent. */
   send(envelope: Envelope | Request): boolean {
     if (this.socket?.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(envelope));
@@ -97,7 +100,7 @@ export class Connection {
     this.socket = socket;
   }
 
-  /** A WebSocket does not tell why it did not open. */
+  /** Finds out why the WebSocket did not open, which it does not say itself. */
   private async askWhy(): Promise<void> {
     const status = await fetch(apiUrl('api/state'), { method: 'HEAD' }).then((response) => response.status, () => 0);
     if (status === 401 && !this.closed) this.listener.onRefused();
@@ -124,7 +127,7 @@ export class Connection {
     socket.onclose = null;
     socket.close();
     window.clearTimeout(this.silence);
-    for (const id of [...this.waiting.keys()]) this.answer(id, 'the connection was lost');
+    for (const id of [...this.waiting.keys()]) this.answer(id, t('connection.cut_off'));
     this.listener.onStatus('lost');
     this.timer = window.setTimeout(() => this.open(), this.wait);
     this.wait = Math.min(2 * this.wait, LONGEST_WAIT);

@@ -19,7 +19,7 @@ render(<App />, document.getElementById('app')!);
 beginFeedback();
 connect();
 
-// Fields that only the engine can compute are asked for while they are shown, and no longer.
+// The engine computes a field only while a page shows it.
 const shownField = computed(() => state.value?.field);
 effect(() => {
   const field = neededField.value;

@@ -1,18 +1,19 @@
-// What the page knows: signals that panels read, and the way of everything that is asked.
+// The state of the page: signals that panels read, and the functions that send requests.
 
 import { batch, computed, effect, signal } from '@preact/signals';
 import type { EngineFigures, Hello, Message, NoticeLevel, State } from './generated/api';
+import type { SceneTable } from './generated/scene';
 import { SNAPSHOT_VERSION, type FrameSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
 import { Connection, type ConnectionStatus, type Request } from './connection';
-import type { SceneTable } from './ui/scene_table';
+import { t } from './i18n';
 import { History } from './ui/history';
 
 export type Vec3 = [number, number, number];
 
 export const status = signal<ConnectionStatus>('connecting');
-/** Whether it has ever been open: before, "connecting" is no loss. */
+/** Whether the connection has ever been open. */
 export const wasOpen = signal(false);
-/** Whether the engine is there and does not let this page in. */
+/** Whether the engine refuses this page's token. */
 export const isRefused = signal(false);
 export const hello = signal<Hello | null>(null);
 export const state = signal<State | null>(null);
@@ -28,23 +29,24 @@ export const isWatching = computed(
 export const isVersionOther = computed(
   () => hello.value !== null && hello.value.snapshot_version !== SNAPSHOT_VERSION,
 );
-/** A game is on and its truth is not shown: whatever could show a lump must not. */
+/** Whether a game hides lumps: nothing on the page may show them. */
 export const isHiding = computed(() => state.value?.game != null && state.value.game.result == null);
 export const isReplaying = computed(() => state.value?.recording.is_replaying ?? false);
 
-/** A list of things that happened, newest first. */
+/** A notice in the list, newest first. */
 export interface NoticeItem {
   key: number;
   level: NoticeLevel;
   text: string;
   at: Date;
-  /** How often it came one after the other. */
+  /** How often it came in a row. */
   count: number;
 }
 const MOST_NOTICES = 100;
 export const notices = signal<NoticeItem[]>([]);
-/** Those that are shown as toasts, by key. */
+/** Keys of the notices shown as toasts. */
 export const toasts = signal<number[]>([]);
+/** ms. */
 const TOAST_TIME: Record<NoticeLevel, number> = { info: 5000, warning: 8000, error: 14_000 };
 let nextKey = 1;
 
@@ -66,10 +68,10 @@ export function dismissToast(key: number): void {
   if (toasts.value.includes(key)) toasts.value = toasts.value.filter((other) => other !== key);
 }
 
-// Snapshots come up to 60 times a second: they go to those who draw, past the signals.
+// Snapshots come up to 60 times a second. They go to the drawing code directly, not through signals.
 
 export const history = new History();
-export let latestMesh: MeshSnapshot | null = null;
+let latestMesh: MeshSnapshot | null = null;
 export let latestFrame: FrameSnapshot | null = null;
 const meshListeners = new Set<(mesh: MeshSnapshot) => void>();
 const frameListeners = new Set<(frame: FrameSnapshot) => void>();
@@ -97,13 +99,13 @@ function takeSnapshot(snapshot: Snapshot): void {
   }
 }
 
-// The scene as it was chosen, to go back to.
+// The scene as it was loaded, for “Reset”.
 
 export const original = signal<SceneTable | null>(null);
 let originalKey: string | null | undefined;
 let originalRevision: string | null = null;
 
-/** The next scene that comes is one that was chosen, not one that was changed. */
+/** The next scene from the engine is a newly loaded one, not an edited one. */
 function awaitScene(): void {
   originalRevision = JSON.stringify(state.value?.scene ?? null);
 }
@@ -157,40 +159,40 @@ export function connect(): void {
   });
 }
 
-/** Asks; resolves to why it was refused, or null. Nothing is shown: for fields, which show it themselves. */
+/** Sends a request; resolves to the reason of a refusal, or null. Shows nothing: fields show the reason themselves. */
 export async function ask(request: Request): Promise<string | null> {
   const isScene = request.type === 'load_text';
   if (isScene) awaitScene();
-  const error = (await connection?.request(request)) ?? (connection === null ? 'not connected' : null);
-  // What was refused does not come, and the next scene is a changed one again.
+  const error = (await connection?.request(request)) ?? (connection === null ? t('connection.not_connected') : null);
+  // A refused scene does not come.
   if (isScene && error !== null) originalRevision = null;
   return error;
 }
 
-/** Asks, and says in words when it is refused. */
+/** Sends a request, and shows a refusal as a notice. */
 export async function askAloud(request: Request): Promise<boolean> {
   const error = await ask(request);
   if (error !== null) notify('warning', error);
   return error === null;
 }
 
-/** Asks without waiting, as for every move of the hand. */
+/** Sends a request without waiting for its answer. */
 export function send(request: Request): void {
   connection?.send(request);
 }
 
-/** Changes keys of the scene. */
+/** Changes keys of the scene; null as a value removes the key. */
 export function edit(...edits: [path: string, value: unknown][]): Promise<string | null> {
   return ask({ type: 'edit', edits: edits.map(([path, value]) => ({ path, value })) });
 }
 
-/** Changes when the place that the scene presses does, as with another body. */
+/** Changes with the press point of the scene, as when another body is loaded. */
 export const homeKey = computed(() => state.value?.home.point.join());
 
 /** Changes when another body is chosen. */
 export const galleryKey = computed(() => state.value?.gallery_key);
 effect(() => {
-  // What was pressed before says nothing of another scene.
+  // Curves of one scene mean nothing in another.
   void galleryKey.value;
   history.clear();
 });

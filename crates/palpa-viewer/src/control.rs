@@ -220,7 +220,7 @@ pub struct Note {
     pub text: String,
 }
 
-/// All that pages show beside the moving body.
+/// Everything that pages show, except the moving body.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct State {
     /// Grows with every change.
@@ -289,7 +289,7 @@ pub enum Phase {
     /// A body is being built; the one before is still there.
     #[default]
     Building,
-    /// It runs.
+    /// The engine runs.
     Running,
     /// It does not, see [`State::problem`].
     Stopped,
@@ -462,7 +462,7 @@ pub struct FoundLump {
     pub error: Option<f64>,
 }
 
-/// How the engine fares.
+/// Figures of the engine.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct EngineFigures {
     /// Since its start, s.

@@ -7,7 +7,7 @@ use schemars::generate::SchemaSettings;
 use schemars::transform::RecursiveTransform;
 use serde_json::{Value, json};
 
-/// The document.
+/// The `OpenAPI` document, with all types of [`crate::control`].
 pub fn document() -> Value {
     let settings = SchemaSettings::draft2020_12().with(|s| {
         s.definitions_path = "/components/schemas".into();
@@ -17,17 +17,17 @@ pub fn document() -> Value {
     let mut generator = settings.into_generator();
     let state = body(
         &mut generator,
-        "All that pages show beside the moving body.",
+        "Everything that pages show, except the moving body.",
         SchemaGenerator::subschema_for::<State>,
     );
     let engine = body(
         &mut generator,
-        "How the engine fares.",
+        "Figures of the engine.",
         SchemaGenerator::subschema_for::<EngineFigures>,
     );
     let reply = body(
         &mut generator,
-        "The answer; refusals come with 409.",
+        "The answer. A refusal has status 409.",
         SchemaGenerator::subschema_for::<Reply>,
     );
     let envelope = generator.subschema_for::<Envelope>();
@@ -35,8 +35,8 @@ pub fn document() -> Value {
     let file = |summary: &str, kind: &str, description: &str| {
         json!({ "get": { "summary": summary, "responses": {
             "200": { "description": description, "content": { kind: {} } },
-            "404": { "description": "There is none yet." },
-            "500": { "description": "It cannot be made; the text says why." },
+            "404": { "description": "There is no such file yet." },
+            "500": { "description": "The file cannot be made. The text says why." },
             "503": { "description": "Too many files are being made." } } } })
     };
     json!({
@@ -45,8 +45,9 @@ pub fn document() -> Value {
             "title": "Palpa viewer",
             "version": env!("CARGO_PKG_VERSION"),
             "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
-            "description": "What a page, or a program in its place, asks of `palpa view` and is told. Where the server was started with \
-                a token, every request carries it (401 without): `Authorization: Bearer …`, or `?token=…` for what is only read, as downloads and the WebSocket.",
+            "description": "Requests and answers of `palpa view`, for pages and programs. If the server was started with a token, every \
+                request must carry it: as `Authorization: Bearer …`, or as `?token=…` for downloads and the WebSocket. \
+                Without it the answer is 401.",
         },
         "components": {
             "schemas": generator.take_definitions(true),
@@ -55,40 +56,41 @@ pub fn document() -> Value {
         "security": [{}, { "token": [] }],
         "paths": {
             "/api/control": { "post": {
-                "summary": "Asks for something",
-                "description": "As over the WebSocket, but on behalf of a program: refused while a page controls, unless the request is \
-                    `take_control`; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.",
+                "summary": "Send a request",
+                "description": "The same requests as over the WebSocket. They are refused while a page is in control, unless the request is \
+                    `take_control`. Pages then watch until one of them takes control. Limits: 1 MiB a request, 200 requests a second.",
                 "requestBody": { "required": true, "content": { "application/json": { "schema": envelope } } },
                 "responses": {
                     "200": reply.clone(),
-                    "400": { "description": "It cannot be understood; the reply says where." },
+                    "400": { "description": "The request cannot be parsed. The reply says where." },
                     "409": reply,
-                    "413": { "description": "It is longer than 1 MiB." },
-                    "415": { "description": "It is not called application/json." },
+                    "413": { "description": "The request is longer than 1 MiB." },
+                    "415": { "description": "The content type is not application/json." },
                     "429": { "description": "Too many requests." },
-                    "504": { "description": "The engine gave no answer." },
+                    "504": { "description": "The engine gave no answer within 30 s." },
                 },
             } },
-            "/api/state": { "get": { "summary": "The state", "responses": { "200": state, "503": { "description": "The engine starts." } } } },
-            "/api/engine": { "get": { "summary": "The engine's figures", "responses": { "200": engine, "503": { "description": "The engine starts." } } } },
-            "/api/scene.toml": file("The scene, as a scene file", "application/toml", "The scene with every default written out."),
-            "/api/body.vtu": file("The body as it is pressed now", "application/xml", "For ParaView and other readers of VTK files."),
-            "/api/recording.mcap": file("The recording", "application/octet-stream", "What `palpa replay` reads."),
-            "/api/recording.csv": file("The recording's ticks", "text/csv", "A row per tick of the 1 kHz loop."),
+            "/api/state": { "get": { "summary": "The state", "responses": { "200": state, "503": { "description": "The engine is starting." } } } },
+            "/api/engine": { "get": { "summary": "The engine's figures", "responses": { "200": engine, "503": { "description": "The engine is starting." } } } },
+            "/api/scene.toml": file("The scene file", "application/toml", "The scene with all defaults written out."),
+            "/api/body.vtu": file("The deformed body", "application/xml", "For ParaView and other readers of VTK files."),
+            "/api/recording.mcap": file("The recording", "application/octet-stream", "A log for `palpa replay`."),
+            "/api/recording.csv": file("The ticks of the recording", "text/csv", "One row for each tick of the 1 kHz loop."),
             "/ws": { "get": {
                 "summary": "The WebSocket",
-                "description": "Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in \
-                    `crates/palpa-viewer/src/wire.rs`. The first who connects controls, the others watch until they take control. A client that \
-                    is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), asks more than 200 times a \
-                    second (400 at once) or is not understood 20 times in a row is let go, with the reason.",
+                "description": "Text messages are `Message` from the server and `Envelope` from the client. Binary messages are snapshots; \
+                    `crates/palpa-viewer/src/wire.rs` defines their layout. The first client to connect is in control, the others watch \
+                    until they take control. A slow client misses frames. The server closes a connection, with the reason, if the client \
+                    reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), sends more than 200 requests a second (400 at \
+                    once), or sends 20 requests in a row that cannot be parsed.",
                 "parameters": [{ "name": "token", "in": "query", "schema": { "type": "string" } }],
                 "responses": {
                     "101": { "description": "A WebSocket." },
-                    "403": { "description": "It is asked from a page of another place." },
-                    "503": { "description": "32 are connected, which is the most." },
+                    "403": { "description": "The request comes from a page of another origin." },
+                    "503": { "description": "32 clients are connected, which is the limit." },
                 },
             } },
-            "/healthz": { "get": { "summary": "Whether it runs", "responses": { "200": { "description": "It runs." }, "503": { "description": "The engine stands; the text says why." } } } },
+            "/healthz": { "get": { "summary": "Health check", "responses": { "200": { "description": "The engine runs." }, "503": { "description": "The engine has stopped. The text says why." } } } },
             "/metrics": { "get": { "summary": "Figures for Prometheus", "responses": { "200": { "description": "Text format 0.0.4." } } } },
         },
     })
@@ -103,7 +105,7 @@ fn body(
     json!({ "description": description, "content": { "application/json": { "schema": schema } } })
 }
 
-/// Puts a reference and what stands beside it side by side: tools of `OpenAPI` forget what stands beside a reference.
+/// Moves the keys beside a reference into an `allOf`: `OpenAPI` tools ignore keys beside a reference.
 fn apart(schema: &mut Schema) {
     let Some(object) = schema.as_object_mut() else {
         return;

@@ -81,7 +81,7 @@ async fn socket(
         Ok(upgrade) => upgrade,
         Err(why) => {
             let why =
-                format!("here is a WebSocket: {why}; /api says what can be asked otherwise\n");
+                format!("This endpoint is a WebSocket: {why}. See /api for the other endpoints.\n");
             return (
                 StatusCode::UPGRADE_REQUIRED,
                 [(header::UPGRADE, "websocket")],

@@ -11,7 +11,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The body as it is pressed now */
+        /** The deformed body */
         get: {
             parameters: {
                 query?: never;
@@ -30,14 +30,14 @@ export interface paths {
                         "application/xml": unknown;
                     };
                 };
-                /** @description There is none yet. */
+                /** @description There is no such file yet. */
                 404: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description It cannot be made; the text says why. */
+                /** @description The file cannot be made. The text says why. */
                 500: {
                     headers: {
                         [name: string]: unknown;
@@ -71,8 +71,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Asks for something
-         * @description As over the WebSocket, but on behalf of a program: refused while a page controls, unless the request is `take_control`; then pages watch until one of them takes control. At most 1 MiB, and 200 requests a second.
+         * Send a request
+         * @description The same requests as over the WebSocket. They are refused while a page is in control, unless the request is `take_control`. Pages then watch until one of them takes control. Limits: 1 MiB a request, 200 requests a second.
          */
         post: {
             parameters: {
@@ -87,7 +87,7 @@ export interface paths {
                 };
             };
             responses: {
-                /** @description The answer; refusals come with 409. */
+                /** @description The answer. A refusal has status 409. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -96,14 +96,14 @@ export interface paths {
                         "application/json": components["schemas"]["Reply"];
                     };
                 };
-                /** @description It cannot be understood; the reply says where. */
+                /** @description The request cannot be parsed. The reply says where. */
                 400: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description The answer; refusals come with 409. */
+                /** @description The answer. A refusal has status 409. */
                 409: {
                     headers: {
                         [name: string]: unknown;
@@ -112,14 +112,14 @@ export interface paths {
                         "application/json": components["schemas"]["Reply"];
                     };
                 };
-                /** @description It is longer than 1 MiB. */
+                /** @description The request is longer than 1 MiB. */
                 413: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description It is not called application/json. */
+                /** @description The content type is not application/json. */
                 415: {
                     headers: {
                         [name: string]: unknown;
@@ -133,7 +133,7 @@ export interface paths {
                     };
                     content?: never;
                 };
-                /** @description The engine gave no answer. */
+                /** @description The engine gave no answer within 30 s. */
                 504: {
                     headers: {
                         [name: string]: unknown;
@@ -165,7 +165,7 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description How the engine fares. */
+                /** @description Figures of the engine. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -174,7 +174,7 @@ export interface paths {
                         "application/json": components["schemas"]["EngineFigures"];
                     };
                 };
-                /** @description The engine starts. */
+                /** @description The engine is starting. */
                 503: {
                     headers: {
                         [name: string]: unknown;
@@ -198,7 +198,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The recording's ticks */
+        /** The ticks of the recording */
         get: {
             parameters: {
                 query?: never;
@@ -208,7 +208,7 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description A row per tick of the 1 kHz loop. */
+                /** @description One row for each tick of the 1 kHz loop. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -217,14 +217,14 @@ export interface paths {
                         "text/csv": unknown;
                     };
                 };
-                /** @description There is none yet. */
+                /** @description There is no such file yet. */
                 404: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description It cannot be made; the text says why. */
+                /** @description The file cannot be made. The text says why. */
                 500: {
                     headers: {
                         [name: string]: unknown;
@@ -265,7 +265,7 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description What `palpa replay` reads. */
+                /** @description A log for `palpa replay`. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -274,14 +274,14 @@ export interface paths {
                         "application/octet-stream": unknown;
                     };
                 };
-                /** @description There is none yet. */
+                /** @description There is no such file yet. */
                 404: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description It cannot be made; the text says why. */
+                /** @description The file cannot be made. The text says why. */
                 500: {
                     headers: {
                         [name: string]: unknown;
@@ -312,7 +312,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The scene, as a scene file */
+        /** The scene file */
         get: {
             parameters: {
                 query?: never;
@@ -322,7 +322,7 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description The scene with every default written out. */
+                /** @description The scene with all defaults written out. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -331,14 +331,14 @@ export interface paths {
                         "application/toml": unknown;
                     };
                 };
-                /** @description There is none yet. */
+                /** @description There is no such file yet. */
                 404: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description It cannot be made; the text says why. */
+                /** @description The file cannot be made. The text says why. */
                 500: {
                     headers: {
                         [name: string]: unknown;
@@ -379,7 +379,7 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description All that pages show beside the moving body. */
+                /** @description Everything that pages show, except the moving body. */
                 200: {
                     headers: {
                         [name: string]: unknown;
@@ -388,7 +388,7 @@ export interface paths {
                         "application/json": components["schemas"]["State"];
                     };
                 };
-                /** @description The engine starts. */
+                /** @description The engine is starting. */
                 503: {
                     headers: {
                         [name: string]: unknown;
@@ -412,7 +412,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Whether it runs */
+        /** Health check */
         get: {
             parameters: {
                 query?: never;
@@ -422,14 +422,14 @@ export interface paths {
             };
             requestBody?: never;
             responses: {
-                /** @description It runs. */
+                /** @description The engine runs. */
                 200: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description The engine stands; the text says why. */
+                /** @description The engine has stopped. The text says why. */
                 503: {
                     headers: {
                         [name: string]: unknown;
@@ -489,7 +489,7 @@ export interface paths {
         };
         /**
          * The WebSocket
-         * @description Text is a Message from the server and an Envelope from the page; bytes are snapshots, whose layout is in `crates/palpa-viewer/src/wire.rs`. The first who connects controls, the others watch until they take control. A client that is slow misses frames; one that reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), asks more than 200 times a second (400 at once) or is not understood 20 times in a row is let go, with the reason.
+         * @description Text messages are `Message` from the server and `Envelope` from the client. Binary messages are snapshots; `crates/palpa-viewer/src/wire.rs` defines their layout. The first client to connect is in control, the others watch until they take control. A slow client misses frames. The server closes a connection, with the reason, if the client reads nothing for 10 s, is silent for 14 s (pings go out every 4 s), sends more than 200 requests a second (400 at once), or sends 20 requests in a row that cannot be parsed.
          */
         get: {
             parameters: {
@@ -509,14 +509,14 @@ export interface paths {
                     };
                     content?: never;
                 };
-                /** @description It is asked from a page of another place. */
+                /** @description The request comes from a page of another origin. */
                 403: {
                     headers: {
                         [name: string]: unknown;
                     };
                     content?: never;
                 };
-                /** @description 32 are connected, which is the most. */
+                /** @description 32 clients are connected, which is the limit. */
                 503: {
                     headers: {
                         [name: string]: unknown;
@@ -547,7 +547,7 @@ export interface components {
              */
             value: unknown;
         };
-        /** @description How the engine fares. */
+        /** @description Figures of the engine. */
         EngineFigures: {
             /**
              * Format: double
@@ -927,6 +927,17 @@ export interface components {
         });
         /** @description How the body answers. */
         Method: "tissue" | "reference";
+        /** @description Something to know about the scene: its kind, and the names and numbers in it. */
+        Note: {
+            /** @description The kind of note. Pages have words for each kind in each of their languages. */
+            kind: string;
+            /** @description The note in English, for clients without words of their own. */
+            text: string;
+            /** @description Names and numbers, in SI units. */
+            values: {
+                [key: string]: unknown;
+            };
+        };
         /** @description Something that happened. */
         Notice: {
             /** @description How grave it is. */
@@ -962,7 +973,7 @@ export interface components {
              */
             id?: number | null;
         };
-        /** @description All that pages show beside the moving body. */
+        /** @description Everything that pages show, except the moving body. */
         State: {
             /** @description Whether faults on purpose are allowed. */
             allows_faults: boolean;
@@ -1010,7 +1021,7 @@ export interface components {
              */
             n_nodes: number;
             /** @description What a user should know of the scene. */
-            notes: string[];
+            notes: components["schemas"]["Note"][];
             /** @description What the engine does. */
             phase: components["schemas"]["Phase"];
             /** @description Why the last scene could not be built, or the engine stopped. */
@@ -1120,6 +1131,7 @@ export type LumpForm = components['schemas']['LumpForm'];
 export type LumpInfo = components['schemas']['LumpInfo'];
 export type Message = components['schemas']['Message'];
 export type Method = components['schemas']['Method'];
+export type Note = components['schemas']['Note'];
 export type Notice = components['schemas']['Notice'];
 export type NoticeLevel = components['schemas']['NoticeLevel'];
 export type Phase = components['schemas']['Phase'];

@@ -1,4 +1,4 @@
-// A body as it is drawn: its nodes at rest and as they lie now, the normals of its levels, its open rims.
+// A body as it is drawn: its nodes at rest and deformed, the normals of its levels, its open rims.
 
 import { Box3, Vector3 } from 'three';
 import type { FrameSnapshot, MeshSnapshot } from '../generated/wire';
@@ -13,21 +13,21 @@ export class Body {
   /** Nodes, node-major; node (v, l) is v * nLevels + l. */
   readonly rest: Float32Array;
   readonly positions: Float32Array;
-  /** Of the levels that were asked for last. */
+  /** Normals of nodes, three numbers each; only those of the levels last updated are current. */
   readonly normals: Float32Array;
-  /** Of the skin at rest, by vertex. */
+  /** Normals of the skin at rest, three numbers a vertex. */
   readonly restNormals: Float32Array;
   readonly triangles: Uint32Array;
   readonly intervalLayer: Uint8Array;
   /** The level at which each layer begins. */
   readonly layerStart: number[];
-  /** Edges of one triangle only, two vertices each, turned as in their triangle. */
+  /** Rim edges, which belong to one triangle only: two vertices each, in the triangle's order. */
   readonly rimEdges: Uint32Array;
-  /** Of each triangle: bit e when its edge from corner e is on a rim. */
+  /** For each triangle, bit e is set if its edge from corner e is on a rim. */
   readonly rimBits: Uint8Array;
-  /** The surface that holds the deepest level, closed over the rims: nodes, three each. */
+  /** Triangles of the deepest level, closed over the rims: three nodes each. */
   readonly coreTriangles: Uint32Array;
-  /** How many of its triangles lie under the skin; those after close it. */
+  /** Number of core triangles under the skin; those after them close the rims. */
   readonly nCoreSides: number;
   readonly stiffness: Float32Array;
   readonly bonePositions: Float32Array;
@@ -74,7 +74,7 @@ export class Body {
     this.radius = 0.5 * this.box.getSize(new Vector3()).length();
   }
 
-  /** Moves the nodes to where they are in a frame. */
+  /** Moves the nodes to their places in a frame. */
   deform(frame: Pick<FrameSnapshot, 'displacements' | 'displacement_unit'>): void {
     const { displacements, displacement_unit: unit } = frame;
     const n = Math.min(displacements.length, this.positions.length);

@@ -1,30 +1,22 @@
-// Values at nodes and prisms by which a body is coloured, and the range and legend of their map.
+// The values of nodes by which a body is coloured, and the range and legend of their map.
 
 import type { LayerInfo } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
 import type { Body } from './body';
-import type { ColourBy, Legend } from './options';
-import { layerColours, mapStops, type MapName } from './palette';
+import type { Legend } from './options';
+import { layerColours, mapOf } from './palette';
+import { QUANTITIES, type ColourBy, type Quantity } from './quantities';
 
-const FIELD_NUMBER: Partial<Record<ColourBy, number>> = { von_mises: 1, pressure: 2, stretch: 3 };
-/** In which an automatic range comes down to a half, s. */
+/** The time in which an automatic range shrinks by a half, s. */
 const HALF_LIFE = 3;
-/** Ranges are not automatically smaller: below lie noise and the quantum of the wire. */
-const LEAST_SPAN: Record<string, number> = { displacement: 5e-4, von_mises: 50, pressure: 50, stretch: 0.01 };
-/** Above lie single nodes at edges of the contact, which would darken all else. */
+/** Share of the nodes that an automatic range covers: single nodes at edges of the contact would darken all else. */
 const SHARE = 0.995;
 
-/** How a quantity is mapped. */
-export function mapFor(by: ColourBy): MapName {
-  return by === 'pressure' ? 'vik' : by === 'stiffness' ? 'cividis' : 'ylgnbu';
-}
-
 export class Colouring {
-  /** Of the legend, SI. */
-  min = 0;
-  max = 1;
+  /** The range of the legend, SI. */
+  private min = 0;
+  private max = 1;
   isLog = false;
-  readonly prisms: Float32Array | null = null;
   private stiffnessNodes: Float32Array | null = null;
   private stiffnessOf: Body | null = null;
   private high = 0;
@@ -33,37 +25,29 @@ export class Colouring {
   private since = 0;
 
   /** Whether surfaces are coloured by a map. */
-  static isMap(by: ColourBy): boolean {
+  static isMap(by: ColourBy): by is Quantity {
     return by !== 'tissue' && by !== 'layer';
   }
 
-  /** Writes the nodes' values; false when there is nothing to show yet. */
-  nodes(body: Body, by: ColourBy, frame: FrameSnapshot | null, out: Float32Array): boolean {
+  /** Writes the nodes' values, SI: those at rest while there are no others. */
+  nodes(body: Body, by: Quantity, frame: FrameSnapshot | null, out: Float32Array): void {
+    const { field, rest } = QUANTITIES[by];
     if (by === 'stiffness') {
       out.set(this.nodalStiffness(body));
-      return true;
-    }
-    if (by === 'displacement') {
-      if (!frame) {
-        out.fill(0);
-        return true;
-      }
+    } else if (by === 'displacement' && frame) {
       const { displacements: d, displacement_unit: unit } = frame;
       for (let i = 0; i < out.length; i++) out[i] = unit * Math.sqrt(d[3 * i] * d[3 * i] + d[3 * i + 1] * d[3 * i + 1] + d[3 * i + 2] * d[3 * i + 2]);
-      return true;
+    } else if (field && frame && frame.field === field.number && frame.field_values.length === out.length) {
+      const scale = (frame.field_max - frame.field_min) / 65535;
+      const values = frame.field_values;
+      for (let i = 0; i < out.length; i++) out[i] = frame.field_min + scale * values[i];
+    } else {
+      out.fill(rest);
     }
-    if (!frame || frame.field !== FIELD_NUMBER[by] || frame.field_values.length !== out.length) {
-      out.fill(by === 'stretch' ? 1 : 0);
-      return false;
-    }
-    const scale = (frame.field_max - frame.field_min) / 65535;
-    const values = frame.field_values;
-    for (let i = 0; i < out.length; i++) out[i] = frame.field_min + scale * values[i];
-    return true;
   }
 
-  /** The range for these values; `time` in s. */
-  updateRange(body: Body, by: ColourBy, fixed: [number, number] | null, values: Float32Array, time: number): void {
+  /** Sets the range for these values; `time` in s. */
+  updateRange(body: Body, by: Quantity, fixed: [number, number] | null, values: Float32Array, time: number): void {
     if (by !== this.by) {
       this.by = by;
       this.high = this.low = 0;
@@ -71,6 +55,7 @@ export class Colouring {
     const fade = 0.5 ** (Math.max(0, time - this.since) / HALF_LIFE);
     this.since = time;
     this.isLog = false;
+    const { rest: base, leastSpan } = QUANTITIES[by];
     if (by === 'stiffness') {
       const [low, high] = extremes(body.stiffness);
       this.isLog = low > 0 && high > 10 * low;
@@ -78,12 +63,11 @@ export class Colouring {
     } else if (fixed) {
       [this.min, this.max] = fixed;
     } else if (by === 'displacement') {
-      this.high = Math.max(extremes(values)[1], this.high * fade, LEAST_SPAN[by]);
+      this.high = Math.max(extremes(values)[1], this.high * fade, leastSpan);
       [this.min, this.max] = [0, niceUp(this.high)];
     } else {
-      const base = by === 'stretch' ? 1 : 0;
       const [low, high] = quantiles(values, SHARE);
-      this.high = Math.max(high - base, this.high * fade, LEAST_SPAN[by]);
+      this.high = Math.max(high - base, this.high * fade, leastSpan);
       this.low = Math.max(base - low, this.low * fade, 0);
       if (by === 'pressure') {
         // Signed: both sides alike, so that the map's middle is zero.
@@ -95,7 +79,7 @@ export class Colouring {
     }
   }
 
-  /** For the shader: in decades when logarithmic. */
+  /** The range for the shader: decimal logarithms if `isLog`. */
   get range(): [number, number] {
     return this.isLog ? [Math.log10(this.min), Math.log10(this.max)] : [this.min, this.max];
   }
@@ -106,11 +90,12 @@ export class Colouring {
       const colours = layerColours(layers);
       return { title: by, unit: '', min: 0, max: 1, stops: colours, categories: layers.map(({ name }, i) => ({ name, colour: colours[i] })) };
     }
-    const unit = by === 'displacement' ? 'm' : by === 'stretch' ? '' : by === 'stiffness' && isReference ? 'N/m' : 'Pa';
-    return { title: by, unit, min: this.min, max: this.max, isLog: this.isLog, stops: mapStops(mapFor(by)) };
+    // The bars of the reference method have a stiffness of their own.
+    const unit = by === 'stiffness' && isReference ? 'N/m' : QUANTITIES[by].unit;
+    return { title: by, unit, min: this.min, max: this.max, isLog: this.isLog, stops: mapOf(by).stops };
   }
 
-  /** Stiffness of nodes: the mean of the prisms round them. */
+  /** Stiffness of nodes: the mean over the prisms around them. */
   private nodalStiffness(body: Body): Float32Array {
     if (this.stiffnessOf === body && this.stiffnessNodes) return this.stiffnessNodes;
     const { triangles, nLevels, stiffness, nNodes } = body;
@@ -141,7 +126,7 @@ function extremes(values: Float32Array): [number, number] {
   return low <= high ? [low, high] : [0, 0];
 }
 
-/** Between which all but the rest of `share` lies on each side, by a histogram. */
+/** Limits within which `share` of the values lie, counted from either side; by a histogram. */
 function quantiles(values: Float32Array, share: number): [number, number] {
   const [low, high] = extremes(values);
   if (high <= low) return [low, high];
@@ -156,7 +141,7 @@ function quantiles(values: Float32Array, share: number): [number, number] {
   return [low + i / scale, low + (k + 1) / scale];
 }
 
-/** The next number that reads well, so that legends stand still. */
+/** The next round number, so that legends change rarely. */
 function niceUp(x: number): number {
   const decade = 10 ** Math.floor(Math.log10(x));
   const step = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((s) => s * decade >= x * 0.9999) ?? 10;

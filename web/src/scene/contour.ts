@@ -1,4 +1,4 @@
-// Where a plane cuts a closed surface: loops, and what they enclose.
+// Cuts of closed surfaces by a plane: loops, and the areas they enclose.
 
 import { ShapeUtils, Vector2 } from 'three';
 
@@ -25,7 +25,7 @@ export function contourLoops(positions: Float32Array, triangles: Uint32Array, pl
   for (let i = 0; i < nNodes; i++) {
     height[i] = nx * positions[3 * i] + ny * positions[3 * i + 1] + nz * positions[3 * i + 2] - plane.offset;
   }
-  // Every point of the contour lies on an edge of the surface, by which its two segments find each other.
+  // Every point of the contour lies on an edge of the surface, which joins its two segments.
   const points = new Map<number, number[]>();
   const links = new Map<number, number[]>();
   const cross = (a: number, b: number): number => {
@@ -58,7 +58,7 @@ export function contourLoops(positions: Float32Array, triangles: Uint32Array, pl
     }
     if (loop.length >= 9) loops.push(loop);
   };
-  // Ends first, so that an open chain is walked from end to end.
+  // Ends first, so that an open chain is followed from end to end.
   for (const [key, to] of links) if (to.length === 1 && !seen.has(key)) walk(key);
   for (const key of links.keys()) if (!seen.has(key)) walk(key);
   return loops;

@@ -1,23 +1,23 @@
-// Where the cutaway plane lies, which side of it stays, and its frame.
+// Geometry of the cutaway: its plane, the side that stays, and its frame.
 
 import { Plane, Vector3, type Box3 } from 'three';
 import { planeAxes, type CutPlane } from './contour';
 import type { ViewOptions } from './options';
 
 export interface Cut {
-  /** Its normal points into what stays. */
+  /** The normal points to the side that stays. */
   plane: CutPlane;
-  /** Growing positions go along this way, m, from 0 to 1. */
+  /** Way of the plane from position 0 to 1, m. */
   way: Vector3;
-  /** Corners of the frame round the body, in the plane. */
+  /** Corners of the frame around the body, in the plane, m. */
   corners: Vector3[];
-  /** Where the frame's sides have their middles. */
+  /** Middles of the frame's sides, m. */
   middles: Vector3[];
 }
 
-/** Unless flipped, what lies towards home is taken away. */
+/** Directions to the side that stays unless flipped: the side towards home is removed. */
 const STAYS = { x: new Vector3(1, 0, 0), y: new Vector3(0, 1, 0), z: new Vector3(0, 0, -1) };
-/** Of the way, left at both ends, so that a plane at the end does not lie in a face of the body. */
+/** Share of the way left out at both ends, so that the plane never lies in a face of the body. */
 const MARGIN = 0.002;
 
 export function cutOf({ axis, position, flip }: ViewOptions['cutaway'], box: Box3, forward: Vector3): Cut {
@@ -43,7 +43,7 @@ export function cutOf({ axis, position, flip }: ViewOptions['cutaway'], box: Box
   };
 }
 
-/** As three clips: keeps what is on the normal's side. */
+/** The plane for three.js, which keeps the side of the normal. */
 export function clippingPlane({ normal, offset }: CutPlane, into: Plane): Plane {
   into.normal.set(...normal);
   into.constant = -offset;

@@ -1,8 +1,8 @@
-// Turning, moving and zooming the picture by mouse and fingers. A hand that presses may claim what begins on the body.
+// Rotating, moving and zooming the view by mouse and fingers. The hand may claim gestures that begin on the body.
 
 import type { CameraRig } from './rig';
 
-/** Who may take pointers and the wheel before the camera does. */
+/** Takes pointers and the wheel before the camera does. */
 export interface Claims {
   /** A pointer goes down; true when it is the hand's until it comes up. */
   press(event: PointerEvent): boolean;
@@ -85,7 +85,7 @@ export class Gestures {
   }
 }
 
-/** Notches of a wheel, or the like of a touchpad. */
+/** Notches of a wheel, or an equal movement on a touchpad. */
 export function wheelSteps(event: WheelEvent): number {
   const pixels = event.deltaY * (event.deltaMode === 1 ? 33 : event.deltaMode === 2 ? 400 : 1);
   return Math.max(-3, Math.min(3, pixels / 100));

@@ -2,5 +2,5 @@
 
 export { BodyView } from './view';
 export { DEFAULT_OPTIONS, NoWebGL2 } from './options';
-export type { ColourBy, Legend, Picked, SectionArea, Vec3, ViewOptions } from './options';
-export { BONE, LUMP, layerColours } from './palette';
+export type { Legend, Picked, SectionArea, Vec3, ViewOptions } from './options';
+export { COLOURINGS, quantityOf, type ColourBy } from './quantities';

@@ -1,4 +1,4 @@
-// Lines as wide as is asked for, in pixels.
+// Lines of a given width in pixels.
 
 import { BufferAttribute, Color, DynamicDrawUsage, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, ShaderMaterial, Vector2 } from 'three';
 
@@ -60,7 +60,7 @@ export class Lines extends Mesh<InstancedBufferGeometry, ShaderMaterial> {
   show(segments: Float32Array, length: number): void {
     const n = length / 6;
     if (n > this.capacity) {
-      // A new buffer on the GPU needs a new geometry: the old one is given back.
+      // A new buffer needs a new geometry, and the old one is freed.
       const position = this.geometry.getAttribute('position'), index = this.geometry.index;
       this.geometry.dispose();
       this.geometry = new InstancedBufferGeometry();

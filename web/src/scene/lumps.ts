@@ -1,4 +1,4 @@
-// Lumps as bodies of their own, where layers let them be seen, moved by the tissue round them; and their part of a section.
+// Lumps: their surfaces, moved by the tissue around them, and their area in a section.
 
 import { BufferAttribute, BufferGeometry, CapsuleGeometry, FrontSide, Group, Matrix4, Mesh, SphereGeometry, Vector3, type Plane } from 'three';
 import type { LumpInfo } from '../generated/api';
@@ -20,7 +20,7 @@ export class LumpsView {
     this.material = new SurfaceMaterial(shared, stage.light, planes);
   }
 
-  /** The truth of a game is seen through all that lies over it. */
+  /** `isTruth`: the lumps of a game's result, which are drawn over everything else. */
   set(lumps: LumpInfo[], body: Body, colour: string, isTruth: boolean): void {
     const key = `${body.id} ${isTruth} ${JSON.stringify(lumps)}`;
     if (key === this.key) return;
@@ -87,7 +87,7 @@ function shape({ shape: form, axes, centre }: LumpInfo): BufferGeometry {
   return geometry.applyMatrix4(new Matrix4().makeBasis(a, b, c).setPosition(...(centre as [number, number, number])));
 }
 
-/** In which tetrahedron of the body at rest each point lies, and its shares of the corners. Points outside stay where they are. */
+/** Finds the tetrahedron of the body at rest around each point, and the point's shares of its corners. Points outside get none. */
 function locate(body: Body, points: Float32Array, nodes: Int32Array, shares: Float32Array): void {
   const { rest: x, triangles, nLevels } = body;
   const n = points.length / 3;
@@ -158,7 +158,7 @@ function outside({ shape: form, centre, axes }: LumpInfo, x: number, y: number, 
   return (Math.hypot(p[0] / r[0], p[1] / r[1], p[2] / r[2]) - 1) * Math.min(...r);
 }
 
-/** m² of the section that lie in lumps. */
+/** Area of the section that lies in lumps, m². */
 export function lumpArea(section: Section, lumps: LumpInfo[]): number {
   if (lumps.length === 0) return 0;
   const { positions: { data: x }, rest: { data: r }, indices } = section;
@@ -179,7 +179,7 @@ export function lumpArea(section: Section, lumps: LumpInfo[]): number {
   return sum;
 }
 
-/** Which share of a triangle lies in a lump: by points at the middles of its 64 equal parts. */
+/** Share of a triangle that lies in a lump, sampled at the middles of its 64 equal parts. */
 function shareInside(lump: LumpInfo, r: Float32Array, a: number, b: number, c: number): number {
   const n = 8;
   let inside = 0;

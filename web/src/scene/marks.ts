@@ -1,4 +1,4 @@
-// What a game leaves on the skin: numbered pins, and where it was pressed how hard.
+// Marks of a game on the skin: numbered pins, and dots coloured by the force pressed there.
 
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Points, ShaderMaterial, SphereGeometry, Sprite,
@@ -130,7 +130,7 @@ export class MarksView {
     }
   }
 
-  /** As large on the screen at any distance; `pixel` in metres. */
+  /** Keeps the size on the screen at any distance; `pixel` is a pixel's size, m. */
   scale(pixel: number): void {
     for (const { object } of this.pins) {
       const [stem, head, label] = object.children;

@@ -1,18 +1,25 @@
-// What can be chosen about the view, and what it tells.
+// The options of the view, and the types of what it reports.
+
+import type { ColourBy } from './quantities';
 
 export type Vec3 = [number, number, number];
 
-export type ColourBy = 'tissue' | 'layer' | 'displacement' | 'von_mises' | 'pressure' | 'stretch' | 'stiffness';
+/** Names for screen readers. */
+export interface ViewWords {
+  canvas: string;
+  plane: string;
+}
 
 export interface ViewOptions {
+  words: ViewWords;
   theme: 'light' | 'dark';
   colourBy: ColourBy;
-  /** Of the colour map, SI; null = automatic: grows at once, shrinks slowly. */
+  /** Range of the colour map, SI; null is automatic: it grows at once and shrinks slowly. */
   range: [number, number] | null;
-  /** From the skin down; missing = visible, 1. */
+  /** From the skin down; a missing one is visible and opaque. */
   layers: { visible: boolean; opacity: number }[];
   bones: boolean;
-  /** Shown where they are seen: in the section, or through transparent layers. */
+  /** In the section, and through transparent layers. */
   lumps: boolean;
   /** Edges of prisms. */
   wireframe: boolean;
@@ -26,6 +33,7 @@ export interface ViewOptions {
 }
 
 export const DEFAULT_OPTIONS: ViewOptions = {
+  words: { canvas: '', plane: '' },
   theme: 'light',
   colourBy: 'tissue',
   range: null,

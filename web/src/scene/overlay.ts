@@ -1,4 +1,4 @@
-// What lies over the picture: scale bar, axes, and the grip of the cutaway plane.
+// Overlays of the picture: scale bar, axes, and the grip of the cutaway plane.
 
 import type { Vector3 } from 'three';
 import './overlay.css';
@@ -24,7 +24,7 @@ const AXES = [
   { name: 'z', colour: '#3f78c4' },
 ] as const;
 
-/** Small axes in the corner; a click on one looks along it. */
+/** Small axes in the corner. A click on one looks along it. */
 export class Gizmo {
   readonly element = document.createElement('div');
   private readonly arms: { group: SVGGElement; line: SVGLineElement; end: SVGGElement; axis: number; sign: number }[] = [];
@@ -65,7 +65,7 @@ export class Gizmo {
   }
 }
 
-/** A round length in mm. */
+/** A bar of a round length in mm. */
 export class ScaleBar {
   readonly element = document.createElement('div');
   private readonly bar = document.createElement('div');
@@ -90,12 +90,12 @@ export class ScaleBar {
   }
 }
 
-/** The grip by which the plane is dragged: a slider that turns with the plane's normal. */
+/** The grip that drags the plane: a slider that turns with the plane's normal. */
 export class PlaneGrip {
   readonly element = document.createElement('div');
   private readonly arrow: SVGGElement;
   private direction = { x: 1, y: 0 };
-  /** Pixels for the way through the whole body. */
+  /** Length of the way through the whole body, px. */
   private way = 1;
   private position = 0;
 
@@ -104,7 +104,6 @@ export class PlaneGrip {
     element.className = 'scene-grip';
     element.tabIndex = 0;
     element.setAttribute('role', 'slider');
-    element.setAttribute('aria-label', 'Cutaway plane');
     element.setAttribute('aria-valuemin', '0');
     element.setAttribute('aria-valuemax', '100');
     element.hidden = true;
@@ -120,7 +119,7 @@ export class PlaneGrip {
       element.focus({ preventScroll: true });
       element.setPointerCapture(down.pointerId);
       const from = this.position;
-      // The direction of the beginning: the plane's own turns on the screen, as its grip moves, by perspective.
+      // The direction at the start: perspective turns the plane's own while the grip moves.
       const { x, y } = this.direction, way = this.way;
       const move = (event: PointerEvent) => this.move(from + ((event.clientX - down.clientX) * x + (event.clientY - down.clientY) * y) / way);
       element.addEventListener('pointermove', move);
@@ -142,7 +141,7 @@ export class PlaneGrip {
     this.onMove(Math.min(1, Math.max(0, to)));
   }
 
-  /** Where it is on the picture; where the plane goes for growing positions, in pixels for the whole way. */
+  /** Place of the grip and way of the plane from position 0 to 1 in the picture, px. */
   update(x: number, y: number, wayX: number, wayY: number, position: number): void {
     this.position = position;
     const way = Math.hypot(wayX, wayY);

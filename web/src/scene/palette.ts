@@ -1,13 +1,20 @@
-// Colours: of tissues by their names, of maps over a range, of the two themes.
+// Colours of tissues by their names, colour maps, and the two themes.
+//
+// To add a colour map: one entry in `MAPS` below with its source, its colours evenly spaced from the least value to the
+// greatest, and the lines that are seen on it. To use it: name it in `MAP_OF` at the quantity that it shows. Nothing else of
+// the page names a map, and none needs words: the legend shows the quantity.
+// To add a tissue's colour: one line in `TISSUES`.
 
 import { DataTexture, LinearFilter, RGBAFormat, SRGBColorSpace } from 'three';
 import type { LayerInfo } from '../generated/api';
+import type { Quantity } from './quantities';
 
+/** Skin in sections and legends. */
 export const SKIN = '#dba17b';
 /** Skin as a surface is paler than its section. */
 export const SKIN_IN_LIGHT = '#dcae98';
 
-/** Names are those of the tissue catalogue; the first that is part of a layer's name counts. */
+/** Parts of tissue names, mostly of the catalogue; the first that occurs in a layer's name counts. */
 const TISSUES: [string, string][] = [
   ['epidermis', '#e3b08d'],
   ['dermis', '#d9a07c'],
@@ -27,7 +34,7 @@ const TISSUES: [string, string][] = [
   ['cartilage', '#cfdde0'],
   ['bone', '#e9e1cc'],
 ];
-/** For layers whose names say nothing: told apart by eyes of all kinds (after Okabe and Ito, softened). */
+/** For layers with other names; safe for colour-blind eyes (after Okabe and Ito, softened). */
 const OTHERS = ['#d9a07c', '#8fb8d6', '#e8c66b', '#7fb8a0', '#c98fb0', '#a7a1d1', '#d3886a', '#9fb37a'];
 
 export const BONE = '#e9e2cf';
@@ -35,7 +42,7 @@ export const BONE = '#e9e2cf';
 export const CORE = '#c3b7a3';
 export const LUMP = '#7d5ba6';
 
-/** The colour of every layer, from the skin down: the same in the body, its section, and legends. */
+/** A colour for every layer, from the skin down: the same on the body, in its section and in legends. */
 export function layerColours(layers: readonly Pick<LayerInfo, 'name'>[]): string[] {
   const taken = new Set<string>();
   return layers.map(({ name }, i) => {
@@ -50,18 +57,49 @@ export function layerColours(layers: readonly Pick<LayerInfo, 'name'>[]): string
   });
 }
 
-/** YlGnBu (Brewer, 2002), safe for colour-blind eyes. Nothing is light, so that a body of which little moves keeps its shape. */
-const YLGNBU = ['#fbf8d0', '#edf4b1', '#c7e9b4', '#7fcdbb', '#41b6c4', '#1d91c0', '#225ea8', '#253494', '#081d58'];
-/** Cividis (Nuñez, Anderton and Renslow, 2018). */
-const CIVIDIS = ['#00224e', '#123570', '#3b496c', '#575d6d', '#707173', '#8a8678', '#a59c74', '#c3b369', '#fee838'];
-/** Vik (Crameri, 2018): blue below the middle, brown above. */
-const VIK = ['#001261', '#033e7d', '#1e6f9d', '#71a8c4', '#c9dde7', '#ece5e0', '#eacebd', '#d39774', '#be6533', '#8b2706', '#590008'];
+interface ColourMap {
+  /** Evenly spaced, from the least value to the greatest. */
+  stops: string[];
+  /** Lines on the map's colours: white where most of them are dark, else those of the theme. */
+  lines: 'white' | 'theme';
+}
 
-export type MapName = 'ylgnbu' | 'cividis' | 'vik';
-const MAPS: Record<MapName, string[]> = { ylgnbu: YLGNBU, cividis: CIVIDIS, vik: VIK };
+const MAPS = {
+  /** YlGnBu (Brewer, 2002), safe for colour-blind eyes; small values are light, so that a body at rest shows its shape. */
+  ylgnbu: {
+    stops: ['#fbf8d0', '#edf4b1', '#c7e9b4', '#7fcdbb', '#41b6c4', '#1d91c0', '#225ea8', '#253494', '#081d58'],
+    lines: 'white',
+  },
+  /** Cividis (Nuñez, Anderton and Renslow, 2018). */
+  cividis: {
+    stops: ['#00224e', '#123570', '#3b496c', '#575d6d', '#707173', '#8a8678', '#a59c74', '#c3b369', '#fee838'],
+    lines: 'white',
+  },
+  /** Vik (Crameri, 2018), for signed values: blue below the middle, brown above. */
+  vik: {
+    stops: ['#001261', '#033e7d', '#1e6f9d', '#71a8c4', '#c9dde7', '#ece5e0', '#eacebd', '#d39774', '#be6533', '#8b2706', '#590008'],
+    lines: 'theme',
+  },
+} satisfies Record<string, ColourMap>;
+type MapName = keyof typeof MAPS;
 
-export function mapStops(name: MapName): string[] {
-  return MAPS[name];
+/** The map of each quantity. */
+const MAP_OF: Record<Quantity, MapName> = {
+  displacement: 'ylgnbu',
+  von_mises: 'ylgnbu',
+  pressure: 'vik',
+  stretch: 'ylgnbu',
+  stiffness: 'cividis',
+};
+
+export function mapOf(quantity: Quantity): ColourMap {
+  return MAPS[MAP_OF[quantity]];
+}
+
+/** The texture of each quantity's map; quantities of one map share it. */
+export function mapTextures(): Record<Quantity, DataTexture> {
+  const made = Object.fromEntries(Object.entries(MAPS).map(([name, { stops }]) => [name, mapTexture(stops)]));
+  return Object.fromEntries(Object.entries(MAP_OF).map(([quantity, name]) => [quantity, made[name]])) as Record<Quantity, DataTexture>;
 }
 
 function rgb(hex: string): [number, number, number] {
@@ -69,9 +107,9 @@ function rgb(hex: string): [number, number, number] {
   return [n >> 16, (n >> 8) & 255, n & 255];
 }
 
-/** A map as a texture of one row. */
-export function mapTexture(name: MapName): DataTexture {
-  const stops = MAPS[name].map(rgb);
+/** A texture of one row. */
+function mapTexture(colours: string[]): DataTexture {
+  const stops = colours.map(rgb);
   const n = 256;
   const data = new Uint8Array(4 * n);
   for (let i = 0; i < n; i++) {
@@ -88,7 +126,7 @@ export function mapTexture(name: MapName): DataTexture {
 }
 
 export interface Theme {
-  /** In the middle of the background and at its corners. */
+  /** Colours of the background in its middle and at its corners. */
   background: [string, string];
   shadow: number;
   shadowOpacity: number;
@@ -97,6 +135,8 @@ export interface Theme {
   wire: string;
   wireOpacity: number;
   plane: string;
+  /** Text and scale bar of a saved picture. */
+  ink: string;
 }
 
 export const THEMES: Record<'light' | 'dark', Theme> = {
@@ -108,6 +148,7 @@ export const THEMES: Record<'light' | 'dark', Theme> = {
     wire: '#3a2a22',
     wireOpacity: 0.24,
     plane: '#4c7fa8',
+    ink: '#33404a',
   },
   dark: {
     background: ['#2b3036', '#14171a'],
@@ -117,5 +158,6 @@ export const THEMES: Record<'light' | 'dark', Theme> = {
     wire: '#2b1b14',
     wireOpacity: 0.28,
     plane: '#7fb2d9',
+    ink: '#d5dde3',
   },
 };

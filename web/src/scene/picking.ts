@@ -1,12 +1,12 @@
-// From a ray to the place at rest that it meets.
+// Picking: from a ray to the place at rest that it meets.
 
 import { Vector3, type Ray } from 'three';
 import type { Body } from './body';
 import type { CutPlane } from './contour';
-import type { Vec3 } from './options';
+import type { Picked, Vec3 } from './options';
 import type { Section } from './section';
 
-export interface Hit {
+interface Hit {
   distance: number;
   /** At rest. */
   point: Vec3;
@@ -44,14 +44,38 @@ function cast(ray: Ray, x: Float32Array, triangles: Uint32Array | number[], n: n
   return best;
 }
 
-/** Skin as it lies now, or at rest; the part that is cut away is not met. */
+/** What a ray may meet besides the skin. */
+export interface Pickable {
+  section: { section: Section; plane: CutPlane } | null;
+  bones: boolean;
+  isKept: (p: Vector3) => boolean;
+}
+
+/** The nearest of skin, section and bones. */
+export function pickNearest(ray: Ray, body: Body, { section, bones, isKept }: Pickable): Picked | null {
+  const hits = [
+    { part: 'skin' as const, hit: pickSkin(ray, body, false, isKept) },
+    { part: 'section' as const, hit: section && pickSection(ray, section.section, section.plane) },
+    { part: 'bone' as const, hit: bones ? pickBone(ray, body, isKept) : null },
+  ];
+  let best: Picked | null = null;
+  let nearest = Infinity;
+  for (const { part, hit } of hits) {
+    if (!hit || hit.distance >= nearest) continue;
+    nearest = hit.distance;
+    best = { point: hit.point, normal: hit.normal, part };
+  }
+  return best;
+}
+
+/** Picks the skin, deformed or at rest, outside the part that is cut away. */
 export function pickSkin(ray: Ray, body: Body, atRest: boolean, isKept: (p: Vector3) => boolean): Hit | null {
   const hit = cast(ray, atRest ? body.rest : body.positions, body.triangles, body.triangles.length, body.nLevels, false, isKept);
   return hit && { ...hit, ...skinAt(body, hit.triangle, hit.shares) };
 }
 
 /** The point and normal of the skin at rest in a triangle (its first index). */
-export function skinAt(body: Body, triangle: number, shares: Vec3): { point: Vec3; normal: Vec3 } {
+function skinAt(body: Body, triangle: number, shares: Vec3): { point: Vec3; normal: Vec3 } {
   const point: Vec3 = [0, 0, 0], normal: Vec3 = [0, 0, 0];
   for (let k = 0; k < 3; k++) {
     const v = body.triangles[triangle + k];
@@ -64,14 +88,14 @@ export function skinAt(body: Body, triangle: number, shares: Vec3): { point: Vec
   return { point, normal: [normal[0] * scale, normal[1] * scale, normal[2] * scale] };
 }
 
-export function pickBone(ray: Ray, body: Body, isKept: (p: Vector3) => boolean): Hit | null {
+function pickBone(ray: Ray, body: Body, isKept: (p: Vector3) => boolean): Hit | null {
   const hit = cast(ray, body.bonePositions, body.boneTriangles, body.boneTriangles.length, 1, false, isKept);
   if (!hit) return null;
   const at = ray.at(hit.distance, new Vector3());
   return { ...hit, point: at.toArray() as Vec3, normal: ray.direction.clone().negate().toArray() as Vec3 };
 }
 
-export function pickSection(ray: Ray, section: Section, plane: CutPlane): Hit | null {
+function pickSection(ray: Ray, section: Section, plane: CutPlane): Hit | null {
   const hit = cast(ray, section.positions.data, section.indices.data, section.indices.length, 1, true, () => true);
   if (!hit) return null;
   const point: Vec3 = [0, 0, 0];

@@ -1,24 +1,33 @@
-// How much is drawn at once, so that slow GPUs and software WebGL stay usable: less while the picture moves, all of it when it
+// The detail of pictures, so that slow GPUs and software WebGL stay usable: less while the body moves, all of it when it
 // stands still.
 
+/** A picture that takes longer is slow, one that takes less is fast, ms. */
 const SLOW = 38;
 const FAST = 14;
+/** How long nothing moves before the picture is drawn in full, ms. */
 const STILL_MS = 350;
-/** The same where a full picture takes long: it would stand in the way of what comes next. */
+/** The same where a full picture takes long and would delay the next movement. */
 const STILL_MS_SLOW = 900;
-/** Pixel ratios for pictures that stand still in software WebGL, which has no multisampling; the next when one took too long. */
+/** Pixel ratios for still pictures in software WebGL, which has no multisampling. If one takes too long, the next is used. */
 const STILL_RATIOS = [2, 1.5, 1];
+/** ms. */
 const STILL_TOO_LONG = 350;
 
-/** From the most to the least: share of the pixel ratio, shadows. */
-const STEPS = [
+/** How much of a picture is drawn: pixels of the canvas per CSS pixel, and whether with shadows. */
+export interface Detail {
+  ratio: number;
+  shadows: boolean;
+}
+
+/** From the most to the least; `ratio` is a share of the screen's. */
+const STEPS: Detail[] = [
   { ratio: 1, shadows: true },
   { ratio: 1, shadows: false },
   { ratio: 0.75, shadows: false },
   { ratio: 0.55, shadows: false },
 ];
 
-/** Whether WebGL is drawn by the CPU; null when there is none. */
+/** Whether the CPU draws WebGL; null without WebGL 2. */
 export function isSoftwareWebGL(): boolean | null {
   const gl = document.createElement('canvas').getContext('webgl2');
   if (!gl) return null;
@@ -73,8 +82,8 @@ export class Quality {
     }
   }
 
-  /** What to draw now: all of it when nothing has changed for a while, less while pictures follow each other. */
-  begin(isRefinement: boolean): { ratio: number; shadows: boolean } {
+  /** The detail of the next picture: full when nothing has changed for a while, less while pictures follow each other. */
+  begin(isRefinement: boolean): Detail {
     this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);
     const usual = Math.min(window.devicePixelRatio || 1, 2);
     const most = this.isSoftware && this.isFull ? Math.max(usual, STILL_RATIOS[this.stillStep]) : usual;
@@ -90,7 +99,7 @@ export class Quality {
     if (!this.isFull) this.wait();
   }
 
-  /** Something has changed: what stands still is drawn in full later. */
+  /** Something has changed: the full picture is put off. */
   wait(): void {
     window.clearTimeout(this.timer);
     if (this.step > 0 || this.isSoftware) this.timer = window.setTimeout(this.redraw, this.stillStep > 0 ? STILL_MS_SLOW : STILL_MS);

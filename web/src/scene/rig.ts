@@ -1,11 +1,11 @@
-// The camera on its sphere about a target: z stays up.
+// The camera on a sphere around its target, with z up.
 
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
 
 const FIELD_OF_VIEW = 28;
 const TURN_MS = 450;
 
-/** Towards the camera from the target. */
+/** Directions from the target to the camera. */
 export const SIDES = {
   home: new Vector3(-0.42, -1, 0.72).normalize(),
   top: new Vector3(0, -0.001, 1).normalize(),
@@ -34,7 +34,7 @@ export class CameraRig {
     this.elevation = Math.asin(MathUtils.clamp(direction.z, -1, 1));
   }
 
-  /** The whole body is seen from a side. */
+  /** Fits the whole box into the picture, seen from a direction. */
   fit(box: Box3, direction: Vector3, animate: boolean): void {
     const centre = box.getCenter(new Vector3());
     const azimuth = Math.atan2(direction.y, direction.x);
@@ -72,7 +72,7 @@ export class CameraRig {
     return 1.12 * distance;
   }
 
-  /** Drags the picture by pixels of a picture `height` high. */
+  /** Rotates by a drag of so many pixels in a picture `height` pixels high. */
   orbit(dx: number, dy: number, height: number): void {
     this.turn = null;
     this.azimuth -= (dx / height) * Math.PI * 1.1;
@@ -94,12 +94,12 @@ export class CameraRig {
     this.place();
   }
 
-  /** At the target's distance. */
+  /** Size of a pixel at the target, m. */
   metresPerPixel(height: number): number {
     return (2 * this.distance * Math.tan(MathUtils.degToRad(FIELD_OF_VIEW / 2))) / height;
   }
 
-  /** To the right and up in the picture, and into it. */
+  /** Directions to the right, up and into the picture. */
   axes(): { right: Vector3; up: Vector3; forward: Vector3 } {
     const right = new Vector3(), up = new Vector3(), forward = new Vector3();
     this.camera.matrixWorld.extractBasis(right, up, forward);
@@ -115,7 +115,7 @@ export class CameraRig {
     return this.turn !== null;
   }
 
-  /** Goes on with a turn. */
+  /** Continues an animated turn; `now` in ms. */
   step(now: number): void {
     if (!this.turn) return;
     const { from, to } = this.turn;

@@ -17,13 +17,13 @@ import type { CutPlane } from './contour';
 const EDGES = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
 const FACES = [[0, 1, 2], [3, 5, 4], [0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 3, 0]];
 
-/** The edges of a loop in order, and of each the face in which the segment to the next edge lies. */
+/** The edges of a loop in order, each with the face that holds the segment to the next edge. */
 interface Loop {
   edges: number[];
   faces: number[];
 }
 
-/** By which nodes are on the positive side, as bits. */
+/** The loops of a prism, by the nodes on the positive side as bits. */
 const CASES: Loop[][] = Array.from({ length: 64 }, (_, mask) => loopsOf(mask));
 
 function loopsOf(mask: number): Loop[] {
@@ -58,7 +58,7 @@ function loopsOf(mask: number): Loop[] {
   return loops;
 }
 
-/** A growing list of numbers, used anew at every cut. */
+/** A growing list of numbers, reused for every cut. */
 class Grown<T extends Float32Array | Uint32Array> {
   length = 0;
   constructor(public data: T) {}
@@ -72,7 +72,7 @@ class Grown<T extends Float32Array | Uint32Array> {
   }
 }
 
-/** What the section is coloured by: of nodes, or of prisms. */
+/** Values that colour the section, of nodes or of prisms. */
 export interface SectionValues {
   nodes: Float32Array | null;
   prisms: Float32Array | null;
@@ -85,17 +85,17 @@ export class Section {
   readonly values = new Grown(new Float32Array(3 * (1 << 12)));
   readonly layers = new Grown(new Float32Array(3 * (1 << 12)));
   readonly indices = new Grown(new Uint32Array(3 * (1 << 14)));
-  /** Segments between layers and round the body: both ends. */
+  /** Segments between layers and around the body: both ends. */
   readonly outline = new Grown(new Float32Array(3 * (1 << 13)));
   /** Segments on the faces of all prisms. */
   readonly wire = new Grown(new Float32Array(3 * (1 << 13)));
-  /** m², by layer. */
+  /** Area of each layer, m². */
   area: number[] = [];
   private height = new Float32Array(0);
   private state = new Uint8Array(0);
   private readonly corner = new Float64Array(6 * 16);
 
-  /** Cuts the body as it lies now. Layers that are not shown are measured all the same. */
+  /** Cuts the deformed body. Areas include the layers that are not shown. */
   cut(body: Body, plane: CutPlane, values: SectionValues, shown: readonly boolean[]): void {
     const { positions: x, rest, nLevels, nVertices, triangles, intervalLayer, rimBits, nNodes } = body;
     for (const list of [this.positions, this.rest, this.values, this.layers, this.indices, this.outline, this.wire]) list.length = 0;
@@ -104,7 +104,7 @@ export class Section {
     if (this.state.length < nVertices) this.state = new Uint8Array(nVertices);
     const { height, state } = this;
     const [nx, ny, nz] = plane.normal;
-    // Columns first: which lie wholly on one side (1 or 2) is known before any prism is looked at.
+    // Columns that lie wholly on one side (1 or 2) are found first, so that their prisms are skipped.
     for (let v = 0, node = 0; v < nVertices; v++) {
       let sides = 0;
       for (let l = 0; l < nLevels; l++, node++) {
@@ -147,7 +147,7 @@ export class Section {
     for (let k = 0; k < n; k++) {
       const edge = EDGES[loop.edges[k]];
       const p = nodes[edge[0]], q = nodes[edge[1]];
-      // From the lower node, so that all prisms at the edge find the very same point.
+      // From the lower node, so that all prisms at the edge get exactly the same point.
       const from = p < q ? p : q, to = p < q ? q : p;
       const t = height[from] / (height[from] - height[to]);
       for (let c = 0; c < 3; c++) {

@@ -1,4 +1,4 @@
-// The section as it is drawn: polygons of tissue, lines between layers, core and bones filled.
+// Draws the section: polygons of tissue, lines between layers, filled core and bones.
 
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, Sphere, type IUniform, type Vector2 } from 'three';
 import type { Body } from './body';
@@ -35,7 +35,7 @@ export class SectionView {
     this.group.add(this.tissue, this.core, this.bone, this.wire, this.boneLine, this.outline);
   }
 
-  /** Puts on the GPU what `section` has cut. */
+  /** Hands the cut in `section` to the GPU. */
   update(body: Body, plane: CutPlane, bones: boolean): void {
     const { section } = this;
     const n = section.layers.length;
@@ -74,7 +74,7 @@ export class SectionView {
     this.outline.show(section.outline.data, section.outline.length);
     this.wire.show(section.wire.data, section.wire.length);
 
-    // What does not move is filled anew only when the plane or the mesh has changed.
+    // Core and bones do not move: they are filled again only after a change of plane or mesh.
     const key = `${body.id} ${plane.normal.join()} ${plane.offset}`;
     if (key !== this.filledFor) {
       this.filledFor = key;
@@ -88,7 +88,7 @@ export class SectionView {
     this.bone.visible = this.boneLine.visible = bones && body.boneTriangles.length > 0;
   }
 
-  /** The same attributes in a new geometry; what the GPU held is given back. */
+  /** The same attributes in a new geometry; frees the GPU memory of the old one. */
   private renew(geometry: BufferGeometry): BufferGeometry {
     geometry.dispose();
     const next = new BufferGeometry();
@@ -107,7 +107,7 @@ export class SectionView {
     this.wire.material.visible = isWired;
   }
 
-  /** Of the picture in pixels, for lines. */
+  /** Size of the picture, px, for the width of lines. */
   set size(size: Vector2) {
     for (const lines of [this.outline, this.wire, this.boneLine]) (lines.material.uniforms.size as IUniform<Vector2>).value.copy(size);
   }
@@ -128,7 +128,7 @@ function fill(mesh: Mesh<BufferGeometry, MeshBasicMaterial>, positions: number[]
   mesh.geometry.setAttribute('position', new BufferAttribute(Float32Array.from(positions), 3));
 }
 
-/** A point of a loop, which closes. */
+/** A point of a closed loop. */
 function at(loop: number[], i: number): number[] {
   const k = i % loop.length;
   return loop.slice(k, k + 3);

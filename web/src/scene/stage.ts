@@ -1,5 +1,5 @@
-// What stands round the body: light, and the body's soft shadow on the ground. The background is the page's own, behind a canvas
-// that lets it through: to paint it on the GPU would cost software WebGL a third of its time.
+// The surroundings of the body: light, and a soft shadow on the ground. The background is CSS behind a transparent canvas:
+// painting it with software WebGL would take a third of the time of a picture.
 
 import {
   CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, Vector3,
@@ -7,7 +7,7 @@ import {
 import type { Body } from './body';
 import { THEMES, type Theme } from './palette';
 
-/** Towards the key light: over the viewer's left shoulder from home. */
+/** Direction to the key light: over the left shoulder, seen from home. */
 const LIGHT = new Vector3(-0.5, -0.55, 1.0).normalize();
 const BLOB = 128;
 
@@ -41,7 +41,7 @@ export class Stage {
     return theme;
   }
 
-  /** Light and shadow for a body. The ground's shadow is painted once: what is pressed does not change it visibly. */
+  /** Sets light and shadow for a body. The ground's shadow is painted once, since a press does not change it visibly. */
   setBody(body: Body): void {
     const { centre, radius, box } = body;
     this.key.position.copy(LIGHT).multiplyScalar(4 * radius).add(centre);
@@ -73,7 +73,7 @@ export class Stage {
     for (let t = 0; t < body.triangles.length; t += 3) {
       const at = [0, 1, 2].map((k) => 3 * body.triangles[t + k] * body.nLevels);
       const [x, y] = [at.map((i) => px(body.rest[i] - centre.x)), at.map((i) => px(centre.y - body.rest[i + 1]))];
-      // Those that face upwards are enough; with the others the windings would cancel.
+      // Only triangles that face upwards: with the others, the windings would cancel.
       if ((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]) >= 0) continue;
       s.moveTo(x[0], y[0]);
       s.lineTo(x[1], y[1]);

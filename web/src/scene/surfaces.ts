@@ -15,7 +15,7 @@ export interface LayerLook {
 export interface SurfacesLook {
   layers: LayerLook[];
   isMapped: boolean;
-  /** Skin as skin looks, not as in a legend. */
+  /** Whether skin is shaded as skin, not in the plain colour of a legend. */
   isTissue: boolean;
   bones: boolean;
   core: string;
@@ -23,7 +23,7 @@ export interface SurfacesLook {
   wire: { on: boolean; colour: string; opacity: number };
 }
 
-/** Materials by what they are of. They outlive meshes: a new one takes three many times as long as a new mesh. */
+/** Materials by the part they belong to. They outlive meshes, because compiling one takes much longer than a new mesh. */
 export type Materials = Map<string, SurfaceMaterial>;
 
 export class Surfaces {
@@ -68,7 +68,7 @@ export class Surfaces {
     this.core = this.mesh('core', body.coreTriangles);
     if (body.boneTriangles.length > 0) this.bones = this.boneMesh();
 
-    // What lies deeper is drawn later, so that most of it is hidden before it is shaded.
+    // Deeper parts are drawn later, so that hidden pixels are not shaded.
     this.walls.forEach((mesh) => (mesh.renderOrder = 0.1));
     this.core.renderOrder = 0.6;
     if (this.bones) this.bones.renderOrder = 0.5;
@@ -132,14 +132,14 @@ export class Surfaces {
     for (let k = 0; k < n; k++) {
       const { colour, opacity, visible } = layers[k];
       const look: SurfaceLook = { colour: isTissue && colour === SKIN ? SKIN_IN_LIGHT : colour, opacity, isMapped, skin: isTissue ? (k === 0 ? 1 : 0.55) : 0 };
-      // Only what can be seen is drawn: a layer's outside when what is over it lets it through, its inside likewise.
+      // A side of a layer is drawn only if the layer next to it is transparent or hidden.
       this.outer[k].visible = visible && isThrough(k - 1);
       this.inner[k].visible = visible && opacity === 1 && k < n - 1 && isThrough(k + 1);
       this.walls[k].visible = visible;
       this.outer[k].material.look(look);
       this.inner[k].material.look({ ...look, side: BackSide });
       this.walls[k].material.look({ ...look, skin: look.skin * 0.5, isFlat: true, side: DoubleSide });
-      // Transparent layers from the inside out, after all that is solid.
+      // Transparent layers are drawn after the solid ones, from the inside out.
       this.outer[k].renderOrder = opacity < 1 ? 2 + 0.01 * (n - k) : 0;
       this.walls[k].renderOrder = opacity < 1 ? 2 + 0.01 * (n - k) : 0.1;
       this.outer[k].castShadow = this.walls[k].castShadow = opacity > 0.6;
@@ -148,7 +148,7 @@ export class Surfaces {
     }
     this.core.material.look({ colour: this.bones ? core : bone, opacity: 1, isMapped: false, skin: 0, isFlat: true, side: DoubleSide });
     this.core.visible = bones;
-    // Under solid layers only what closes its open ends is seen of the core.
+    // Under solid layers only the open ends of the core are visible.
     const isHidden = layers.every((layer) => layer.visible && layer.opacity === 1);
     this.core.geometry.setDrawRange(isHidden ? 3 * this.body.nCoreSides : 0, Infinity);
     if (this.bones) {
@@ -191,7 +191,7 @@ function wallTriangles({ rimEdges, nLevels }: Body, from: number, to: number): U
   return out;
 }
 
-/** Edges of prisms that lie outside: those of the skin, and of the walls. */
+/** Outer edges of prisms: those of the skin and of the walls. */
 function edgeNodes({ triangles, rimEdges, nLevels }: Body): Uint32Array {
   const out: number[] = [];
   for (let i = 0; i < triangles.length; i++) {

@@ -1,18 +1,17 @@
-// What presses, where it presses, and how it is pressed back: tool, operated point, force.
+// The tool, the operated point at its tip, and the arrow of the force.
 
 import {
-  BufferGeometry, CanvasTexture, CapsuleGeometry, ConeGeometry, CylinderGeometry, Group, LatheGeometry, Mesh, MeshBasicMaterial, MeshMatcapMaterial,
-  SphereGeometry, SRGBColorSpace, Vector2, Vector3,
+  BufferGeometry, CanvasTexture, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, MeshMatcapMaterial,
+  SphereGeometry, SRGBColorSpace, Vector3,
 } from 'three';
-import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js';
-import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js';
 import type { ToolForm } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
+import { toolGeometry } from './toolshapes';
 
 /** Colours of the thesis's program. */
 const OPERATED_POINT = 0x00c8d7;
 const FORCE = 0xe5252a;
-/** Forces below this are noise, N. */
+/** Forces below this are noise and have no arrow, N. */
 const LEAST_FORCE = 0.01;
 const UP = new Vector3(0, 1, 0);
 
@@ -24,7 +23,7 @@ export class ToolView {
   private readonly head: Mesh<ConeGeometry, MeshBasicMaterial>;
   private readonly arrow = new Group();
   private form = '';
-  /** Of the arrow at the device's largest force, m. */
+  /** Length of the arrow at the device's largest force, m. */
   private longest = 0.1;
   private maxForce = 10;
   private readonly force = new Vector3();
@@ -46,7 +45,7 @@ export class ToolView {
     this.group.visible = false;
   }
 
-  /** Of which shape; the scale of forces. */
+  /** Shape of the tool and scale of the arrow: the device's largest force, N, and the body's radius, m. */
   set(form: ToolForm, maxForce: number, bodyRadius: number): void {
     this.maxForce = maxForce > 0 ? maxForce : 10;
     this.longest = 0.85 * bodyRadius;
@@ -55,7 +54,7 @@ export class ToolView {
     if (key === this.form) return;
     this.form = key;
     this.tool.geometry.dispose();
-    this.tool.geometry = shape(form, 0.55 * bodyRadius);
+    this.tool.geometry = toolGeometry(form, 0.55 * bodyRadius);
   }
 
   place(frame: FrameSnapshot): void {
@@ -72,7 +71,7 @@ export class ToolView {
     this.arrow.visible = force && this.force.length() > LEAST_FORCE;
   }
 
-  /** Sizes that are the same on the screen at any distance; `pixel` in metres. */
+  /** Gives point and arrow the same size on the screen at any distance; `pixel` is a pixel's size, m. */
   scale(pixel: number): void {
     this.point.scale.setScalar(pixel * (this.isNode ? 7 : 5));
     const force = this.force.length();
@@ -94,57 +93,7 @@ export class ToolView {
   }
 }
 
-/** With its tip at the origin and z out of the tissue; rods are `length` long. */
-function shape(form: ToolForm, length: number): BufferGeometry {
-  switch (form.kind) {
-    case 'sphere':
-      return withStem(new SphereGeometry(form.radius, 48, 32).translate(0, 0, form.radius), form.radius, 2 * form.radius, length);
-    case 'flat_punch': {
-      const { radius: r, edge_radius: e } = form;
-      const profile = [new Vector2(0, 0)];
-      for (let i = 0; i <= 6; i++) {
-        const a = (i / 6) * (Math.PI / 2);
-        profile.push(new Vector2(r - e + e * Math.sin(a), e - e * Math.cos(a)));
-      }
-      const top = Math.max(0.35 * length, 1.2 * r);
-      const bevel = 0.08 * r;
-      profile.push(new Vector2(r, top - bevel), new Vector2(r - bevel, top), new Vector2(0, top));
-      const rod = new LatheGeometry(profile, 64).rotateX(Math.PI / 2);
-      return withStem(rod, r, top, length);
-    }
-    case 'capsule':
-      return withStem(new CapsuleGeometry(form.radius, form.length, 16, 40).rotateZ(Math.PI / 2).translate(0, 0, form.radius), form.radius, 2 * form.radius, length);
-    case 'box': {
-      const [x, y, z] = form.size;
-      const edge = Math.min(Math.max(form.edge_radius, 0.02 * Math.min(x, y, z)), 0.499 * Math.min(x, y, z));
-      return withStem(new RoundedBoxGeometry(x, y, z, 4, edge).translate(0, 0, z / 2), Math.min(x, y) / 2, z, length);
-    }
-    case 'fingertip': {
-      const [x, y, z] = form.radii;
-      return new SphereGeometry(1, 48, 32).scale(x, y, z).translate(0, 0, z);
-    }
-    case 'node':
-      return new SphereGeometry(1e-4, 4, 3);
-  }
-}
-
-/** A thin stem to hold it by. */
-function withStem(geometry: BufferGeometry, radius: number, from: number, length: number): BufferGeometry {
-  const r = Math.min(0.35 * radius, 0.035 * length);
-  const h = Math.max(length - from, 0.4 * length);
-  const stem = new CylinderGeometry(r, r, h, 24).rotateX(Math.PI / 2).translate(0, 0, from + h / 2 - 0.02 * radius);
-  const merged = mergeGeometries([geometry, stem].map((g) => (g.index ? g.toNonIndexed() : g)).map(bare));
-  geometry.dispose();
-  stem.dispose();
-  return merged;
-}
-
-function bare(geometry: BufferGeometry): BufferGeometry {
-  for (const name of Object.keys(geometry.attributes)) if (name !== 'position' && name !== 'normal') geometry.deleteAttribute(name);
-  return geometry;
-}
-
-/** Brushed steel as a ball of it looks: a matcap. */
+/** Brushed steel, as a matcap: the picture of a lit ball of it. */
 function metal(): CanvasTexture {
   const canvas = document.createElement('canvas');
   canvas.width = canvas.height = 128;

@@ -35,7 +35,7 @@ export function App() {
   );
 }
 
-/** The engine was changed under an open page: what it sends can no longer be read. */
+/** Shown after an update of the engine: this page can no longer read its snapshots. */
 function OtherVersion() {
   return (
     <main class="whole-page">

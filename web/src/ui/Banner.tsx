@@ -1,4 +1,4 @@
-// What stands over everything: a lost connection.
+// The banner over everything when the connection is lost.
 
 import { t } from '../i18n';
 import { isRefused, status, wasOpen } from '../store';

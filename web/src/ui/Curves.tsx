@@ -9,16 +9,16 @@ import { axes, roundUp } from './axes';
 import { WINDOW } from './history';
 import { theme } from './settings';
 
-/** Twenty times a second is as smooth as these curves can be seen. */
+/** Between two drawings of a curve, ms; more often looks no smoother. */
 const PERIOD = 50;
 const FONT = '11px system-ui, sans-serif';
-/** The part of a force–depth curve that is drawn in full strength, s; what is older is paler. */
+/** The newest part of the force–depth curve, s. Older parts are paler. */
 const FRESH = 2;
 
 type Kind = 'force-depth' | 'force-time' | 'depth-time';
 
 export function Curves() {
-  // Colours and words are the plots' own: they are made anew when those change.
+  // The plots keep their colours and words, so new ones are made when those change.
   const key = `${theme.value}-${language.value}`;
   const now = state.value;
   const usual = now?.usual_depth ?? 0.004;
@@ -129,7 +129,7 @@ function options(kind: Kind, element: HTMLElement): uPlot.Options {
   };
   const isPhase = kind === 'force-depth';
   const isDepth = kind === 'depth-time';
-  // Hovering counts: a little of it is shown, and the rest is out of sight.
+  // Depths above the skin are negative; a little of them is shown.
   const depthRange = (): [number, number] => [-0.2 * axes.depth * 1e3, axes.depth * 1e3];
   const forceRange = (): [number, number] => [0, axes.force];
   const lines: uPlot.Series[] = isPhase
@@ -158,7 +158,7 @@ function options(kind: Kind, element: HTMLElement): uPlot.Options {
   };
 }
 
-/** The unit stands at the last number only: calm, and still there. */
+/** Labels with the unit at the last number only. */
 function labels(unit: string): uPlot.Axis.Values {
   return (_plot, splits) =>
     splits.map((value, index) => {
@@ -167,7 +167,7 @@ function labels(unit: string): uPlot.Axis.Values {
     });
 }
 
-/** A curve that goes to and fro, which a function of x could not: pale where it is old, a dot where it is now. */
+/** Draws force over depth, which is no function of the depth: pale where it is old, with a dot at the newest point. */
 function drawPhase(colour: string) {
   return (plot: uPlot, _series: number): null => {
     const n = history.length;

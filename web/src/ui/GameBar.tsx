@@ -1,4 +1,4 @@
-// While lumps are hidden: the time, the marks, and the way to the truth.
+// The bar of a game: time, marks and result.
 
 import { signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
@@ -49,7 +49,7 @@ export function GameBar() {
   );
 }
 
-/** Goes on between states, which come when something changes only. */
+/** Keeps the clock running between states, which come only when something changes. */
 function useClock(told: number | undefined, isOn: boolean): void {
   useEffect(() => {
     if (!isOn || told === undefined) return;

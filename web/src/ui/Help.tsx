@@ -1,4 +1,4 @@
-// Keys and mouse.
+// The help dialog: mouse, keys and gamepad.
 
 import { useEffect, useRef } from 'preact/hooks';
 import { t, type Key } from '../i18n';

@@ -1,4 +1,4 @@
-// What the colours mean.
+// The legend of the colours.
 
 import { named, t } from '../i18n';
 import type { Legend } from '../scene';
@@ -34,7 +34,7 @@ function Bar({ shown }: { shown: Legend }) {
   );
 }
 
-/** All in the unit that suits the largest. */
+/** A value of the legend; all values have the unit that suits the largest. */
 function inUnit(value: number, { title, unit, max }: Legend): string {
   if (unit === '' || title === 'stretch') return value.toFixed(2);
   const [factor, name] = unit === 'm' ? [1e-3, 'mm'] : unit !== 'Pa' || max < 1e3 ? [1, unit] : max < 1e6 ? [1e3, 'kPa'] : [1e6, 'MPa'];

@@ -1,4 +1,4 @@
-// What happened: for a moment as toasts, and for longer in a list.
+// Notices: as toasts for some seconds, and in a list.
 
 import { useEffect, useRef } from 'preact/hooks';
 import { signal } from '@preact/signals';
@@ -67,7 +67,7 @@ function NoticeList() {
   );
 }
 
-/** Errors interrupt who listens; the rest waits for a pause. */
+/** Screen readers read errors at once and other notices at the next pause. */
 export function Notices() {
   const shown = toasts.value
     .map((key) => notices.value.find((item) => item.key === key))

@@ -1,4 +1,4 @@
-// Tabs, and the panel of the one that is chosen.
+// Tabs, and the panel of the chosen one.
 
 import type { FunctionComponent } from 'preact';
 import { useRef } from 'preact/hooks';
@@ -70,7 +70,7 @@ export function Rail() {
               tabIndex={isChosen ? 0 : -1}
               class={hasNews(name) ? 'news' : ''}
               onClick={() => {
-                // The chosen tab's click folds the panel away: the body gets its room.
+                // A click on the chosen tab folds the panel away.
                 isPanelOpen.value = isChosen ? !isPanelOpen.value : true;
                 tab.value = name;
               }}
@@ -94,7 +94,7 @@ export function Rail() {
   );
 }
 
-/** Something goes on there. */
+/** Whether something is under way in a panel. */
 function hasNews(name: Tab): boolean {
   const now = state.value;
   if (now === null) return false;

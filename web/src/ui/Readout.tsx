@@ -1,4 +1,4 @@
-// The force that a hand would feel: as number, as bar, as curves.
+// The force on the hand as a number, a bar and curves.
 
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
@@ -14,10 +14,10 @@ import { formatNumber, inMillimetres, withPrefix } from './quantity';
 import { PressDepth } from './panels/DevicePanel';
 import { isDeepest } from './settings';
 
-/** Share of the force that is let through, %. */
+/** Share of the force that reaches the hand, %. */
 const gain = signal(100);
 
-/** Numbers that change faster than this cannot be read, ms. */
+/** Between two changes of the numbers, ms; faster ones cannot be read. */
 const PERIOD = 80;
 
 export function Readout() {
@@ -32,7 +32,7 @@ export function Readout() {
   );
 }
 
-/** Of small networks the force is told in mN: 2009 reckoned in dyn. */
+/** Small forces of the reference method are shown in mN: the thesis has dyn. */
 export function written(force: number): string {
   return force > 0 && force < 0.005 && state.peek()?.method === 'reference' ? withPrefix(force, 'N', 2) : `${force.toFixed(2)} N`;
 }
@@ -45,7 +45,7 @@ function ForceNumber() {
   const scale = useRef<HTMLSpanElement>(null);
   const [spoken, setSpoken] = useState('');
 
-  // Past the page's signals: text is set where it stands, all of it of the same frame.
+  // Text is set directly, not through signals, so that all of it is of one frame.
   useEffect(() => {
     let newest: FrameSnapshot | null = null;
     let timer = 0;
@@ -62,7 +62,7 @@ function ForceNumber() {
       gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
       gauge.current!.setAttribute('aria-valuemax', String(axes.force));
       scale.current!.textContent = `${formatNumber(axes.force)} N`;
-      // Above the skin nothing is missed.
+      // Above the skin a reduced force makes no difference.
       gain.value = newest.depth > 0 ? Math.round(newest.gain * 100) : 100;
       newest = null;
     };
@@ -85,7 +85,7 @@ function ForceNumber() {
       force: written(magnitude(latestFrame.force)),
       depth: inMillimetres(latestFrame.depth),
     });
-    // The same words again must be spoken, too.
+    // Screen readers speak a text only when it changes.
     setSpoken(words === spoken ? `${words}\u00a0` : words);
   };
 

@@ -1,4 +1,4 @@
-// A recording is shown: its time, to slide along, and to play.
+// The bar of a replay: time slider and playback.
 
 import { signal } from '@preact/signals';
 import { useEffect, useId, useRef } from 'preact/hooks';
@@ -7,10 +7,10 @@ import { askAloud, isController, onFrame, send, state } from '../store';
 import { Button } from './controls';
 import { Icon } from './icons';
 
-/** The moment that is shown, s. */
+/** The time shown, s. */
 const time = signal(0);
 const SEEK_PERIOD = 50;
-/** What an arrow key moves, s: more than a frame, or it would fall back to the one that is shown. */
+/** Step of an arrow key, s: longer than a frame, so that it always reaches another one. */
 const KEY_STEP = 0.05;
 const ARROWS: Record<string, number> = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
@@ -33,7 +33,7 @@ export function ReplayBar() {
   if (recording === undefined || !recording.is_replaying) return null;
   const seek = (to: number): void => {
     time.value = to;
-    // The newest wish counts: others between are not sent.
+    // Only the newest time is sent.
     if (wanted.current === null) {
       window.setTimeout(() => {
         send({ type: 'seek', time: wanted.current ?? to });

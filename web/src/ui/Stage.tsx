@@ -1,4 +1,4 @@
-// The body, and what lies over it: legend, building, problems, replay and game.
+// The view of the body with its overlays: legend, progress, problems, replay and game.
 
 import { effect, signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
@@ -94,7 +94,7 @@ export function Stage() {
   );
 }
 
-/** What a picked place is for. */
+/** Uses a picked point for its purpose. */
 function takePicked(point: Vec3): void {
   const purpose = picking.peek();
   if (purpose === null) return;
@@ -120,7 +120,7 @@ function movePress(point: Vec3): Promise<string | null> {
   return edit(['/press', changed]);
 }
 
-/** Under another place, as deep as it was. */
+/** Moves a lump under another point, at the same depth. */
 function moveLump(index: number, point: Vec3): Promise<string | null> {
   const lump = scene.peek()?.lump?.[index];
   const path = `/lump/${index}`;
@@ -184,7 +184,7 @@ function NoBody({ isWebGL }: { isWebGL: boolean }) {
   );
 }
 
-/** What was read of what could not be built. */
+/** The last problem that the user dismissed. */
 const dismissed = signal<string | null>(null);
 
 function Phase() {

@@ -1,4 +1,4 @@
-// Name, scene, who is connected and who controls, theme, language, help.
+// The bar at the top: scene, connection, control, theme, language, messages, help.
 
 import { useState } from 'preact/hooks';
 import { language, named, t, type Language } from '../i18n';

@@ -1,6 +1,6 @@
-// Ends of the axes: round numbers that grow at once when they must and shrink when most of their room is empty.
+// Ends of the axes of the curves: round numbers that grow at once, and shrink when most of an axis is empty.
 
-/** The next of 1, 2, 5, 10, … above. */
+/** The next of …, 1, 2, 5, 10, … that is not smaller. */
 export function roundUp(value: number): number {
   const power = 10 ** Math.floor(Math.log10(value));
   const lead = value / power;
@@ -8,7 +8,7 @@ export function roundUp(value: number): number {
   return step * power;
 }
 
-/** What is used of an axis before it shrinks. */
+/** An axis shrinks when a smaller share of it is used. */
 const LEAST_USED = 0.25;
 
 class AxisEnd {
@@ -27,7 +27,7 @@ class AxisEnd {
   grow(value: number): void {
     if (value > this.end) this.end = roundUp(value);
   }
-  /** `most` is the largest of all that is shown. */
+  /** `most` is the largest value shown. */
   settle(most: number): void {
     this.grow(most);
     if (most < LEAST_USED * this.end) this.end = Math.max(this.least, roundUp(Math.max(most / 0.8, 1e-9)));

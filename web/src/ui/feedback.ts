@@ -1,4 +1,4 @@
-// The force as sound and vibration, for those who have no haptic device. Both are off until they are wished for.
+// The force as sound and vibration, for users without a haptic device. Both are off until they are switched on.
 
 import { effect } from '@preact/signals';
 import { onFrame, state } from '../store';
@@ -6,11 +6,11 @@ import { magnitude } from './history';
 import { hasSound, hasVibration } from './settings';
 
 const LOWEST_PITCH = 110;
-/** Two octaves and a half over the force of the scale: heard well on small loudspeakers, too. */
+/** Range of the pitch: small loudspeakers play it well. */
 const OCTAVES = 2.5;
 const LOUDEST = 0.18;
 const DEAD_BAND = 0.02;
-/** Phones vibrate in pieces: each is asked for a little before the one before ends. */
+/** Length of one vibration, ms; the next one starts a little before its end. */
 const PIECE = 120;
 
 interface Tone {
@@ -35,14 +35,14 @@ function beginTone(): Tone {
   gain.gain.value = 0;
   oscillator.connect(gain).connect(context.destination);
   oscillator.start();
-  // Browsers keep a page silent until it is used.
+  // Browsers keep a page silent until the user has touched it.
   const wake = (): void => void context.resume();
   window.addEventListener('pointerdown', wake, { once: true });
   window.addEventListener('keydown', wake, { once: true });
   return { context, oscillator, gain };
 }
 
-/** How strong the force is felt, 0 to 1: of forces, too, the small ones are told apart best. */
+/** Strength of sound and vibration, 0 to 1; its square root makes small forces easy to tell apart. */
 function strength(force: number): number {
   if (force < DEAD_BAND) return 0;
   return Math.min(1, Math.sqrt(force / Math.min(state.value?.max_force ?? 8, 8)));
@@ -76,11 +76,11 @@ export function beginFeedback(): void {
           duration: PIECE, strongMagnitude: felt * 0.6, weakMagnitude: felt,
         });
       }
-      // A phone's motor knows on and off only: weak forces are short pulses.
+      // A phone's motor is on or off: weak forces are short pulses.
       navigator.vibrate?.(Math.max(8, Math.round(PIECE * felt)));
     }
   });
-  // Without frames nobody knows the force: silence, as of a device that lost its engine.
+  // Without frames the force is unknown, so there is silence.
   window.setInterval(() => {
     if (tone !== null && performance.now() - heardAt > 500) tone.gain.gain.setTargetAtTime(0, tone.context.currentTime, 0.05);
   }, 250);

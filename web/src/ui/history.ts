@@ -2,12 +2,12 @@
 
 import type { FrameSnapshot } from '../generated/wire';
 
-/** How far back curves go, s. */
+/** Length of the curves, s. */
 export const WINDOW = 15;
 /** Frames come at 60 Hz at most. */
 const CAPACITY = 1200;
 
-/** Lists that slide along buffers of twice their size: nothing is allocated when a frame comes. */
+/** Lists that slide along buffers of twice their size, so that frames allocate nothing. */
 export class History {
   private readonly buffers = Array.from({ length: 4 }, () => new Float64Array(2 * CAPACITY));
   private begin = 0;
@@ -19,7 +19,7 @@ export class History {
   push(frame: FrameSnapshot): void {
     const [times, depths, forces, axials] = this.buffers;
     const last = this.end > this.begin ? times[this.end - 1] : -Infinity;
-    // A recording that is sought, an engine that began anew: what was before belongs to another time.
+    // After a seek or a restart of the engine, earlier values belong to another time.
     if (frame.time < last || frame.is_replay !== this.replay || frame.time > last + WINDOW) this.clear();
     else if (frame.time === last) return;
     this.replay = frame.is_replay;
@@ -66,7 +66,7 @@ export function magnitude(force: readonly number[]): number {
   return Math.hypot(force[0], force[1], force[2]);
 }
 
-/** The part of the force along the tool's axis, which points out of the tissue, N. */
+/** Force along the tool's axis, N; the axis points out of the tissue. */
 export function along(frame: FrameSnapshot): number {
   const [i, j, k, w] = frame.orientation;
   const [x, y, z] = frame.force;

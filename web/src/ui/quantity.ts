@@ -1,4 +1,4 @@
-// Quantities as a scene file writes them, "12 kPa", and as they are shown.
+// Quantities: as a scene file writes them ("12 kPa"), and as the page shows them.
 
 export type Dimension = 'length' | 'pressure' | 'time' | 'speed' | 'spring' | 'number';
 
@@ -12,7 +12,7 @@ const UNITS: Record<Exclude<Dimension, 'number'>, Record<string, number>> = {
 
 const PATTERN = /^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d].*)?$/;
 
-/** The value in SI, or null when it is no such quantity. */
+/** The value in SI; null if the text is no such quantity. */
 export function parseQuantity(text: string, dimension: Dimension): number | null {
   const match = PATTERN.exec(text);
   if (match === null) return null;
@@ -24,7 +24,7 @@ export function parseQuantity(text: string, dimension: Dimension): number | null
   return factor === undefined ? null : value * factor;
 }
 
-/** The unit in which a value of this size is read best. */
+/** The unit for values of a size, from large to small. */
 const WRITTEN: Record<Exclude<Dimension, 'number'>, [atLeast: number, unit: string][]> = {
   length: [[1, 'm'], [1e-4, 'mm'], [0, 'µm']],
   pressure: [[1e6, 'MPa'], [1e3, 'kPa'], [0, 'Pa']],
@@ -33,7 +33,7 @@ const WRITTEN: Record<Exclude<Dimension, 'number'>, [atLeast: number, unit: stri
   spring: [[0.1, 'N/m'], [0, 'dyn/cm']],
 };
 
-/** In digits that say what matters. */
+/** With so many significant digits. */
 export function formatNumber(value: number, digits = 3): string {
   if (!Number.isFinite(value)) return '–';
   return String(Number(value.toPrecision(digits)));
@@ -55,27 +55,27 @@ export function defaultUnit(dimension: Dimension): string {
   return DEFAULT_UNITS[dimension];
 }
 
-/** What was typed, with the usual unit where none was. */
+/** The typed text, with the usual unit if it has none. */
 export function withUnit(text: string, dimension: Dimension): string {
   const match = PATTERN.exec(text);
   if (dimension === 'number' || match === null || match[2] !== undefined) return text.trim();
   return `${match[1]} ${defaultUnit(dimension)}`;
 }
 
-/** As written, but for what no person would write: 0.00030000000000000003 m, 0 m among millimetres. */
+/** The text as written, unless it is a zero or too long to read, such as 0.00030000000000000003 m. */
 export function tidied(text: string, dimension: Dimension): string {
   const value = parseQuantity(text, dimension);
   if (value === null || (value !== 0 && text.length <= 9)) return text;
   return formatQuantity(value, dimension, 5);
 }
 
-/** A quantity that is written as it is, whatever a scene holds there. */
+/** The text of a scene's value, whatever its type. */
 export function writtenQuantity(value: unknown): string {
   if (typeof value === 'string') return value;
   return typeof value === 'number' ? formatNumber(value, 6) : '';
 }
 
-/** A length in mm, with as many decimals as asked. */
+/** A length, m, as text in mm. */
 export function inMillimetres(value: number, decimals = 1): string {
   const shown = (value * 1e3).toFixed(decimals);
   return `${shown.replace('-', Number(shown) === 0 ? '' : '−')} mm`;
@@ -88,7 +88,7 @@ export function writtenPoint(point: readonly number[]): string[] {
 
 const PREFIXES: [number, string][] = [[1, ''], [1e-3, 'm'], [1e-6, 'µ'], [1e-9, 'n']];
 
-/** With a prefix from nano to none: times and energies of the engine. */
+/** With an SI prefix from nano to none. */
 export function withPrefix(value: number, unit: string, digits = 3): string {
   const size = Math.abs(value);
   const [factor, prefix] = size === 0 ? PREFIXES[0] : (PREFIXES.find(([least]) => size >= least) ?? PREFIXES[3]);

@@ -1,4 +1,4 @@
-// What is seen, as a file.
+// Saves the view as a picture file.
 
 import { bodyView } from './body';
 
@@ -9,6 +9,6 @@ export async function saveImage(): Promise<void> {
   link.href = URL.createObjectURL(image);
   link.download = `palpa-${new Date().toISOString().slice(0, 19).replaceAll(':', '')}.png`;
   link.click();
-  // The browser has taken it by then.
+  // By then the browser has read it.
   window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

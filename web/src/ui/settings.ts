@@ -1,13 +1,14 @@
-// What a user chose for this browser, remembered between visits, and how the body is shown now.
+// Settings: those that the browser remembers between visits, and how the body is shown now.
 
 import { batch, computed, effect, signal, type Signal } from '@preact/signals';
-import { DEFAULT_OPTIONS, type ColourBy, type ViewOptions } from '../scene';
+import { DEFAULT_OPTIONS, quantityOf, type ColourBy, type ViewOptions } from '../scene';
+import { t } from '../i18n';
 import { galleryKey, isHiding, state, type Vec3 } from '../store';
 import type { Field } from '../generated/api';
 
 const PREFIX = 'palpa.';
 
-/** A signal whose value outlives the page. Browsers may forbid storage: then it does not. */
+/** A signal whose value the browser keeps, unless it forbids storage. */
 function remembered<T>(name: string, initial: T, isValid: (value: unknown) => boolean): Signal<T> {
   let value = initial;
   try {
@@ -17,7 +18,7 @@ function remembered<T>(name: string, initial: T, isValid: (value: unknown) => bo
       if (isValid(read)) value = read as T;
     }
   } catch {
-    // The initial value it is.
+    // No storage: the initial value is used.
   }
   const kept = signal(value);
   effect(() => {
@@ -25,7 +26,7 @@ function remembered<T>(name: string, initial: T, isValid: (value: unknown) => bo
     try {
       localStorage.setItem(PREFIX + name, written);
     } catch {
-      // It lasts as long as the page.
+      // No storage: the value lasts as long as the page.
     }
   });
   return kept;
@@ -63,23 +64,23 @@ export type Tab = (typeof TABS)[number];
 export const tab = remembered<Tab>('tab', 'scene', isOneOf(...TABS));
 export const isPanelOpen = remembered('panel', true, isBoolean);
 
-// How the body is touched.
+// How the hand presses.
 
-export type HandMode = 'press' | 'orbit';
+type HandMode = 'press' | 'orbit';
 export const handMode = signal<HandMode>('press');
-/** How deep a press goes, m; none until it is chosen: then as the scene's hand does. */
+/** Depth of a press, m; null until it is chosen: then the scene's own. */
 export const chosenDepth = signal<number | null>(null);
 export const pressDepth = computed(() => {
   const usual = state.value?.usual_depth ?? 0.004;
   return Math.min(chosenDepth.value ?? usual, state.value?.greatest_depth ?? Infinity);
 });
 
-/** What the next click on the body is for. */
+/** The purpose of the next click on the body. */
 export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };
 export const picking = signal<Picking | null>(null);
-/** Whether the hand holds the tool as deep as it goes. */
+/** Whether the tool is at the greatest depth. */
 export const isDeepest = signal(false);
-/** Where the hand was last on the skin, m. */
+/** The last place of the hand on the skin, m. */
 export const lastTouched = signal<Vec3 | null>(null);
 
 // How the body is shown.
@@ -90,32 +91,31 @@ export function show(changes: Partial<ViewOptions>): void {
   wanted.value = { ...wanted.value, ...changes };
 }
 
-/** Maps by which a hidden lump would be seen. */
-export function isTelling(colourBy: ColourBy): boolean {
-  return colourBy === 'stiffness' || colourBy === 'von_mises' || colourBy === 'pressure' || colourBy === 'stretch';
+/** Whether a hidden lump can be seen by this map. */
+export function showsLumps(colourBy: ColourBy): boolean {
+  return quantityOf(colourBy)?.showsLumps ?? false;
 }
 
-/** How it is shown indeed: while lumps are hidden, nothing that tells of them. */
+/** The options in force: during a game, nothing that shows hidden lumps. */
 export const view = computed<ViewOptions>(() => {
-  const options = { ...wanted.value, theme: theme.value, reducedMotion: reducedMotion.value };
+  const words = { canvas: t('app.canvas'), plane: t('view.cutaway_plane') };
+  const options = { ...wanted.value, words, theme: theme.value, reducedMotion: reducedMotion.value };
   if (!isHiding.value) return options;
   return {
     ...options,
     lumps: false,
     wireframe: false,
-    colourBy: isTelling(options.colourBy) ? 'tissue' : options.colourBy,
-    range: isTelling(options.colourBy) ? null : options.range,
+    colourBy: showsLumps(options.colourBy) ? 'tissue' : options.colourBy,
+    range: showsLumps(options.colourBy) ? null : options.range,
     cutaway: { ...options.cutaway, on: false },
   };
 });
 
-export const neededField = computed<Field>(() => {
-  const colourBy = view.value.colourBy;
-  return colourBy === 'von_mises' || colourBy === 'pressure' || colourBy === 'stretch' ? colourBy : 'none';
-});
+/** The field that the engine must compute for this view. */
+export const neededField = computed<Field>(() => quantityOf(view.value.colourBy)?.field?.name ?? 'none');
 
 effect(() => {
-  // Another body has other layers, another usual depth, other places.
+  // Layers, depth and places of one body mean nothing for another.
   void galleryKey.value;
   batch(() => {
     chosenDepth.value = null;

@@ -300,30 +300,22 @@ fn whether_it_is_well() {
 }
 
 #[test]
-fn the_document_and_its_page() {
+fn the_page_of_the_api_lists_every_operation() {
     let (_session, server) = Session::start(None);
     let document: Value = serde_json::from_str(&get(&server, "/api/openapi.json").text).unwrap();
     assert_eq!(document["openapi"], "3.1.0");
     let page = get(&server, "/api").text;
-    for path in document["paths"].as_object().unwrap().keys() {
-        assert!(page.contains(&format!("<code>{path}</code>")), "{path}");
-    }
-    for name in document["components"]["schemas"]
-        .as_object()
-        .unwrap()
-        .keys()
-    {
-        assert!(page.contains(&format!("<section id=\"{name}\">")), "{name}");
-    }
-    // Every link within the page leads somewhere, and none out of it.
-    for link in page.split("href=\"").skip(1) {
-        let link = link.split('"').next().unwrap();
-        match link.strip_prefix('#') {
-            Some(id) => assert!(page.contains(&format!("id=\"{id}\"")), "{id}"),
-            None => assert_eq!(link, "/api/openapi.json"),
+    let mut n_operations = 0;
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for method in methods.as_object().unwrap().keys() {
+            let operation = format!("<code>{} {path}</code>", method.to_uppercase());
+            assert!(page.contains(&operation), "{operation}");
+            n_operations += 1;
         }
     }
-    assert!(page.contains("type: take_control") && page.contains("3 × number"));
+    assert!(n_operations >= 10, "{n_operations} operations");
+    let links: Vec<_> = page.split("href=\"").skip(1).collect();
+    assert!(links.len() == 1 && links[0].starts_with("/api/openapi.json\""));
 }
 
 /// Every way that the document names is there.

@@ -1,11 +1,11 @@
-// The haptic device, the hand that holds it, and what of the force is heard and felt here.
+// The haptic device, the hand that holds it, and the force as sound and vibration.
 
+import { CHOICES } from '../../generated/scene';
 import { t } from '../../i18n';
 import { edit, scene, state } from '../../store';
 import { aloud, Controlled, Section, Segmented, Select, Slider, Toggle } from '../controls';
 import { canVibrate } from '../feedback';
 import { formatNumber, inMillimetres } from '../quantity';
-import { GRIPS, PRESETS } from '../scene_table';
 import { chosenDepth, handMode, hasSound, hasVibration, pressDepth } from '../settings';
 
 export function DevicePanel() {
@@ -18,14 +18,14 @@ export function DevicePanel() {
           <Select
             label={t('device.preset')}
             value={device.preset ?? 'falcon'}
-            options={PRESETS.map((value) => ({ value, label: t(`preset.${value}`) }))}
+            options={CHOICES.DevicePreset.map((value) => ({ value, label: t(`preset.${value}`) }))}
             onChange={(preset) => aloud(edit(['/device/preset', preset]))}
             testid="device-preset"
           />
           <Segmented
             label={t('device.grip')}
             value={device.grip ?? 'medium'}
-            options={GRIPS.map((value) => ({ value, label: t(`grip.${value}`) }))}
+            options={CHOICES.Grip.map((value) => ({ value, label: t(`grip.${value}`) }))}
             onChange={(grip) => aloud(edit(['/device/grip', grip]))}
           />
           {device.preset !== 'ideal' && <p class="hint">{t('device.friction_hint')}</p>}
@@ -54,7 +54,7 @@ export function DevicePanel() {
   );
 }
 
-/** How deep a press goes. */
+/** The depth to which a press goes. */
 export function PressDepth({ testid }: { testid: string }) {
   const greatest = state.value?.greatest_depth ?? 0.02;
   return (

@@ -1,4 +1,4 @@
-// How the engine fares: rates, deadlines, limits, energy.
+// The engine: rates, deadlines, limits, energy.
 
 import { t } from '../../i18n';
 import { askAloud, figures, isController, state } from '../../store';
@@ -99,7 +99,7 @@ const FOOT = 16;
 
 const BARS = 40;
 
-/** The engine's bins are far finer than a bar can be: as many per bar as fall into it. */
+/** Collects the engine's bins, which are far finer, into bars: from, to, count. */
 function gathered(counted: EngineFigures['tick_histogram'], first: number, last: number): [number, number, number][] {
   const ratio = last / first;
   const bars = Array.from({ length: BARS }, (_, i): [number, number, number] => [
@@ -112,7 +112,7 @@ function gathered(counted: EngineFigures['tick_histogram'], first: number, last:
   return bars.filter(([, , count]) => count > 0);
 }
 
-/** Bars over the time that ticks took; their height is logarithmic, for one slow tick in a million must be seen. */
+/** Histogram of tick times. Heights are logarithmic, so that one slow tick in a million is seen. */
 function Histogram({ now }: { now: EngineFigures }) {
   const counted = now.tick_histogram.filter(([, , count]) => count > 0);
   if (counted.length === 0) return null;
@@ -156,12 +156,12 @@ function Histogram({ now }: { now: EngineFigures }) {
   );
 }
 
-/** Words at the ends stay inside. */
+/** Labels at the ends stay inside the picture. */
 function anchor(x: number): 'start' | 'middle' | 'end' {
   return x < 20 ? 'start' : x > WIDTH - 20 ? 'end' : 'middle';
 }
 
-/** Energy taken from the hand and given back: more may not be given than was taken and the budget. */
+/** Energy given to the hand, as a share of the energy taken from it plus the budget. */
 function Energy({ now }: { now: EngineFigures }) {
   const allowed = now.energy_in + now.energy_budget;
   const share = allowed > 0 ? Math.min(1, now.energy_out / allowed) : 0;

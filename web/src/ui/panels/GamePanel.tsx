@@ -1,4 +1,4 @@
-// Find the lump: lumps are hidden, felt for, marked, and shown.
+// The game: start a round, follow it, and read its result.
 
 import { signal } from '@preact/signals';
 import { useId } from 'preact/hooks';
@@ -12,7 +12,7 @@ import { picking, show, view } from '../settings';
 const wantedLumps = signal<'1' | '2' | '3'>('1');
 const wantedSeed = signal('');
 
-export function startGame(n_lumps: number, seed: number | null): void {
+function startGame(n_lumps: number, seed: number | null): void {
   picking.value = null;
   void askAloud({ type: 'start_game', n_lumps, seed });
 }

@@ -1,17 +1,18 @@
-// Lumps: put in, moved, made larger and harder.
+// Lumps: added, moved, changed in size and hardness.
 
 import { signal } from '@preact/signals';
+import type { LumpTable } from '../../generated/scene';
 import { named, t } from '../../i18n';
 import { edit, isHiding, scene, state } from '../../store';
-import { aloud, Button, Controlled, QuantityField, Section, Select, Toggle } from '../controls';
+import { aloud, Button, Controlled, PointFields, QuantityField, Section, Select, Toggle } from '../controls';
 import { formatQuantity, withUnit, writtenPoint, writtenQuantity } from '../quantity';
-import { stiffnessKey, type LumpTable, type Point } from '../scene_table';
+import { DEFAULT_POISSON, stiffnessKey } from '../tissue';
 import { lastTouched, picking, show, wanted } from '../settings';
 
-/** Share of the light that a layer stops which is seen through. */
+/** Opacity of layers that are seen through. */
 const CLEAR = 0.3;
 
-/** What the next lump is to be; a firm nodule a little under the skin. */
+/** The values of the next lump: at first a firm nodule under the skin. */
 const next = signal({ depth: '10 mm', radius: '6 mm', young: '150 kPa' });
 
 export function LumpsPanel() {
@@ -35,7 +36,7 @@ export function LumpsPanel() {
   );
 }
 
-/** Lumps lie inside: what is over them is made clear, or full again. */
+/** Makes all layers transparent, or opaque again. */
 function SeeThrough() {
   const layers = state.value?.layers ?? [];
   const isClear = wanted.value.layers.some((layer) => layer.opacity < 1);
@@ -49,7 +50,7 @@ function SeeThrough() {
   );
 }
 
-/** Only kept here until it is added: any text is taken. */
+/** Keeps a value of the new lump; the engine checks it when the lump is added. */
 function keep(key: 'depth' | 'radius' | 'young'): (text: string) => Promise<null> {
   return (text) => {
     next.value = { ...next.value, [key]: withUnit(text, key === 'young' ? 'pressure' : 'length') };
@@ -67,7 +68,7 @@ function NewLump({ lumps }: { lumps: LumpTable[] }) {
       radius: next.value.radius,
       below: writtenPoint(below),
       depth: next.value.depth,
-      tissue: { name: t('lumps.tissue_of_new'), young: next.value.young, poisson: 0.45 },
+      tissue: { name: t('lumps.tissue_of_new'), young: next.value.young, poisson: DEFAULT_POISSON },
       transition: '0.5 mm',
     };
     aloud(scene.value?.lump === undefined ? edit(['/lump', [lump]]) : edit(['/lump/-', lump]));
@@ -154,7 +155,7 @@ function LumpFields({ index, lump }: { index: number; lump: LumpTable }) {
   );
 }
 
-/** A lump of another shape and about the same size; keys that the shape does not have would be refused. */
+/** The lump in another shape of about the same size. The engine refuses keys of other shapes. */
 function reshaped(lump: LumpTable, shape: 'sphere' | 'ellipsoid' | 'capsule'): LumpTable {
   const size = lump.radius ?? lump.radii?.[0] ?? '6 mm';
   const { radius: _, radii: __, length: ___, axis: ____, ...rest } = lump;
@@ -177,7 +178,7 @@ function Hardness({ index, lump }: { index: number; lump: LumpTable }) {
       range={key === 'spring' ? undefined : { min: 2e3, max: 2e6, isLogarithmic: true }}
       onCommit={(value) =>
         table === null
-          ? edit([path, { name: lump.tissue ?? t('lumps.tissue_of_new'), young: value, poisson: 0.45 }])
+          ? edit([path, { name: lump.tissue ?? t('lumps.tissue_of_new'), young: value, poisson: DEFAULT_POISSON }])
           : edit([`${path}/${key}`, value])
       }
       testid={`lump-${index}-young`}
@@ -189,22 +190,4 @@ function PlaceFields({ path, lump }: { path: string; lump: LumpTable }) {
   if (lump.at !== undefined) return <PointFields label={t('lumps.at')} value={lump.at} path={`${path}/at`} />;
   if (lump.below !== undefined) return <PointFields label={t('lumps.below')} value={lump.below} path={`${path}/below`} />;
   return null;
-}
-
-export function PointFields(props: { label: string; value: Point; path: string; names?: [string, string, string] }) {
-  const names = props.names ?? ['x', 'y', 'z'];
-  return (
-    <div class="triple" role="group" aria-label={props.label}>
-      <span class="label">{props.label}</span>
-      {names.map((name, k) => (
-        <QuantityField
-          key={name}
-          label={name}
-          value={props.value[k]}
-          dimension="length"
-          onCommit={(value) => edit([`${props.path}/${k}`, value])}
-        />
-      ))}
-    </div>
-  );
 }

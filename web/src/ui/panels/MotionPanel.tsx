@@ -1,12 +1,11 @@
-// What the simulated hand does by itself: a press, a stroke, a palpation.
+// Motions of the simulated hand: a press, a stroke, a palpation.
 
+import { CHOICES, type MotionKind } from '../../generated/scene';
 import { t } from '../../i18n';
 import { askAloud, edit, scene, state } from '../../store';
-import { aloud, Button, Controlled, QuantityField, Section, Segmented, Select } from '../controls';
+import { aloud, Button, Controlled, PointFields, QuantityField, Section, Segmented, Select } from '../controls';
 import { formatQuantity, parseQuantity, writtenQuantity, type Dimension } from '../quantity';
-import { MOTIONS, type MotionKind } from '../scene_table';
 import { picking } from '../settings';
-import { PointFields } from './LumpsPanel';
 
 const ACROSS: MotionKind[] = ['stroke', 'drag', 'palpate'];
 const REPEATED: MotionKind[] = ['drag', 'tap', 'palpate'];
@@ -40,7 +39,7 @@ export function MotionPanel() {
         <Select
           label={t('motion.kind')}
           value={kind}
-          options={MOTIONS.map((value) => ({ value, label: t(`motion_kind.${value}`) }))}
+          options={CHOICES.MotionKind.map((value) => ({ value, label: t(`motion_kind.${value}`) }))}
           onChange={(value) => aloud(edit(['/motion/kind', value]))}
           testid="motion-kind"
         />

@@ -1,4 +1,4 @@
-// Recording what is felt, looking at it again, and taking it along.
+// Recordings: record, replay, download.
 
 import { useEffect, useState } from 'preact/hooks';
 import { t } from '../../i18n';
@@ -58,7 +58,7 @@ export function RecordPanel() {
   );
 }
 
-/** Seconds since it is on: states come only when something changes. */
+/** Seconds since `isOn` became true; states come only when something changes. */
 function useElapsed(isOn: boolean): number {
   const [seconds, setSeconds] = useState(0);
   useEffect(() => {

@@ -1,4 +1,4 @@
-// Which body lies there: the gallery, scenes of one's own, what is saved.
+// Scenes: the gallery, files, and what is known about the loaded one.
 
 import { useRef } from 'preact/hooks';
 import { named, t } from '../../i18n';
@@ -6,7 +6,7 @@ import { ask, askAloud, notify, state } from '../../store';
 import { Button, Controlled, Download, Section } from '../controls';
 import { formatNumber } from '../quantity';
 
-/** A scene file is a page of text: what is larger is something else. */
+/** Largest scene file, bytes. */
 const LARGEST_FILE = 1_000_000;
 
 export function ScenePanel() {
@@ -88,7 +88,7 @@ export function ScenePanel() {
             <dt>{t('scene.max_force')}</dt>
             <dd>{formatNumber(now.max_force)} N</dd>
           </dl>
-          {now.notes.length > 0 && <ul class="notes">{now.notes.map((note) => <li key={note}>{note}</li>)}</ul>}
+          {now.notes.length > 0 && <ul class="notes">{now.notes.map(({ text }) => <li key={text}>{text}</li>)}</ul>}
         </Section>
       )}
     </>

@@ -1,35 +1,19 @@
-// What each layer is made of, changed while it is pressed.
+// The tissue of each layer, which can be changed under a press.
 
-import { named, t, type Key } from '../../i18n';
+import type { LayerTable, TissueTable } from '../../generated/scene';
+import { named, t } from '../../i18n';
 import { edit, original, scene, state } from '../../store';
 import type { LayerInfo } from '../../generated/api';
 import { aloud, Button, Controlled, QuantityField, Section, Select, type Range } from '../controls';
-import { formatQuantity, parseQuantity, writtenQuantity, type Dimension } from '../quantity';
+import { formatQuantity, parseQuantity, writtenQuantity } from '../quantity';
 import {
-  LAWS, stiffnessKey, tissueName, type LawName, type LayerTable, type StiffnessKey, type TissueTable,
-} from '../scene_table';
+  DEFAULT_LAW, DEFAULT_POISSON, LAWS, LAW_NAMES, stiffnessKey, tissueName, underLaw, writtenOut, type StiffnessKey,
+} from '../tissue';
 
 const STIFFNESS_RANGE: Range = { min: 1e3, max: 1e6, isLogarithmic: true };
 const SPRING_RANGE: Range = { min: 1, max: 1e5, isLogarithmic: true };
 const POISSON_RANGE: Range = { min: 0.3, max: 0.499 };
 const THICKNESS_RANGE: Range = { min: 0.5e-3, max: 30e-3, isLogarithmic: true };
-
-/** A parameter of a law beside stiffness and Poisson's ratio, with what it begins at when the law is chosen. */
-interface Parameter {
-  key: 'c01' | 'c20' | 'c30' | 'alpha' | 'b';
-  dimension: Dimension;
-  start: (young: number) => string | number;
-}
-const quarterShear = (young: number): string => formatQuantity(young / 24, 'pressure');
-const PARAMETERS: Partial<Record<LawName, Parameter[]>> = {
-  'mooney-rivlin': [{ key: 'c01', dimension: 'pressure', start: quarterShear }],
-  yeoh: [
-    { key: 'c20', dimension: 'pressure', start: quarterShear },
-    { key: 'c30', dimension: 'pressure', start: quarterShear },
-  ],
-  ogden: [{ key: 'alpha', dimension: 'number', start: () => 8 }],
-  fung: [{ key: 'b', dimension: 'number', start: () => 10 }],
-};
 
 export function TissuesPanel() {
   const layers = scene.value?.layer ?? [];
@@ -42,36 +26,18 @@ export function TissuesPanel() {
   );
 }
 
-/** The tissue as a table of its own, which a name of the catalogue is not. */
-function asTable(layer: LayerTable, info: LayerInfo | undefined): TissueTable {
-  if (typeof layer.tissue !== 'string') return layer.tissue;
-  const law = LAWS.find((name) => name === info?.law) ?? 'neo-hookean';
-  const young = info?.stiffness ?? 2e4;
-  return { name: layer.tissue, law, young: formatQuantity(young, 'pressure', 4), poisson: 0.45, ...starts(law, young) };
-}
-
-function starts(law: LawName, young: number): Partial<TissueTable> {
-  return Object.fromEntries((PARAMETERS[law] ?? []).map(({ key, start }) => [key, start(young)]));
-}
-
 function LayerFields({ index, layer, info }: { index: number; layer: LayerTable; info: LayerInfo | undefined }) {
   const path = `/layer/${index}`;
   const isNamed = typeof layer.tissue === 'string';
-  const table = asTable(layer, info);
+  const table = typeof layer.tissue === 'string' ? writtenOut(layer.tissue, info?.law, info?.stiffness) : layer.tissue;
   const key = stiffnessKey(table);
-  const law = table.law ?? 'neo-hookean';
+  const law = table.law ?? DEFAULT_LAW;
   const before = original.value?.layer?.[index];
   const isChanged = before !== undefined && JSON.stringify(before) !== JSON.stringify(layer);
 
-  // A tissue of the catalogue becomes one of the scene's own with the first value that is changed.
+  // A tissue of the catalogue becomes a table in the scene with the first value that is changed.
   const change = (name: string, value: unknown): Promise<string | null> =>
     isNamed ? edit([`${path}/tissue`, { ...table, [name]: value }]) : edit([`${path}/tissue/${name}`, value]);
-  const changeLaw = (next: LawName): void => {
-    const kept: TissueTable = { ...table, law: next, young: formatQuantity(info?.stiffness ?? 2e4, 'pressure', 4) };
-    for (const other of ['shear', 'c10', 'c01', 'c20', 'c30', 'alpha', 'b', 'terms', 'volume']) delete kept[other];
-    aloud(edit([`${path}/tissue`, { ...kept, ...starts(next, info?.stiffness ?? 2e4) }]));
-  };
-
   const name = named('tissue', tissueName(layer.tissue, t('tissues.unnamed')));
   return (
     <Section
@@ -84,13 +50,13 @@ function LayerFields({ index, layer, info }: { index: number; layer: LayerTable;
         <Select
           label={t('tissues.law')}
           value={law}
-          options={LAWS.map((value) => ({ value, label: t(`law.${value}` as Key) }))}
-          onChange={changeLaw}
+          options={LAW_NAMES.map((value) => ({ value, label: t(`law.${value}`) }))}
+          onChange={(next) => aloud(edit([`${path}/tissue`, underLaw(table, next, info?.stiffness)]))}
           testid={`layer-${index}-law`}
         />
       )}
       <QuantityField
-        label={t(`tissues.${key}` as Key)}
+        label={t(`tissues.${key}`)}
         value={writtenQuantity(table[key]) || (info === undefined ? '' : formatQuantity(info.stiffness, 'pressure', 4))}
         dimension={key === 'spring' ? 'spring' : 'pressure'}
         range={rangeOf(key, table)}
@@ -99,10 +65,10 @@ function LayerFields({ index, layer, info }: { index: number; layer: LayerTable;
         testid={`layer-${index}-young`}
       />
       {key !== 'spring' && <CompressibilityField index={index} table={table} change={change} />}
-      {(PARAMETERS[law] ?? []).filter(() => table.terms === undefined).map((parameter) => (
+      {(table.terms === undefined ? LAWS[law] : []).map((parameter) => (
         <QuantityField
           key={parameter.key}
-          label={t(`tissues.${parameter.key}` as Key)}
+          label={t(`tissues.${parameter.key}`)}
           value={writtenQuantity(table[parameter.key])}
           dimension={parameter.dimension}
           onCommit={(value) => change(parameter.key, parameter.dimension === 'number' ? parseQuantity(value, 'number') ?? value : value)}
@@ -141,7 +107,7 @@ function CompressibilityField(props: {
   return (
     <QuantityField
       label={t('tissues.poisson')}
-      value={writtenQuantity(table.poisson ?? 0.45)}
+      value={writtenQuantity(table.poisson ?? DEFAULT_POISSON)}
       dimension="number"
       range={POISSON_RANGE}
       onCommit={(value) => change('poisson', parseQuantity(value, 'number') ?? value)}

@@ -1,49 +1,32 @@
-// What presses: shape, size and friction.
+// The tool: shape, size and friction.
 
+import type { ToolTable } from '../../generated/scene';
 import { t } from '../../i18n';
+import { DEFAULT_SHAPE, reshaped, TOOL_SHAPES, TOOL_SHAPE_NAMES, type ToolField } from '../../scene/toolshapes';
 import { edit, scene } from '../../store';
-import { aloud, Controlled, QuantityField, Section, Select } from '../controls';
+import { aloud, Controlled, PointFields, QuantityField, Section, Select } from '../controls';
 import { parseQuantity, writtenQuantity } from '../quantity';
-import { TOOL_SHAPES, type ToolShape, type ToolTable } from '../scene_table';
-import { PointFields } from './LumpsPanel';
-
-/** Tools that hold the skin need scenes of their own: they can be kept, not chosen. */
-const CHOOSABLE: ToolShape[] = ['sphere', 'flat-punch', 'capsule', 'box', 'fingertip'];
 
 export function ToolPanel() {
   const tool = scene.value?.tool ?? {};
-  const shape = tool.shape ?? 'disc';
-  const length = (key: 'radius' | 'edge_radius' | 'length', max: number) =>
-    tool[key] !== undefined && (
-      <QuantityField
-        label={t(`tool.${key}`)}
-        value={tool[key]}
-        dimension="length"
-        range={{ min: key === 'edge_radius' ? 0.1e-3 : 2e-3, max }}
-        onCommit={(value) => edit([`/tool/${key}`, value])}
-        testid={`tool-${key}`}
-      />
-    );
+  const shape = tool.shape ?? DEFAULT_SHAPE;
+  const { fields, isContact } = TOOL_SHAPES[shape];
   return (
     <Controlled>
       <Section title={t('tool.shape_and_size')}>
         <Select
           label={t('tool.shape')}
           value={shape}
-          options={TOOL_SHAPES.filter((value) => CHOOSABLE.includes(value) || value === shape).map((value) => ({
+          options={TOOL_SHAPE_NAMES.filter((value) => TOOL_SHAPES[value].isContact || value === shape).map((value) => ({
             value,
             label: t(`tool_shape.${value}`),
           }))}
           onChange={(chosen) => aloud(edit(['/tool', reshaped(tool, chosen)]))}
           testid="tool-shape"
         />
-        {length('radius', 25e-3)}
-        {length('length', 60e-3)}
-        {tool.size !== undefined && <PointFields label={t('tool.size')} value={tool.size} path="/tool/size" />}
-        {tool.radii !== undefined && <PointFields label={t('tool.radii')} value={tool.radii} path="/tool/radii" names={['1', '2', '3']} />}
-        {length('edge_radius', 5e-3)}
+        {fields.map((field) => <SizeField key={field.key} field={field} tool={tool} />)}
       </Section>
-      {CHOOSABLE.includes(shape) && (
+      {isContact && (
         <Section title={t('tool.friction')} hint={t('tool.friction_hint')}>
           <QuantityField
             label={t('tool.coefficient')}
@@ -59,24 +42,22 @@ export function ToolPanel() {
   );
 }
 
-/** Each shape has sizes of its own; those of another would be refused. */
-function reshaped(tool: ToolTable, shape: ToolShape): ToolTable {
-  const radius = tool.radius ?? '10 mm';
-  const friction = tool.friction === undefined ? {} : { friction: tool.friction };
-  switch (shape) {
-    case 'flat-punch':
-      return { shape, radius, edge_radius: '1.5 mm', ...friction };
-    case 'capsule':
-      return { shape, radius, length: '20 mm', ...friction };
-    case 'box':
-      return { shape, size: ['16 mm', '16 mm', '16 mm'], edge_radius: '2 mm', ...friction };
-    case 'fingertip':
-      return { shape, radii: ['8 mm', '7 mm', '7 mm'], ...friction };
-    case 'node':
-      return { shape };
-    case 'disc':
-      return { shape, radius };
-    case 'sphere':
-      return { shape, radius, ...friction };
+function SizeField({ field, tool }: { field: ToolField; tool: ToolTable }) {
+  const path = `/tool/${field.key}`;
+  const label = t(`tool.${field.key}`);
+  if ('names' in field) {
+    const value = tool[field.key];
+    return value === undefined ? null : <PointFields label={label} value={value} path={path} names={field.names} />;
   }
+  const value = tool[field.key];
+  return value === undefined ? null : (
+    <QuantityField
+      label={label}
+      value={value}
+      dimension="length"
+      range={field}
+      onCommit={(written) => edit([path, written])}
+      testid={`tool-${field.key}`}
+    />
+  );
 }

@@ -1,25 +1,14 @@
-// How the body is shown: colours, layers, the cutaway.
+// The view: colours, layers, the cutaway.
 
-import { named, t, type Key } from '../../i18n';
+import { named, t } from '../../i18n';
 import { isHiding, isWatching, notify, state } from '../../store';
-import type { ColourBy, ViewOptions } from '../../scene';
+import { COLOURINGS, quantityOf, type ViewOptions } from '../../scene';
 import { Button, Section, Segmented, Select, Slider, Toggle } from '../controls';
 import { bodyView, legend, section } from '../body';
 import { parseQuantity, formatNumber } from '../quantity';
-import { isTelling, neededField, show, view, wanted } from '../settings';
+import { showsLumps, neededField, show, view, wanted } from '../settings';
 import { saveImage } from '../save';
 import { useId, useState } from 'preact/hooks';
-
-const COLOURS: ColourBy[] = ['tissue', 'layer', 'displacement', 'von_mises', 'pressure', 'stretch', 'stiffness'];
-
-/** The unit in which a map's range is typed, and what it is in SI. */
-const RANGE_UNITS: Partial<Record<ColourBy, [unit: string, factor: number]>> = {
-  displacement: ['mm', 1e-3],
-  von_mises: ['kPa', 1e3],
-  pressure: ['kPa', 1e3],
-  stretch: ['', 1],
-  stiffness: ['kPa', 1e3],
-};
 
 export function ViewPanel() {
   const options = view.value;
@@ -31,10 +20,10 @@ export function ViewPanel() {
         <Select
           label={t('view.colour_by')}
           value={options.colourBy}
-          options={COLOURS.map((value) => ({
+          options={COLOURINGS.map((value) => ({
             value,
-            label: t(`colour.${value}` as Key),
-            disabled: hiding && isTelling(value),
+            label: t(`colour.${value}`),
+            disabled: hiding && showsLumps(value),
           }))}
           onChange={(colourBy) => show({ colourBy, range: null })}
           testid="colour-by"
@@ -87,9 +76,9 @@ export function ViewPanel() {
 }
 
 function RangeFields({ options }: { options: ViewOptions }) {
-  const unit = RANGE_UNITS[options.colourBy];
-  if (unit === undefined) return null;
-  const [name, factor] = unit;
+  const quantity = quantityOf(options.colourBy);
+  if (quantity === null) return null;
+  const [name, factor] = quantity.typed;
   const isFixed = options.range !== null;
   const shown = options.range ?? (legend.value === null ? null : [legend.value.min, legend.value.max]);
   return (
