@@ -13,7 +13,7 @@ mod prepare;
 pub mod press;
 
 pub use error::one_paragraph;
-pub use note::{Note, in_words, note_schema};
+pub use note::{LayerAspect, Note, in_words, note_schema};
 pub use palpa_device as device;
 pub use palpa_fem as fem;
 pub use palpa_mesh as mesh;

@@ -163,8 +163,8 @@ pub enum Note {
     FirstSpeedOnly,
     /// Levels are too flat or too tall for bars to stand for a Young's modulus.
     BarAspects {
-        /// Each layer's name, and the height of its levels over the length of edges near the tool.
-        layers: Vec<(String, f64)>,
+        /// The layers that are.
+        layers: Vec<LayerAspect>,
         /// Smallest sound ratio.
         least: f64,
         /// Largest sound ratio.
@@ -233,6 +233,15 @@ pub enum Note {
         /// What differs, in English.
         text: String,
     },
+}
+
+/// The shape of a layer's levels.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LayerAspect {
+    /// Name of the layer.
+    pub name: String,
+    /// Height of its levels over the length of the skin's edges near the tool.
+    pub aspect: f64,
 }
 
 impl Note {
@@ -422,7 +431,7 @@ impl fmt::Display for Note {
                 most,
             } => {
                 let unsound: Vec<String> = (layers.iter())
-                    .map(|(name, aspect)| format!("{name} {aspect:.2}"))
+                    .map(|layer| format!("{} {:.2}", layer.name, layer.aspect))
                     .collect();
                 write!(
                     f,

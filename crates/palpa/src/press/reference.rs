@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::place::mesh_size_near;
 use super::{Phase, Place, Waypoint, tidy, waypoints};
 use crate::build::BuiltBody;
-use crate::note::{Note, xyz};
+use crate::note::{LayerAspect, Note, xyz};
 
 /// Samples of a rest, evenly spread: springs do not relax, so that it is all the same.
 const HOLD_SAMPLES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
@@ -374,12 +374,15 @@ pub(crate) fn nodes_under_disc(
 
 /// Says which layers have levels too flat or too tall for bars to stand for their modulus.
 fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<Note>) {
-    let unsound: Vec<(String, f64)> = (built.growth.report.layers.iter().zip(&scene.layers))
+    let unsound: Vec<LayerAspect> = (built.growth.report.layers.iter().zip(&scene.layers))
         .filter(|(_, layer)| layer.tissue.elastic().is_some())
         .filter_map(|(report, _)| {
             let height = report.thickness.median / report.n_levels as f64;
             let aspect = height / mesh_size;
-            (!SOUND_ASPECT.contains(&aspect)).then(|| (report.name.clone(), aspect))
+            (!SOUND_ASPECT.contains(&aspect)).then(|| LayerAspect {
+                name: report.name.clone(),
+                aspect,
+            })
         })
         .collect();
     if !unsound.is_empty() {

@@ -1,7 +1,8 @@
 // Scenes: the gallery, files, and what is known about the loaded one.
 
 import { useRef } from 'preact/hooks';
-import { named, t } from '../../i18n';
+import { language, named, t } from '../../i18n';
+import { noteWords } from '../../i18n/notes';
 import { ask, askAloud, notify, state } from '../../store';
 import { Button, Controlled, Download, Section } from '../controls';
 import { formatNumber } from '../quantity';
@@ -88,7 +89,7 @@ export function ScenePanel() {
             <dt>{t('scene.max_force')}</dt>
             <dd>{formatNumber(now.max_force)} N</dd>
           </dl>
-          {now.notes.length > 0 && <ul class="notes">{now.notes.map(({ text }) => <li key={text}>{text}</li>)}</ul>}
+          {now.notes.length > 0 && <ul class="notes">{now.notes.map((note) => <li key={note.text}>{noteWords(note, language.value)}</li>)}</ul>}
         </Section>
       )}
     </>

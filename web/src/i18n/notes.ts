@@ -1,0 +1,100 @@
+// Words of the engine's notes. The engine sends kind and numbers; each kind has an entry for each language here, so that a
+// new kind does not compile without its words.
+
+import type { Note } from '../generated/notes';
+import { inMillimetres } from '../ui/quantity';
+import type { Language } from '.';
+
+type Kind = Note['kind'];
+type Of<K extends Kind> = Extract<Note, { kind: K }>;
+type Words = { [K in Kind]: (note: Of<K>) => string };
+
+const percent = (share: number) => `${Math.round(100 * share)} %`;
+const place = (at: readonly number[]) => `(${at.map((x) => (x * 1e3).toFixed(1)).join(', ')}) mm`;
+const mm = inMillimetres;
+
+/** The repairs that were made, with their counts. */
+function repairs(note: Of<'repaired'>, names: readonly string[]): string {
+  const counts = [note.n_welded, note.n_degenerate, note.n_duplicate, note.n_unused, note.n_flipped];
+  return counts.flatMap((n, i) => (n > 0 ? [`${names[i]} ${n}`] : [])).join(', ');
+}
+
+const en: Words = {
+  file_read: ({ file, text }) => `${file}: ${text}`,
+  unusual_size: ({ file, size }) => `${file} is ${size.toFixed(4)} m large. No body part is that size: check “unit” in the scene.`,
+  repaired: (note) => `${note.file} was repaired: ${repairs(note, ['vertices welded:', 'triangles without area dropped:', 'double triangles dropped:', 'unused vertices dropped:', 'triangles turned outward:'])}`,
+  base_overlaps: ({ n_pairs }) => `The base of the body passes through itself (${n_pairs} pairs of triangles). Look at the cutaway before you trust forces near there.`,
+  cutout_near: ({ radius, enough }) => `The cut-out has a radius of ${mm(radius, 0)}; its rim may be felt below ${mm(enough, 0)}.`,
+  oblique_press: ({ angle }) => `The press direction is ${Math.round((angle * 180) / Math.PI)}° from the skin's normal: the tool drags more than it presses.`,
+  press_on_cut_face: () => 'The place that is pressed lies on a cut face. The force there is that of a free edge.',
+  skin_too_coarse: ({ n_triangles, max_vertices }) => `${n_triangles} skin triangles are larger than wanted, because the limit of ${max_vertices} vertices was reached.`,
+  levels_too_high: ({ max_levels }) => `Levels are higher than wanted, because there are ${max_levels} already.`,
+  lump_not_refined: ({ lump }) => `The mesh is not refined round the lump “${lump}”, because its size is not known. Set [mesh] near_lumps.`,
+  lump_partly_outside: ({ lump, share, at }) => `${percent(share)} of the lump “${lump}” at ${place(at)} lies in the tissue. The rest does not count.`,
+  disc_not_imprinted: ({ why }) => `The edge of the disc could not be cut into the mesh: ${why}`,
+  disc_patch: ({ n_vertices, radius, effective_radius }) => `${n_vertices} skin vertices lie under the disc of radius ${mm(radius)}; they hold a patch of radius ${mm(effective_radius)}.`,
+  cut_face_not_flat: ({ at }) => `The cut face at ${place(at)} is not flat, so it cannot be a plane of symmetry. It was left free.`,
+  speeds_alike: () => 'No tissue relaxes and nothing has mass here: every speed gives the same force.',
+  single_triangles: ({ n, n_all }) => `${n} of ${n_all} skin triangles have no partner. The prisms under them are too stiff where tissue keeps its volume.`,
+  coarse_under_tool: ({ edge, radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of its radius of ${mm(radius)}: the force depends on the mesh. Refine it with [mesh] near_tool.`,
+  coarse_at_edge: ({ edge, edge_radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of the radius of its edge, ${mm(edge_radius)}: the force depends on the steps. Make the edge rounder or the mesh finer.`,
+  tension_lost: ({ layer }) => `The cut faces are free and let go of most of the tension of “${layer}”. Set cut_faces = "fixed" or "symmetric" to keep it.`,
+  long_friction_steps: ({ step, enough }) => `With friction the force depends on the steps, here of ${mm(step, 2)}. Steps of ${mm(enough, 2)} are short enough.`,
+  few_under_disc: ({ n_vertices, radius, edge }) => `Only ${n_vertices} skin vertices lie under the tool of radius ${mm(radius)}, with edges of ${mm(edge)} there: the force depends on the mesh.`,
+  tension_left_out: () => 'Bars have no tension at rest; “prestress” was left out.',
+  first_speed_only: () => 'Bars have no time: only the first of “speeds” was run.',
+  bar_aspects: ({ layers, least, most }) => `Height of levels over length of skin edges: ${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join(', ')}. Outside ${least} to ${most} bars are too stiff across or too soft in shear.`,
+  tension_relaxes: () => 'The tension of the layers is not in equilibrium at the start: the first steps relax it.',
+  motion_off_skin: ({ far, length }) => `${mm(far, 0)} along its motion the tool is off the skin, where nothing is felt. Shorten the motion (now ${mm(length, 0)}).`,
+  tool_replaced: ({ tool, by }) => `A hand presses by contact: the scene's ${tool} was replaced by a ${by}.`,
+  coarser_for_touch: ({ edge }) => `Skin edges under the tool are ${mm(edge)} long, so that the body can follow a hand. [mesh] near_tool makes them finer.`,
+  step_failed: ({ depth }) => `The step to ${mm(depth, 2)} failed. Press less deep, or refine the mesh there.`,
+  turned_prisms: ({ n, depth, at }) => `${n} prisms have a corner turned inside out at ${mm(depth, 2)}, the worst near ${place(at)}. The force may be off.`,
+  friction_smoothed: ({ n, n_all, slip }) => `Friction had to be smoothed in ${n} of ${n_all} steps, over a slip of up to ${Math.round(slip * 1e6)} µm.`,
+  few_touching: ({ n_vertices, radius, edge }) => `At most ${n_vertices} skin vertices touch the tool, over a circle of radius ${mm(radius)} with edges of ${mm(edge)}: the force depends on the mesh.`,
+  departure: ({ text }) => text,
+};
+
+const ja: Words = {
+  file_read: ({ file, text }) => `${file}：${text}`,
+  unusual_size: ({ file, size }) => `${file} の大きさは ${size.toFixed(4)} m です。この大きさの体の部位はありません。シーンの unit を確認してください。`,
+  repaired: (note) => `${note.file} を修復しました：${repairs(note, ['結合した頂点', '面積のない三角形の削除', '重複した三角形の削除', '未使用の頂点の削除', '外向きに直した三角形'])}`,
+  base_overlaps: ({ n_pairs }) => `体の底面が自分自身と交差しています（三角形 ${n_pairs} 組）。その付近の力を使う前に断面を確認してください。`,
+  cutout_near: ({ radius, enough }) => `切り出しの半径は ${mm(radius, 0)} です。${mm(enough, 0)} 未満では縁の影響を感じることがあります。`,
+  oblique_press: ({ angle }) => `押す方向が皮膚の法線から ${Math.round((angle * 180) / Math.PI)}° ずれています。押すよりも引きずる動きになります。`,
+  press_on_cut_face: () => '押す位置が切断面の上にあります。そこでの力は自由端の力です。',
+  skin_too_coarse: ({ n_triangles, max_vertices }) => `頂点数の上限 ${max_vertices} に達したため、皮膚の三角形 ${n_triangles} 個が希望より大きくなっています。`,
+  levels_too_high: ({ max_levels }) => `層の分割がすでに ${max_levels} 段あるため、希望より粗くなっています。`,
+  lump_not_refined: ({ lump }) => `しこり「${lump}」の大きさが分からないため、周囲のメッシュを細かくできません。[mesh] near_lumps を設定してください。`,
+  lump_partly_outside: ({ lump, share, at }) => `${place(at)} のしこり「${lump}」のうち組織の中にあるのは ${percent(share)} です。残りは計算に含まれません。`,
+  disc_not_imprinted: ({ why }) => `円板の縁をメッシュに刻めませんでした：${why}`,
+  disc_patch: ({ n_vertices, radius, effective_radius }) => `半径 ${mm(radius)} の円板の下に皮膚の頂点が ${n_vertices} 個あり、半径 ${mm(effective_radius)} の範囲を保持します。`,
+  cut_face_not_flat: ({ at }) => `${place(at)} の切断面は平らでないため、対称面にできません。自由端としました。`,
+  speeds_alike: () => '緩和する組織も質量もないため、どの速度でも力は同じです。',
+  single_triangles: ({ n, n_all }) => `皮膚の三角形 ${n_all} 個のうち ${n} 個に組になる相手がありません。体積を保つ組織では、その下が硬くなりすぎます。`,
+  coarse_under_tool: ({ edge, radius }) => `工具付近の皮膚の辺の長さは ${mm(edge)} で、工具の半径 ${mm(radius)} の 3 分の 1 を超えています。力がメッシュに依存します。[mesh] near_tool で細かくしてください。`,
+  coarse_at_edge: ({ edge, edge_radius }) => `工具付近の皮膚の辺の長さは ${mm(edge)} で、工具の縁の半径 ${mm(edge_radius)} の 3 分の 1 を超えています。力がステップに依存します。縁を丸くするか、メッシュを細かくしてください。`,
+  tension_lost: ({ layer }) => `切断面が自由なため、「${layer}」の張力の大部分が失われます。保つには cut_faces を "fixed" か "symmetric" にしてください。`,
+  long_friction_steps: ({ step, enough }) => `摩擦があるとき、力はステップの長さ（現在 ${mm(step, 2)}）に依存します。${mm(enough, 2)} 以下なら十分です。`,
+  few_under_disc: ({ n_vertices, radius, edge }) => `半径 ${mm(radius)} の工具の下にある皮膚の頂点は ${n_vertices} 個だけです（辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
+  tension_left_out: () => '棒には初期張力がないため、prestress は使われません。',
+  first_speed_only: () => '棒には時間の効果がないため、speeds の最初の値だけを使いました。',
+  bar_aspects: ({ layers, least, most }) => `層の高さと皮膚の辺の長さの比：${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join('、')}。${least}〜${most} の範囲外では、棒の硬さが正しくありません。`,
+  tension_relaxes: () => '開始時に層の張力が釣り合っていません。最初の数ステップで釣り合います。',
+  motion_off_skin: ({ far, length }) => `動作の ${mm(far, 0)} の位置で工具が皮膚から外れ、力を感じません。動作の長さ（現在 ${mm(length, 0)}）を短くしてください。`,
+  tool_replaced: ({ tool, by }) => `手は接触で押します。シーンの工具（${tool}）を ${by} に置き換えました。`,
+  coarser_for_touch: ({ edge }) => `手の動きに追従できるよう、工具の下の皮膚の辺の長さを ${mm(edge)} にしました。[mesh] near_tool で細かくできます。`,
+  step_failed: ({ depth }) => `${mm(depth, 2)} までのステップに失敗しました。浅く押すか、その付近のメッシュを細かくしてください。`,
+  turned_prisms: ({ n, depth, at }) => `深さ ${mm(depth, 2)} で ${n} 個の要素が裏返っています（最悪の位置 ${place(at)}）。力が正しくない可能性があります。`,
+  friction_smoothed: ({ n, n_all, slip }) => `${n_all} ステップ中 ${n} ステップで摩擦を平滑化しました（滑り 最大 ${Math.round(slip * 1e6)} µm）。`,
+  few_touching: ({ n_vertices, radius, edge }) => `工具に触れる皮膚の頂点は最大 ${n_vertices} 個です（半径 ${mm(radius)}、辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
+  departure: ({ text }) => text,
+};
+
+const WORDS: Record<Language, Words> = { en, ja };
+
+/** A note of the engine in a language; its English words where the page knows no such kind. */
+export function noteWords(note: { kind: string; values: Record<string, unknown>; text: string }, language: Language): string {
+  const words = WORDS[language] as Record<string, ((note: never) => string) | undefined>;
+  return words[note.kind]?.({ kind: note.kind, ...note.values } as never) ?? note.text;
+}
