@@ -30,7 +30,11 @@ unpack_debian() {
     (cd "$debian/packages" && apt-get download rustc-web rust-web-src libstd-rust-web-dev "$std" "$llvm" libz3-4 \
         binutils-mingw-w64-x86-64 >/dev/null 2>&1) || return 1
     local package
-    for package in "$debian"/packages/*.deb; do dpkg -x "$package" "$debian/root"; done
+    mkdir "$debian/root"
+    # LLVM's own source and the manuals are most of it, and not needed.
+    for package in "$debian"/packages/*.deb; do
+        dpkg --fsys-tarfile "$package" | tar -x -C "$debian/root" --exclude './usr/src/*/src' --exclude './usr/share'
+    done
     rm -r "$debian/packages"
     printf '#!/bin/sh\nLD_LIBRARY_PATH="%s" exec "%s" "$@"\n' \
         "$debian/root/usr/lib/x86_64-linux-gnu" "$debian/root/usr/bin/rustc" >"$debian/rustc.new"
@@ -43,6 +47,9 @@ depends_of() {
     apt-cache depends "$1" 2>/dev/null | grep -oE "\b$2\b" | head -n 1 | grep .
 }
 
+# The workspace's profile optimises dependencies, which a check does not need.
+quick=(--config 'profile.dev.package."*".opt-level=0')
+
 with_std=() from_source=()
 for target in "${targets[@]}"; do
     if has_target "$target"; then with_std+=(--target "$target"); else from_source+=(--target "$target"); fi
@@ -50,12 +57,12 @@ done
 
 if [ ${#with_std[@]} -gt 0 ]; then
     echo "cross: cargo check ${with_std[*]}"
-    cargo check --workspace "${with_std[@]}"
+    cargo check --workspace "${quick[@]}" "${with_std[@]}"
 fi
 
 if [ ${#from_source[@]} -gt 0 ]; then
     # `-Z build-std` is cargo's way to compile the standard library; RUSTC_BOOTSTRAP lets a stable cargo take it.
-    check=(cargo check --workspace -Z build-std=std,panic_unwind "${from_source[@]}")
+    check=(cargo check --workspace -Z build-std=std,panic_unwind "${quick[@]}" "${from_source[@]}")
     export RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR="$folder/target"
     if [ -f "$(rustc --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then
         echo "cross: with the toolchain's source: ${check[*]}"
