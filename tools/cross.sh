@@ -33,7 +33,9 @@ unpack_debian() {
     mkdir "$debian/root"
     # LLVM's own source and the manuals are most of it, and not needed.
     for package in "$debian"/packages/*.deb; do
-        dpkg --fsys-tarfile "$package" | tar -x -C "$debian/root" --exclude './usr/src/*/src' --exclude './usr/share'
+        dpkg --fsys-tarfile "$package" |
+            tar -x -C "$debian/root" --anchored --no-wildcards-match-slash --exclude './usr/src/*/src' \
+                --exclude './usr/share' || return 1
     done
     rm -r "$debian/packages"
     printf '#!/bin/sh\nLD_LIBRARY_PATH="%s" exec "%s" "$@"\n' \
