@@ -3,7 +3,8 @@
 # make dist       one binary with the page inside, packed for others
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
-# make docs       the API documentation, without a warning
+# make docs       the API documentation without a warning, the book of docs/, and all links checked
+# make cross      cargo check for Windows and for Linux on ARM, with the standard library that can be had here
 # make loop       a minute of the 1 kHz loop in real time, and the same minute run again
 # make bench      the thesis's table and the moving step, measured here
 
@@ -13,9 +14,13 @@ RESULTS := $(TARGET)/tmp/results
 VENV    := $(TARGET)/venv
 SHOTS   ?= $(TARGET)/tmp/screenshots
 PAGE    := web/dist/index.html
+BOOK    := $(TARGET)/book
+# Where mdBook is installed if it is not on the path; a folder that outlives the tree saves building it again.
+BOOK_TOOLS ?= $(abspath $(TARGET))/tools
+MDBOOK  := $(or $(shell command -v mdbook 2>/dev/null),$(BOOK_TOOLS)/bin/mdbook)
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 
-.PHONY: run test test-page test-data shared lint docs bench loop dist
+.PHONY: run test test-page test-data shared lint docs cross bench loop dist
 
 run: $(PAGE)
 	cargo run --release --package palpa-cli -- view
@@ -69,8 +74,21 @@ define with
 @if command -v $(1) >/dev/null; then echo "$(2)"; $(2); else echo "lint: $(1) is not installed, left out"; fi
 endef
 
-docs:
+docs: $(MDBOOK) tools/book/node_modules/.package-lock.json
 	RUSTDOCFLAGS="--deny warnings" cargo doc --workspace --no-deps
+	"$(MDBOOK)" build --dest-dir "$(abspath $(BOOK))"
+	node tools/book/links.mjs "$(BOOK)"
+
+# Three minutes of CPU time.
+$(BOOK_TOOLS)/bin/mdbook:
+	cargo install mdbook --version 0.5.4 --locked --no-default-features --root "$(BOOK_TOOLS)"
+
+tools/book/node_modules/.package-lock.json: tools/book/package-lock.json
+	cd tools/book && npm ci --no-audit --no-fund
+	touch $@
+
+cross:
+	tools/cross.sh
 
 bench:
 	cargo run --release --package palpa-cli -- reproduce
