@@ -9,7 +9,7 @@ use crate::{Surface, Vec3};
 /// not taken to mean anything. A cap of 10° opening is at 0.03; noise on a flat sheet is far below.
 const LEAST_BULGE: f64 = 1e-3;
 
-/// What turning triangles has come to.
+/// Triangles and parts that were turned, and those that could not be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct OrientReport {
     /// Triangles that were turned to agree with their neighbours or to face outward.
@@ -117,14 +117,9 @@ pub fn orient(surface: &mut Surface) -> OrientReport {
         for t in patch.odd_triangles() {
             flip(surface, t);
         }
-        let shape = Enclosed::of(surface, &patch.triangles);
-        let is_inverted = match (shape.is_closed, shape.facing()) {
-            (_, None) => {
-                report.n_undecided += 1;
-                false
-            }
-            (_, Some(is_outward)) => !is_outward,
-        };
+        let (shape, facing) = facing(surface, &patch.triangles);
+        report.n_undecided += usize::from(facing.is_none());
+        let is_inverted = facing == Some(false);
         if is_inverted {
             if shape.is_closed {
                 report.n_inverted_closed += 1;
@@ -149,7 +144,24 @@ fn flip(surface: &mut Surface, t: u32) {
     surface.triangles[t as usize].swap(1, 2);
 }
 
-/// What some triangles enclose, once their boundary loops are capped. Triangles that are not finite count as absent.
+/// What some consistently wound triangles enclose, and whether they face outward; `None` where that is
+/// not clear. The triangles are given back as they were.
+///
+/// Triangles face inward only if they face outward once they are turned. Where the volume is nothing but
+/// rounding error, both ways may look inward.
+pub(crate) fn facing(surface: &mut Surface, triangles: &[u32]) -> (Enclosed, Option<bool>) {
+    let shape = Enclosed::of(surface, triangles);
+    let mut facing = shape.facing();
+    if facing == Some(false) {
+        triangles.iter().for_each(|&t| flip(surface, t));
+        let turned = Enclosed::of(surface, triangles).facing();
+        triangles.iter().for_each(|&t| flip(surface, t));
+        facing = (turned == Some(true)).then_some(false);
+    }
+    (shape, facing)
+}
+
+/// Volume and area of some triangles, once their boundary loops are capped. Triangles that are not finite count as absent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Enclosed {
     /// Signed volume, positive when the triangles face outward. m³
@@ -196,7 +208,7 @@ impl Enclosed {
     }
 
     /// Whether the triangles face outward, or `None` where an open part is too flat to say.
-    pub(crate) fn facing(&self) -> Option<bool> {
+    fn facing(&self) -> Option<bool> {
         let ball = self.area.powf(1.5) / (6.0 * std::f64::consts::PI.sqrt());
         let is_clear = self.is_closed || self.volume.abs() > LEAST_BULGE * ball;
         is_clear.then_some(self.volume >= 0.0)

@@ -2,6 +2,7 @@
 
 use palpa_mesh::orient::orient;
 use palpa_mesh::{RepairOptions, Surface, Vec3, Verdict, check_surface, examine, repair};
+use nalgebra::Rotation3;
 use proptest::prelude::*;
 
 use crate::shapes::{icosphere, joined, moebius, moved, tube};
@@ -46,19 +47,93 @@ proptest! {
     }
 
     #[test]
-    fn repair_is_idempotent_and_never_makes_things_worse(
+    fn a_second_repair_has_nothing_to_do(
         triangles in prop::collection::vec(prop::array::uniform3(0_u32..12), 1..40),
         jitter in prop::collection::vec(prop::array::uniform3(-2_i8..=2), 12),
     ) {
         // Small whole coordinates, so that corners coincide and lie on lines often.
         let points = jitter.iter().map(|p| Vec3::from(p.map(f64::from))).collect();
-        let (once, _) = repair(&Surface { points, triangles }, &RepairOptions::default());
-        let (twice, report) = repair(&once, &RepairOptions::default());
-        prop_assert_eq!(report.n_welded, 0);
-        prop_assert_eq!(report.n_unused, 0);
-        prop_assert!(twice.triangles.len() <= once.triangles.len());
-        prop_assert!(once.triangles.iter().flatten().all(|&v| (v as usize) < once.points.len()));
+        needs_no_second_repair(&Surface { points, triangles }, &RepairOptions::default());
     }
+
+    #[test]
+    fn a_second_repair_has_nothing_to_do_on_awkward_surfaces(
+        surface in awkward(),
+        weld_tolerance in prop::sample::select(vec![0.0, 1e-9, 1e-6, 0.1]),
+        recentre: bool,
+    ) {
+        needs_no_second_repair(&surface, &RepairOptions { weld_tolerance, recentre });
+    }
+}
+
+/// Few vertices, many triangles on them: fans, doubles and folds. The vertices are on a small grid or on two
+/// lines, shifted by about the tolerance of welding or of flatness, then turned and moved away from the
+/// origin, so that nothing is exact.
+fn awkward() -> impl Strategy<Value = Surface> {
+    let vertex = (
+        prop::array::uniform3(-2_i8..=2),
+        any::<bool>(),
+        prop::array::uniform3(-2_i8..=2),
+    );
+    let shift = prop::sample::select(vec![0.0, 1e-12, 1e-9, 1e-6, 3e-6, 1e-3]);
+    let away = prop::sample::select(vec![0.0, 1e3, 1e9]);
+    let size = prop::sample::select(vec![1.0, 1e-3, 1e-90, 1e170]);
+    let shape = (any::<bool>(), shift, any::<bool>(), away, size);
+    (3..12_u32, prop::collection::vec(vertex, 12), shape).prop_flat_map(
+        |(n, vertices, (on_lines, shift, is_turned, away, size))| {
+            let turn = Rotation3::from_euler_angles(0.3, 1.1, 2.3);
+            let at = move |(p, line, q): &([i8; 3], bool, [i8; 3])| {
+                let mut at = Vec3::from(p.map(f64::from));
+                if on_lines {
+                    let direction = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 3.0, 2.0)];
+                    at = direction[usize::from(*line)] * (at.x + at.y / 3.0);
+                }
+                at += Vec3::from(q.map(f64::from)) * shift;
+                if is_turned {
+                    at = turn * at;
+                }
+                (at + Vec3::new(away, 0.0, -away)) * size
+            };
+            let points: Vec<Vec3> = vertices.iter().map(at).collect();
+            prop::collection::vec(prop::array::uniform3(0..n), 1..30).prop_map(move |triangles| {
+                let points = points.clone();
+                Surface { points, triangles }
+            })
+        },
+    )
+}
+
+/// Repairs a surface and asserts that repairing it again changes nothing.
+#[track_caller]
+fn needs_no_second_repair(surface: &Surface, options: &RepairOptions) -> Surface {
+    let (once, first) = repair(surface, options);
+    let (twice, second) = repair(&once, options);
+    let said = format!("{surface:?}\n{options:?}\nfirst {first:?}\nsecond {second:?}");
+    assert!(!second.is_changed(), "{said}");
+    assert_eq!(twice, once, "{said}");
+    assert!(once.triangles.len() <= surface.triangles.len(), "{said}");
+    assert!(
+        once.triangles
+            .iter()
+            .flatten()
+            .all(|&v| (v as usize) < once.points.len()),
+        "{said}"
+    );
+    once
+}
+
+/// Corners on one line, two triangles on them that are each other's double. Each used to be kept for the
+/// other's sake, and the one that was left after dropping doubles fell to the second repair.
+#[test]
+fn a_flat_triangle_and_its_double_both_go() {
+    let mut points = vec![Vec3::zeros(); 12];
+    points[1] = Vec3::new(-1.0, 0.0, 1.0);
+    points[4] = Vec3::new(0.0, 1.0, 2.0);
+    points[6] = Vec3::new(-2.0, -1.0, 0.0);
+    let triangles = vec![[1, 4, 6], [6, 4, 1]];
+    let surface = Surface { points, triangles };
+    let repaired = needs_no_second_repair(&surface, &RepairOptions::default());
+    assert_eq!(repaired, Surface::default());
 }
 
 #[test]
