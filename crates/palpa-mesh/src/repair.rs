@@ -1,4 +1,4 @@
-//! Repair of what can be repaired without guessing; what cannot is left as it is, for the check to report.
+//! Repair of the defects that can be repaired without guessing. The others stay, for the check to report.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -9,12 +9,12 @@ use crate::topology::{all_sides, by_edge, has_repeated_vertex};
 use crate::weld::weld_within;
 use crate::{Surface, Vec3};
 
-/// Vertices nearer than this share of the diagonal of the bounding box are welded unless the caller says otherwise: 0.3 µm on
-/// a forearm, far below what a skin resolves and far above the rounding of coordinates written with seven digits.
+/// Default weld tolerance, as a share of the diagonal of the bounding box. It is 0.3 µm on a forearm: far
+/// below the detail of a skin and far above the rounding of coordinates written with seven digits.
 pub const DEFAULT_WELD_TOLERANCE: f64 = 1e-6;
 
-/// The height of a triangle over its longest edge, as a share of that edge, below which it has no area. Its normal would be
-/// rounding error.
+/// Height of a triangle over its longest edge, as a share of that edge, below which it counts as flat. Its
+/// normal would be rounding error.
 pub(crate) const FLAT_HEIGHT: f64 = 1e-9;
 
 /// Offset of the centre of the bounding box from the origin, as a share of the diagonal, up to which a
@@ -25,11 +25,11 @@ const CENTRED: f64 = 1e-9;
 /// so two are enough for any coordinates that resolve the body.
 const MAX_MOVES: usize = 8;
 
-/// What a repair may do.
+/// Options of a repair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepairOptions {
-    /// Distance below which vertices are welded, as a share of the diagonal of the bounding box; 0 welds only what is at
-    /// exactly the same place.
+    /// Distance up to which vertices are welded, as a share of the diagonal of the bounding box. 0 welds
+    /// only vertices with exactly the same coordinates.
     pub weld_tolerance: f64,
     /// Whether to move the centre of the bounding box to the origin.
     pub recentre: bool,
@@ -44,7 +44,7 @@ impl Default for RepairOptions {
     }
 }
 
-/// What a repair did.
+/// Counts of the changes that a repair made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct RepairReport {
     /// Vertices that were merged into another.
@@ -62,14 +62,14 @@ pub struct RepairReport {
 }
 
 impl RepairReport {
-    /// Whether the repair changed anything.
+    /// Whether the repair changed the surface.
     pub fn is_changed(&self) -> bool {
         let n = self.n_welded + self.n_degenerate + self.n_duplicate + self.n_unused;
         n + self.orientation.n_flipped > 0 || self.moved_by.is_some()
     }
 
-    /// Counts in the changes of a later repair of the same surface. What could not be turned is as the
-    /// later one found it.
+    /// Adds the changes of a later repair of the same surface. The parts that cannot be turned are those of
+    /// the later one.
     fn add(&mut self, later: &Self) {
         self.n_welded += later.n_welded;
         self.n_degenerate += later.n_degenerate;
@@ -95,7 +95,7 @@ impl RepairReport {
 pub fn repair(surface: &Surface, options: &RepairOptions) -> (Surface, RepairReport) {
     let (mut surface, mut report) = mend(surface.clone(), options);
     if options.recentre {
-        // Moving rounds the coordinates, which may weld or flatten what was just clear of it.
+        // Moving rounds the coordinates. A triangle that was nearly flat may be flat afterwards.
         for _ in 0..MAX_MOVES {
             let Some(shift) = recentre(&mut surface) else {
                 break;

@@ -1,8 +1,8 @@
 //! Repair gives back what was there before the damage, and leaves alone what it must not guess.
 
+use nalgebra::Rotation3;
 use palpa_mesh::orient::orient;
 use palpa_mesh::{RepairOptions, Surface, Vec3, Verdict, check_surface, examine, repair};
-use nalgebra::Rotation3;
 use proptest::prelude::*;
 
 use crate::shapes::{icosphere, joined, moebius, moved, tube};
@@ -134,6 +134,83 @@ fn a_flat_triangle_and_its_double_both_go() {
     let surface = Surface { points, triangles };
     let repaired = needs_no_second_repair(&surface, &RepairOptions::default());
     assert_eq!(repaired, Surface::default());
+}
+
+/// Turning the longest side of the flat triangle a–m–b makes the flat triangle far–a–m, whose longest side
+/// turned makes the first one again.
+#[test]
+fn flat_triangles_are_not_turned_to_and_fro() {
+    let points = [
+        [0.0, 0.0, 0.0],
+        [4e-6, 4e-10, 0.0],
+        [1.0, 1e-4, 0.0],
+        [-1.0, 0.0, 0.0],
+    ];
+    let surface = Surface {
+        points: points.map(Vec3::from).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let repaired = needs_no_second_repair(&surface, &RepairOptions::default());
+    assert_eq!(repaired, surface);
+}
+
+/// The side of a closed part without volume is rounding error, which may differ when the part is turned.
+#[test]
+fn a_closed_part_without_volume_is_turned_once_at_most() {
+    let square = [[0., 0., 0.], [3., 0., 0.], [3., 1., 0.], [0., 1., 0.]];
+    for k in 0..200 {
+        let k = f64::from(k);
+        let turn = Rotation3::from_euler_angles(0.1 * k, 0.3 * k, 0.7 * k);
+        let surface = Surface {
+            points: square.map(|p| turn * Vec3::from(p)).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+        };
+        let repaired = needs_no_second_repair(&surface, &RepairOptions::default());
+        assert_eq!(repaired.triangles.len(), 4);
+    }
+}
+
+/// An unused vertex just outside used to take the place of a used one near it. That widened the bounding box,
+/// and with it the tolerance, so that the second repair welded the last two.
+#[test]
+fn unused_vertices_do_not_widen_the_tolerance() {
+    let points = [
+        [-1.7e-6, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.5, 0.5, 0.5],
+        [0.5 + 1.7320512e-6, 0.5, 0.5],
+    ];
+    let surface = Surface {
+        points: points.map(Vec3::from).to_vec(),
+        triangles: vec![[1, 3, 2], [1, 2, 4], [1, 4, 3], [2, 3, 4], [5, 6, 3]],
+    };
+    let repaired = needs_no_second_repair(&surface, &RepairOptions::default());
+    assert_eq!(repaired.points, surface.points[1..]);
+}
+
+#[test]
+fn a_huge_surface_is_not_welded_to_one_point() {
+    let huge = icosphere(1).scaled(1e170);
+    let repaired = needs_no_second_repair(&huge, &RepairOptions::default());
+    assert_eq!(repaired.points, huge.points);
+}
+
+/// So far out the first move is rounded by more than the second would move.
+#[test]
+fn what_is_far_is_recentred_once() {
+    for far in [0.0, 1.0, 4.5e6, 1e12] {
+        let surface = moved(&icosphere(2), [far, -far, 0.3 * far]);
+        let options = RepairOptions {
+            recentre: true,
+            ..RepairOptions::default()
+        };
+        let repaired = needs_no_second_repair(&surface, &options);
+        let (lo, hi) = repaired.bounds().unwrap();
+        assert!((lo + hi).norm() < 1e-8);
+    }
 }
 
 #[test]
