@@ -2,6 +2,7 @@
 # make test       all tests that need nothing but this tree and a browser, which is installed where there is none
 # make dist       one binary with the page inside, packed for others
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
+# make hunt       property tests with fresh seeds and fuzz targets, for HUNT_MINUTES=20
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation without a warning, the book of docs/, and all links checked
 # make cross      cargo check for Windows and for Linux on ARM, with the standard library that can be had here
@@ -12,6 +13,7 @@ SHARED  ?= ../shared
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
 RESULTS := $(TARGET)/tmp/results
 VENV    := $(TARGET)/venv
+HUNT_MINUTES ?= 20
 SHOTS   ?= $(TARGET)/tmp/screenshots
 PAGE    := web/dist/index.html
 BOOK    := $(TARGET)/book
@@ -20,7 +22,7 @@ BOOK_TOOLS ?= $(abspath $(TARGET))/tools
 MDBOOK  := $(or $(shell command -v mdbook 2>/dev/null),$(BOOK_TOOLS)/bin/mdbook)
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 
-.PHONY: run test test-page test-data shared lint docs cross bench loop dist
+.PHONY: run test hunt test-page test-data shared lint docs cross bench loop dist
 
 run: $(PAGE)
 	cargo run --release --package palpa-cli -- view
@@ -41,6 +43,10 @@ test-page: $(PAGE)
 	cargo build --release --package palpa-cli
 	node web/e2e/browser.mjs --install
 	cd web && PALPA_BIN="$(abspath $(TARGET))/release/palpa" PALPA_SHOTS="$(abspath $(SHOTS))" npm test
+
+# Finds are kept in out/hunt, with the command that shows them again.
+hunt:
+	tools/hunt.sh "$(HUNT_MINUTES)" out/hunt
 
 dist: $(PAGE)
 	cargo build --release --package palpa-cli

@@ -2,8 +2,9 @@
 
 use palpa_mesh::{Format, RepairOptions, check_surface, read_surface_bytes, repair};
 
-/// Reads bytes as one format; what can be read is checked, repaired and checked again. None of this may panic, and what comes
-/// out must have its vertices.
+/// Reads bytes as one format. A surface that can be read is checked, repaired, checked again and repaired
+/// again. None of this may panic, triangles must have their vertices, and the second repair must find
+/// nothing to do.
 pub fn read_check_repair(bytes: &[u8], format: Format) {
     let Ok(file) = read_surface_bytes(bytes, format) else {
         return;
@@ -17,12 +18,12 @@ pub fn read_check_repair(bytes: &[u8], format: Format) {
             .all(|&v| (v as usize) < n)
     );
     check_surface(&file.surface);
-    let (repaired, _) = repair(
-        &file.surface,
-        &RepairOptions {
-            recentre: true,
-            ..RepairOptions::default()
-        },
-    );
+    let options = RepairOptions {
+        recentre: true,
+        ..RepairOptions::default()
+    };
+    let (repaired, _) = repair(&file.surface, &options);
     check_surface(&repaired);
+    let (_, again) = repair(&repaired, &options);
+    assert!(!again.is_changed(), "{again:?}");
 }

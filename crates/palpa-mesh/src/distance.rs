@@ -305,13 +305,8 @@ mod tests {
     fn rays_and_closest_points_agree_with_brute_force() {
         let (_, bone) = cylinder(0.1, 0.04, 0.015, 8e-3);
         let index = SurfaceIndex::build(&bone);
-        let mut seed = 7_u64;
-        let mut random = || {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut rng = fastrand::Rng::with_seed(7);
+        let mut random = || rng.f64() - 0.5;
         for _ in 0..500 {
             let p = Vec3::new(0.05 + 0.15 * random(), 0.08 * random(), 0.08 * random());
             let d = Vec3::new(random(), random(), random());

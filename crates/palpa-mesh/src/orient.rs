@@ -1,15 +1,15 @@
-//! Which way triangles face: one winding over each part, and outward.
+//! Orientation of triangles: one winding over each part, and outward.
 
 use serde::Serialize;
 
 use crate::topology::{Side, UnionFind, all_sides, by_edge, has_sides, sides};
 use crate::{Surface, Vec3};
 
-/// The least share of the volume of a ball of the same area below which the side on which an open sheet bulges is
-/// not taken to mean anything. A cap of 10° opening is at 0.03; noise on a flat sheet is far below.
+/// Volume under an open sheet, as a share of the volume of a ball of the same area, below which the sheet is
+/// too flat to tell which side is out. A cap of 10° opening is at 0.03; noise on a flat sheet is far below.
 const LEAST_BULGE: f64 = 1e-3;
 
-/// What turning triangles has come to.
+/// Triangles and parts that were turned, and those that could not be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct OrientReport {
     /// Triangles that were turned to agree with their neighbours or to face outward.
@@ -46,8 +46,9 @@ impl Patch {
     }
 }
 
-/// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more meet, which
-/// two belong together is not known, and no winding is carried across. Triangles that have no sides among these are left out.
+/// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more
+/// meet, nobody knows which two belong together, and no winding is carried across. Triangles without sides
+/// among these are left out.
 pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
     let n = surface.triangles.len();
     let has_sides = has_sides(surface, sides);
@@ -103,10 +104,10 @@ pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
 
 /// Winds every part consistently and outward.
 ///
-/// A closed part is outward when its volume is positive. An open part is closed in thought by a fan over each of its
-/// boundary loops, from the centre of the loop: a limb cut at both ends becomes a limb with caps, and a sheet faces the side
-/// on which it bulges. For a sheet cut from a hollow (an armpit) that is the wrong side, and for a flat one there is no
-/// telling; the report counts both.
+/// A closed part is outward when its volume is positive. An open part is closed in thought by a fan over each
+/// of its boundary loops, from the centre of the loop: a limb cut at both ends becomes a limb with caps, and a
+/// sheet faces the side on which it bulges. That is the wrong side for a sheet cut from a hollow (an armpit),
+/// and unknown for a flat one; the report counts both.
 pub fn orient(surface: &mut Surface) -> OrientReport {
     let mut report = OrientReport::default();
     for patch in patches(surface, &all_sides(surface)) {
@@ -117,14 +118,9 @@ pub fn orient(surface: &mut Surface) -> OrientReport {
         for t in patch.odd_triangles() {
             flip(surface, t);
         }
-        let shape = Enclosed::of(surface, &patch.triangles);
-        let is_inverted = match (shape.is_closed, shape.facing()) {
-            (_, None) => {
-                report.n_undecided += 1;
-                false
-            }
-            (_, Some(is_outward)) => !is_outward,
-        };
+        let (shape, facing) = facing(surface, &patch.triangles);
+        report.n_undecided += usize::from(facing.is_none());
+        let is_inverted = facing == Some(false);
         if is_inverted {
             if shape.is_closed {
                 report.n_inverted_closed += 1;
@@ -149,7 +145,25 @@ fn flip(surface: &mut Surface, t: u32) {
     surface.triangles[t as usize].swap(1, 2);
 }
 
-/// What some triangles enclose, once their boundary loops are capped. Triangles that are not finite count as absent.
+/// Volume and area of some consistently wound triangles, and whether they face outward; `None` where that
+/// is not clear. The triangles are the same afterwards.
+///
+/// Triangles face inward only if they face outward once they are turned. Where the volume is nothing but
+/// rounding error, both ways may look inward.
+pub(crate) fn facing(surface: &mut Surface, triangles: &[u32]) -> (Enclosed, Option<bool>) {
+    let shape = Enclosed::of(surface, triangles);
+    let mut facing = shape.facing();
+    if facing == Some(false) {
+        triangles.iter().for_each(|&t| flip(surface, t));
+        let turned = Enclosed::of(surface, triangles).facing();
+        triangles.iter().for_each(|&t| flip(surface, t));
+        facing = (turned == Some(true)).then_some(false);
+    }
+    (shape, facing)
+}
+
+/// Volume and area of some triangles, with their boundary loops capped. Triangles that are not finite are left
+/// out.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Enclosed {
     /// Signed volume, positive when the triangles face outward. m³
@@ -196,7 +210,7 @@ impl Enclosed {
     }
 
     /// Whether the triangles face outward, or `None` where an open part is too flat to say.
-    pub(crate) fn facing(&self) -> Option<bool> {
+    fn facing(&self) -> Option<bool> {
         let ball = self.area.powf(1.5) / (6.0 * std::f64::consts::PI.sqrt());
         let is_clear = self.is_closed || self.volume.abs() > LEAST_BULGE * ball;
         is_clear.then_some(self.volume >= 0.0)
@@ -220,8 +234,8 @@ pub(crate) fn boundary_sides(sides: &[Side]) -> Vec<Side> {
         .collect()
 }
 
-/// Boundary sides sorted into those that hang together by their vertices. At the rim of a fin, which ends at an edge of three
-/// triangles, a chain need not close.
+/// Boundary sides grouped by common vertices. At the rim of a fin, which ends at an edge of three triangles, a
+/// chain need not close.
 pub(crate) fn chains(boundary: &[Side]) -> Vec<Vec<Side>> {
     let mut at_vertex: Vec<(u32, u32)> = boundary
         .iter()

@@ -1,6 +1,6 @@
-//! Repair of what can be repaired without guessing; what cannot is left as it is, for the check to report.
+//! Repair of the defects that can be repaired without guessing. The others stay, for the check to report.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use serde::Serialize;
 
@@ -9,22 +9,27 @@ use crate::topology::{all_sides, by_edge, has_repeated_vertex};
 use crate::weld::weld_within;
 use crate::{Surface, Vec3};
 
-/// Vertices nearer than this share of the diagonal of the bounding box are welded unless the caller says otherwise: 0.3 µm on
-/// a forearm, far below what a skin resolves and far above the rounding of coordinates written with seven digits.
+/// Default weld tolerance, as a share of the diagonal of the bounding box. It is 0.3 µm on a forearm: far
+/// below the detail of a skin and far above the rounding of coordinates written with seven digits.
 pub const DEFAULT_WELD_TOLERANCE: f64 = 1e-6;
 
-/// The height of a triangle over its longest edge, as a share of that edge, below which it has no area. Its normal would be
-/// rounding error.
+/// Height of a triangle over its longest edge, as a share of that edge, below which it counts as flat. Its
+/// normal would be rounding error.
 pub(crate) const FLAT_HEIGHT: f64 = 1e-9;
 
-/// Rounds of resolving flat triangles. Each halves a fan of collinear corners at least; more would go in circles.
-const MAX_ROUNDS: usize = 32;
+/// Offset of the centre of the bounding box from the origin, as a share of the diagonal, up to which a
+/// surface counts as centred. Moving it by less would only round its coordinates.
+const CENTRED: f64 = 1e-9;
 
-/// What a repair may do.
+/// Moves to the origin at most. Each but the first only makes up for the rounding of the one before,
+/// so two are enough for any coordinates that resolve the body.
+const MAX_MOVES: usize = 8;
+
+/// Options of a repair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepairOptions {
-    /// Distance below which vertices are welded, as a share of the diagonal of the bounding box; 0 welds only what is at
-    /// exactly the same place.
+    /// Distance up to which vertices are welded, as a share of the diagonal of the bounding box. 0 welds
+    /// only vertices with exactly the same coordinates.
     pub weld_tolerance: f64,
     /// Whether to move the centre of the bounding box to the origin.
     pub recentre: bool,
@@ -39,7 +44,7 @@ impl Default for RepairOptions {
     }
 }
 
-/// What a repair did.
+/// Counts of the changes that a repair made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct RepairReport {
     /// Vertices that were merged into another.
@@ -50,45 +55,104 @@ pub struct RepairReport {
     pub n_duplicate: usize,
     /// Vertices dropped because no triangle uses them.
     pub n_unused: usize,
-    /// What was turned.
+    /// Triangles and parts that were turned.
     pub orientation: OrientReport,
-    /// What was added to every point, if the surface was recentred. m
+    /// Vector added to every point, if the surface was recentred. m
     pub moved_by: Option<[f64; 3]>,
 }
 
 impl RepairReport {
-    /// Whether the repair changed anything.
+    /// Whether the repair changed the surface.
     pub fn is_changed(&self) -> bool {
         let n = self.n_welded + self.n_degenerate + self.n_duplicate + self.n_unused;
         n + self.orientation.n_flipped > 0 || self.moved_by.is_some()
     }
+
+    /// Adds the changes of a later repair of the same surface. The parts that cannot be turned are those of
+    /// the later one.
+    fn add(&mut self, later: &Self) {
+        self.n_welded += later.n_welded;
+        self.n_degenerate += later.n_degenerate;
+        self.n_duplicate += later.n_duplicate;
+        self.n_unused += later.n_unused;
+        let (sum, later) = (&mut self.orientation, &later.orientation);
+        sum.n_flipped += later.n_flipped;
+        sum.n_inverted_closed += later.n_inverted_closed;
+        sum.n_inverted_open += later.n_inverted_open;
+        sum.n_undecided = later.n_undecided;
+        sum.n_one_sided = later.n_one_sided;
+    }
 }
 
-/// A repaired copy: vertices welded, triangles without area and doubles dropped, winding made consistent and outward
-/// (see [`orient`]), unused vertices dropped.
+/// A repaired copy: vertices welded, duplicate triangles and triangles without area dropped, winding
+/// made consistent and outward (see [`orient`]), unused vertices dropped.
 ///
-/// Holes, edges of three and more triangles, self-intersections and vertices that are not finite stay: whether to
-/// fill, cut or move is not for us to guess.
+/// Holes, edges of three and more triangles, self-intersections and vertices that are not finite stay:
+/// whether to fill, cut or move is not for us to guess. So do the flat triangles that cannot be
+/// resolved without damage to their neighbours.
+///
+/// A repaired surface needs no second repair: `repair` gives it back as it is and reports no change.
 pub fn repair(surface: &Surface, options: &RepairOptions) -> (Surface, RepairReport) {
-    let diagonal = used_bounds(surface).map_or(0.0, |(lo, hi)| (hi - lo).norm());
-    let welded = weld_within(surface, options.weld_tolerance * diagonal).surface;
-    let n_welded = surface.points.len() - welded.points.len();
-    let mut surface = welded;
+    let (mut surface, mut report) = mend(surface.clone(), options);
+    if options.recentre {
+        // Moving rounds the coordinates. A triangle that was nearly flat may be flat afterwards.
+        for _ in 0..MAX_MOVES {
+            let Some(shift) = recentre(&mut surface) else {
+                break;
+            };
+            let before = report.moved_by.map_or_else(Vec3::zeros, Vec3::from);
+            report.moved_by = Some((before + shift).into());
+            let (mended, again) = mend(surface, options);
+            surface = mended;
+            report.add(&again);
+        }
+    }
+    (surface, report)
+}
 
-    let n_degenerate = drop_degenerate(&mut surface);
+/// The repair without the move. Each step leaves nothing to do for the steps before it, in this call and
+/// in the next one:
+///
+/// - Unused vertices go before welding. Otherwise one of them could take the place of a used vertex,
+///   widen the bounding box, and with it the tolerance.
+/// - Duplicates go before flat triangles. Otherwise a flat triangle and its double would keep each other.
+/// - Resolving flat triangles makes no duplicates.
+/// - Which triangles are flat does not depend on how they are wound.
+fn mend(mut surface: Surface, options: &RepairOptions) -> (Surface, RepairReport) {
+    let n_loose = drop_unused(&mut surface);
+    let tolerance = options.weld_tolerance * used_bounds(&surface).map_or(0.0, diagonal);
+    let n_before = surface.points.len();
+    surface = weld_within(&surface, tolerance).surface;
+    let n_welded = n_before - surface.points.len();
+
+    let n_triangles = surface.triangles.len();
+    surface.triangles.retain(|&t| !has_repeated_vertex(t));
+    let n_repeated = n_triangles - surface.triangles.len();
     let n_duplicate = drop_duplicates(&mut surface);
+    let n_degenerate = n_repeated + resolve_flat(&mut surface);
     let orientation = orient(&mut surface);
-    let n_unused = drop_unused(&mut surface);
-    let moved_by = options.recentre.then(|| recentre(&mut surface)).flatten();
+    let n_unused = n_loose + drop_unused(&mut surface);
     let report = RepairReport {
         n_welded,
         n_degenerate,
         n_duplicate,
         n_unused,
         orientation,
-        moved_by,
+        moved_by: None,
     };
     (surface, report)
+}
+
+/// The diagonal of a box. Its square may overflow where the box itself does not.
+fn diagonal((lo, hi): (Vec3, Vec3)) -> f64 {
+    let extent = hi - lo;
+    let diagonal = extent.norm();
+    if diagonal.is_finite() {
+        diagonal
+    } else {
+        let scale = extent.amax();
+        extent.unscale(scale).norm() * scale
+    }
 }
 
 /// Smallest and largest coordinates of the vertices that are used and finite.
@@ -106,13 +170,16 @@ pub(crate) fn used_bounds(surface: &Surface) -> Option<(Vec3, Vec3)> {
     )
 }
 
-/// What is wrong with the shape of a triangle.
+/// The way in which a triangle has no area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flaw {
     /// A vertex stands in it twice.
     RepeatedVertex,
-    /// Its corners lie on one line; the side given is the longest, as the number of its first corner.
-    Flat { longest: usize },
+    /// Its corners lie on one line.
+    Flat {
+        /// The longest side, as the number of its first corner.
+        longest: usize,
+    },
 }
 
 /// The flaw of a triangle, if it has one. A triangle with a corner that is not finite has none of these.
@@ -126,90 +193,200 @@ pub(crate) fn flaw(surface: &Surface, t: usize) -> Option<Flaw> {
         (c - b).norm_squared(),
         (a - c).norm_squared(),
     ];
-    let longest = (0..3).max_by(|&i, &j| length_sq[i].total_cmp(&length_sq[j]))?;
+    // Sides of one length are told apart by their vertices, so that the winding makes no difference.
+    let opposite = |side: usize| surface.triangles[t][(side + 2) % 3];
+    let longest = (0..3).max_by(|&i, &j| {
+        let by_length = length_sq[i].total_cmp(&length_sq[j]);
+        by_length.then_with(|| opposite(i).cmp(&opposite(j)))
+    })?;
     // |cross| = longest · height ≤ ratio · longest².
     let is_flat = (b - a).cross(&(c - a)).norm() <= FLAT_HEIGHT * length_sq[longest];
     (is_flat && length_sq[longest].is_finite()).then_some(Flaw::Flat { longest })
 }
 
-/// Drops triangles without area. One that a neighbour needs to stay connected to the rest (its corners lie on a line, and its
-/// longest side has exactly one neighbour) is not dropped, which would leave a slit: the longest side is turned instead, so
-/// that the neighbour is split at the middle corner.
-fn drop_degenerate(surface: &mut Surface) -> usize {
-    let before = surface.triangles.len();
-    surface.triangles.retain(|&t| !has_repeated_vertex(t));
-    let mut n = before - surface.triangles.len();
-    // Turning one edge may make the next triangle flat, where several corners lie on one line: so it is done in rounds, each
-    // of which turns edges that do not touch, until there is nothing left to do or nothing more can be done.
-    for _ in 0..MAX_ROUNDS {
-        let flat: Vec<(usize, usize)> = (0..surface.triangles.len())
-            .filter_map(|t| match flaw(surface, t) {
-                Some(Flaw::Flat { longest }) => Some((t, longest)),
-                _ => None,
-            })
-            .collect();
-        if flat.is_empty() {
-            break;
-        }
-        let n_done = resolve_flat(surface, &flat);
-        n += n_done;
-        if n_done == 0 {
-            break;
-        }
+/// Resolves flat triangles until no more can be; returns how many times it dropped or turned one.
+/// There must be no duplicates and no repeated vertices.
+///
+/// A flat triangle that its neighbour over the longest side needs to stay connected to the rest is not
+/// dropped, which would leave a slit: the longest side is turned instead, so that the neighbour is split
+/// at the middle corner.
+///
+/// ```text
+///        far                far
+///        / \                /|\
+///       / o \      ─►      / | \
+///      a──m──b            a──m──b      t = (a, b, m) is flat
+/// ```
+fn resolve_flat(surface: &mut Surface) -> usize {
+    let is_flat = |&t: &u32| matches!(flaw(surface, t as usize), Some(Flaw::Flat { .. }));
+    let flat: Vec<u32> = (0..surface.triangles.len() as u32)
+        .filter(is_flat)
+        .collect();
+    if flat.is_empty() {
+        return 0;
     }
+    let mut triangles = FlatTriangles::new(surface);
+    for t in flat {
+        triangles.enqueue(t);
+    }
+    let mut n = 0;
+    while let Some(t) = triangles.next() {
+        n += usize::from(triangles.resolve(t));
+    }
+    let mut dropped = triangles.is_dropped.into_iter();
+    surface.triangles.retain(|_| dropped.next() == Some(false));
     n
 }
 
-/// Drops or turns what it can of the flat triangles, given with their longest sides; returns how many.
-fn resolve_flat(surface: &mut Surface, flat: &[(usize, usize)]) -> usize {
-    let mut on_edge: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-    for sides in by_edge(&all_sides(surface)) {
-        on_edge.insert(sides[0].edge, sides.iter().map(|s| s.triangle).collect());
-    }
-    let mut is_touched = vec![false; surface.triangles.len()];
-    let mut is_dropped = vec![false; surface.triangles.len()];
-    let mut is_flat = vec![false; surface.triangles.len()];
-    for &(t, _) in flat {
-        is_flat[t] = true;
-    }
-    let mut n_done = 0;
-    for &(t, longest) in flat {
-        if is_touched[t] {
-            continue;
-        }
-        // a → b is the longest side, m the corner between its ends.
-        let [a, b, m] = [0, 1, 2].map(|k| surface.triangles[t][(longest + k) % 3]);
-        let others: Vec<u32> = on_edge[&[a.min(b), a.max(b)]]
-            .iter()
-            .copied()
-            .filter(|&o| o as usize != t)
+/// The triangles while flat ones are resolved.
+///
+/// It ends, because each change makes one of these less, and those before it no more: the number of
+/// triangles, the number of flat ones, the lengths of the sides that are turned.
+struct FlatTriangles<'a> {
+    surface: &'a mut Surface,
+    /// The triangles on each edge, smaller vertex first.
+    on_edge: BTreeMap<[u32; 2], Vec<u32>>,
+    /// Whether each triangle is no longer there. `[n_triangles]`
+    is_dropped: Vec<bool>,
+    /// Triangles to look at, first come first served.
+    queue: VecDeque<u32>,
+    /// Whether each triangle is in the queue. `[n_triangles]`
+    is_queued: Vec<bool>,
+    /// Flat triangles that cannot be resolved while an edge is there.
+    waiting: BTreeMap<[u32; 2], Vec<u32>>,
+}
+
+impl<'a> FlatTriangles<'a> {
+    fn new(surface: &'a mut Surface) -> Self {
+        let on_edge = by_edge(&all_sides(surface))
+            .map(|sides| (sides[0].edge, sides.iter().map(|s| s.triangle).collect()))
             .collect();
-        match others[..] {
-            [o] => {
-                let o = o as usize;
-                let Some(far) = surface.triangles[o].into_iter().find(|&v| v != a && v != b) else {
-                    continue;
-                };
-                let is_known = on_edge.contains_key(&[far.min(m), far.max(m)]);
-                if is_touched[o] || is_flat[o] || far == m || is_known {
-                    continue;
-                }
-                // The neighbour keeps its winding: each half is the neighbour with one end of the side moved to m.
-                let moved = |from: u32| surface.triangles[o].map(|v| if v == from { m } else { v });
-                let halves = [moved(a), moved(b)];
-                surface.triangles[o] = halves[0];
-                surface.triangles[t] = halves[1];
-                is_touched[o] = true;
-                on_edge.insert([far.min(m), far.max(m)], Vec::new());
-            }
-            _ => is_dropped[t] = true,
+        let n = surface.triangles.len();
+        Self {
+            surface,
+            on_edge,
+            is_dropped: vec![false; n],
+            queue: VecDeque::new(),
+            is_queued: vec![false; n],
+            waiting: BTreeMap::new(),
         }
-        is_touched[t] = true;
-        n_done += 1;
     }
-    let mut dropped = is_dropped.iter();
-    surface.triangles.retain(|_| dropped.next() == Some(&false));
-    n_done
+
+    fn enqueue(&mut self, t: u32) {
+        if !std::mem::replace(&mut self.is_queued[t as usize], true) {
+            self.queue.push_back(t);
+        }
+    }
+
+    fn next(&mut self) -> Option<u32> {
+        let t = self.queue.pop_front()?;
+        self.is_queued[t as usize] = false;
+        Some(t)
+    }
+
+    fn is_flat(&self, t: u32) -> bool {
+        matches!(flaw(self.surface, t as usize), Some(Flaw::Flat { .. }))
+    }
+
+    /// Drops or turns a triangle, if it is flat and can be; returns whether it did.
+    fn resolve(&mut self, t: u32) -> bool {
+        if self.is_dropped[t as usize] {
+            return false;
+        }
+        let Some(Flaw::Flat { longest }) = flaw(self.surface, t as usize) else {
+            return false;
+        };
+        // a → b is the longest side, m the corner between its ends.
+        let [a, b, m] = [0, 1, 2].map(|k| self.surface.triangles[t as usize][(longest + k) % 3]);
+        let on_longest = &self.on_edge[&edge(a, b)];
+        let &[first, second] = &on_longest[..] else {
+            self.unlink(t);
+            self.is_dropped[t as usize] = true;
+            return true;
+        };
+        let o = if first == t { second } else { first };
+        let neighbour = self.surface.triangles[o as usize];
+        let Some(far) = neighbour.into_iter().find(|&v| v != a && v != b) else {
+            return false;
+        };
+        if self.on_edge.contains_key(&edge(far, m)) {
+            self.waiting.entry(edge(far, m)).or_default().push(t);
+            return false;
+        }
+        if self.is_flat(o) {
+            return false;
+        }
+        self.turn([t, o], [a, b], [m, far])
+    }
+
+    /// Turns the side a–b between a flat triangle `t` and its neighbour `o` into m–far, if that leaves fewer
+    /// flat triangles, or as many with a shorter side; returns whether it did.
+    fn turn(&mut self, [t, o]: [u32; 2], [a, b]: [u32; 2], [m, far]: [u32; 2]) -> bool {
+        let before = [t, o].map(|t| self.surface.triangles[t as usize]);
+        // The neighbour keeps its winding: each half is the neighbour with one end of the side moved to m.
+        let moved = |from: u32| before[1].map(|v| if v == from { m } else { v });
+        let after = [moved(b), moved(a)];
+        self.put([t, o], after);
+        let n_flat = [t, o].into_iter().filter(|&t| self.is_flat(t)).count();
+        let point = |v: u32| self.surface.points[v as usize];
+        let is_shorter =
+            (point(far) - point(m)).norm_squared() < (point(b) - point(a)).norm_squared();
+        self.put([t, o], before);
+        if n_flat > 1 || (n_flat == 1 && !is_shorter) {
+            return false;
+        }
+        self.unlink(t);
+        self.unlink(o);
+        self.put([t, o], after);
+        self.link(t);
+        self.link(o);
+        true
+    }
+
+    fn put(&mut self, at: [u32; 2], triangles: [[u32; 3]; 2]) {
+        for (t, triangle) in at.into_iter().zip(triangles) {
+            self.surface.triangles[t as usize] = triangle;
+        }
+    }
+
+    /// Takes a triangle off its edges. All that this may help is to be looked at again.
+    fn unlink(&mut self, t: u32) {
+        for edge in edges(self.surface.triangles[t as usize]) {
+            let Some(on_edge) = self.on_edge.get_mut(&edge) else {
+                continue;
+            };
+            on_edge.retain(|&other| other != t);
+            let mut freed = on_edge.clone();
+            if on_edge.is_empty() {
+                self.on_edge.remove(&edge);
+                freed = self.waiting.remove(&edge).unwrap_or_default();
+            }
+            for other in freed {
+                self.enqueue(other);
+            }
+        }
+    }
+
+    /// Puts a triangle on its edges, to be looked at with its neighbours.
+    fn link(&mut self, t: u32) {
+        for edge in edges(self.surface.triangles[t as usize]) {
+            let on_edge = self.on_edge.entry(edge).or_default();
+            on_edge.push(t);
+            for other in on_edge.clone() {
+                self.enqueue(other);
+            }
+        }
+    }
+}
+
+/// An edge, smaller vertex first.
+fn edge(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The edges of a triangle.
+fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [edge(a, b), edge(b, c), edge(c, a)]
 }
 
 /// Keeps the first of the triangles that have the same three vertices.
@@ -267,10 +444,14 @@ pub(crate) fn drop_unused(surface: &mut Surface) -> usize {
     n_unused
 }
 
-fn recentre(surface: &mut Surface) -> Option<[f64; 3]> {
+/// Moves the centre of the bounding box to the origin; `None` if it is there. m
+fn recentre(surface: &mut Surface) -> Option<Vec3> {
     let (lo, hi) = used_bounds(surface)?;
     // Halves are added, because the sum of two large coordinates may overflow.
     let shift = -(lo * 0.5 + hi * 0.5);
+    if shift.amax() <= CENTRED * diagonal((lo, hi)) {
+        return None;
+    }
     surface.points.iter_mut().for_each(|p| *p += shift);
-    Some(shift.into())
+    Some(shift)
 }

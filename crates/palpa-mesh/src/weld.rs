@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 
 use crate::{Surface, Vec3};
 
-/// A welded surface, and how it came from the one before.
+/// A welded surface, and the new index of each old vertex.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Welded {
     /// The surface with one vertex per place; triangles keep their order and may have become degenerate.
@@ -14,36 +14,47 @@ pub struct Welded {
     pub new_index: Vec<u32>,
 }
 
-/// Makes one vertex of those with exactly the same coordinates. The first of them gives its place in the order.
+/// Makes one vertex of those with exactly the same coordinates. It takes the place of the first in the order.
 ///
-/// Vertices that are not finite stay apart: nothing is known about where they are.
+/// Vertices that are not finite stay apart: their places are unknown.
 pub fn weld_exact(surface: &Surface) -> Welded {
     let mut seen: HashMap<[u64; 3], u32> = HashMap::with_capacity(surface.points.len());
-    weld(surface, |p, candidate, _| match seen.entry(exact_key(p)) {
+    weld(surface, |p, candidate, _| {
+        at_same_place(&mut seen, p, candidate)
+    })
+}
+
+/// The index of a point with exactly these coordinates, or `None` and `candidate` is put there.
+fn at_same_place(seen: &mut HashMap<[u64; 3], u32>, p: &Vec3, candidate: u32) -> Option<u32> {
+    match seen.entry(exact_key(p)) {
         Entry::Occupied(entry) => Some(*entry.get()),
         Entry::Vacant(entry) => {
             entry.insert(candidate);
             None
         }
-    })
+    }
 }
 
-/// Cells from the origin up to which points are sorted into cells; a whole number beyond has no neighbours as `f64`.
+/// Tolerances from the origin up to which points are sorted into cells. A whole number beyond has no
+/// neighbours as `f64`.
 const END_OF_GRID: f64 = 9007199254740992.0;
 
-/// Makes one vertex of those within `tolerance` (in the unit of the points) of each other, the first of which stays where it
-/// is; so no vertex moves by more than the tolerance, whatever chains there are.
+/// Makes one vertex of those within `tolerance` (in the unit of the points) of the first of them, which stays
+/// where it is. So no vertex moves by more than the tolerance, whatever chains there are, and the vertices that
+/// are kept are further apart than the tolerance.
 pub fn weld_within(surface: &Surface, tolerance: f64) -> Welded {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return weld_exact(surface);
     }
-    // Cells as wide as the tolerance: whatever is near lies in this cell or one of its 26 neighbours.
-    let cell_of = |p: &Vec3| p.map(|x| (x / tolerance).floor() as i64);
+    // Cells of two tolerances: all that is near lies in this cell or one of its 26 neighbours, even where
+    // dividing rounds by half a cell.
+    let cell_of = |p: &Vec3| p.map(|x| (x / tolerance / 2.0).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(surface.points.len());
+    let mut far: HashMap<[u64; 3], u32> = HashMap::new();
     weld(surface, |p, candidate, kept| {
         // Out there the tolerance is finer than the points are, and all of them would crowd into the last cell.
         if p.amax() / tolerance > END_OF_GRID {
-            return None;
+            return at_same_place(&mut far, p, candidate);
         }
         let cell = cell_of(p);
         let is_near = |&v: &u32| (kept[v as usize] - p).norm() <= tolerance;

@@ -75,6 +75,14 @@ impl Pattern {
         }
     }
 
+    /// Number of entries of the factor's lower triangle that are kept (of the whole matrix, if it is dense).
+    pub fn n_factor_entries(&self) -> usize {
+        match &self.0 {
+            Kind::Dense { n } => n * n,
+            Kind::Sparse { symbolic, .. } => symbolic.len_val(),
+        }
+    }
+
     /// The index of the entry `(i, i)`.
     pub fn diagonal(&self, i: usize) -> usize {
         self.entry(i, i)

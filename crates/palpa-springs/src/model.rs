@@ -127,6 +127,11 @@ impl SpringModel {
         &self.operated
     }
 
+    /// Numbers in the factor of the stiffness matrix, or in its inverse: what one solution multiplies.
+    pub fn n_factor_entries(&self) -> usize {
+        self.structure.n_factor_entries()
+    }
+
     /// The solver in use; never [`Solver::Auto`].
     pub fn solver(&self) -> Solver {
         self.structure.solver()

@@ -154,6 +154,33 @@ mod tests {
     }
 
     #[test]
+    fn who_waits_is_heard_again() {
+        let start = Instant::now();
+        let mut gate = Gate::new(start);
+        assert!((0..500).any(|_| gate.ask(10, start) != Verdict::Taken));
+        let later = start + Duration::from_millis(200);
+        assert_eq!(gate.ask(10, later), Verdict::Taken);
+    }
+
+    #[test]
+    fn a_hand_that_moves_is_never_too_much() {
+        let start = Instant::now();
+        let mut gate = Gate::new(start);
+        // Ten minutes at 125 Hz.
+        for tick in 0..75_000 {
+            let now = start + tick * Duration::from_millis(8);
+            assert_eq!(gate.ask(200, now), Verdict::Taken, "tick {tick}");
+        }
+    }
+
+    /// A page takes 6 s of silence for a lost connection, and a server must ask three times before it does so.
+    #[test]
+    fn patience_fits_the_pings() {
+        assert!(PING_EVERY + QUIET < Duration::from_secs(6));
+        assert!(3 * PING_EVERY < SILENCE);
+    }
+
+    #[test]
     fn long_messages_cost_more() {
         let start = Instant::now();
         let mut gate = Gate::new(start);

@@ -159,6 +159,7 @@ impl Search {
         self.queue.push_back(root);
         while let Some(v) = self.queue.pop_front() {
             for &(u, _) in graph.around(v) {
+                work::count();
                 match self.label[u as usize] {
                     Label::Dead | Label::Odd => {}
                     Label::Unseen => {
@@ -257,6 +258,26 @@ impl Search {
             from = partner;
             v = self.before[partner as usize];
         }
+    }
+}
+
+/// Neighbours looked at on this thread, counted in tests only: a bound on the work.
+pub(super) mod work {
+    #[cfg(test)]
+    thread_local! {
+        static N: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
+    }
+
+    #[inline]
+    pub(in super::super) fn count() {
+        #[cfg(test)]
+        N.set(N.get() + 1);
+    }
+
+    /// The count so far.
+    #[cfg(test)]
+    pub(in super::super) fn n() -> u64 {
+        N.get()
     }
 }
 

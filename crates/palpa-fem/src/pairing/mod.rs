@@ -148,3 +148,39 @@ fn cost(skin: &Surface, pair: &Pair) -> f64 {
     let is_reflex = worst >= std::f64::consts::FRAC_PI_2 - 1e-9;
     worst * worst + if is_reflex { REFLEX_COST } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use palpa_mesh::generate::{GradedBlock, LevelStack, Outline, graded_block};
+
+    use super::*;
+
+    /// The work is in proportion to the triangles, up to a slowly growing factor.
+    #[test]
+    fn pairing_irregular_triangles_looks_at_each_a_bounded_number_of_times() {
+        let looks = [4e-3, 2e-3, 1e-3].map(|spacing| {
+            let block = GradedBlock {
+                outline: Outline::Square,
+                half_width: 50e-3,
+                centre: [0.0, 0.0],
+                ring_radius: None,
+                spacing,
+                inner_growth: 0.0,
+                growth: 0.0,
+                jitter: Some(1),
+            };
+            let levels = LevelStack {
+                depths: vec![0.0, 0.04],
+                interval_layer: vec![0],
+            };
+            let skin = graded_block(&block, &levels).skin;
+            let before = matching::work::n();
+            let pairing = pair_triangles(&skin);
+            assert!(!pairing.pairs.is_empty());
+            (matching::work::n() - before) as f64 / skin.triangles.len() as f64
+        });
+        println!("neighbours looked at for each triangle, from coarse to fine: {looks:.0?}");
+        assert!(looks.iter().all(|&n| n > 1.0 && n < 10_000.0), "{looks:?}");
+        assert!(looks[2] < 2.0 * looks[0], "{looks:?}");
+    }
+}

@@ -14,15 +14,16 @@ use crate::{Mat3, Material, Materials, ModelParams, State, Supports};
 use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
 use palpa_mesh::{LayeredBody, Vec3};
 
-struct Noise(u64);
+/// Numbers between −0.5 and 0.5, the same in each run.
+struct Noise(fastrand::Rng);
 
 impl Noise {
+    fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        self.0.f64() - 0.5
     }
 }
 
@@ -113,7 +114,7 @@ enum Strain {
 
 /// Two deformations of a body.
 fn deformations(model: &Model, strain: Strain) -> [Vec<Vec3>; 2] {
-    let mut noise = Noise(11);
+    let mut noise = Noise::new(11);
     let (stretch, size) = match strain {
         Strain::Irregular => (
             Mat3::new(0.05, 0.1, -0.04, 0.02, 0.06, 0.1, -0.1, 0.03, -0.2),

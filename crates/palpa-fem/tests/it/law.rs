@@ -54,17 +54,17 @@ fn law(law: Result<impl Into<Law>, LawError>) -> Law {
     law.expect("a sound law").into()
 }
 
-/// Numbers without a pattern, the same in each run (splitmix64).
-pub(crate) struct Chance(pub(crate) u64);
+/// Numbers without a pattern, the same in each run.
+pub(crate) struct Chance(fastrand::Rng);
 
 impl Chance {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     /// Evenly between −1 and 1.
     pub(crate) fn signed(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2.0_f64.powi(-52) - 1.0
+        2.0 * self.0.f64() - 1.0
     }
 
     pub(crate) fn matrix(&mut self) -> Mat3 {

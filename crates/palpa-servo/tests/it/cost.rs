@@ -39,6 +39,7 @@ fn no_tick_allocates() {
             most = most.max(report.sweeps);
         }
     }
+    assert!(most > 0, "no tick solved a contact");
     // Twice the most of one solution: the tick in which a patch arrives solves with the old and the
     // new.
     assert!(most <= 2 * ServoParams::default().max_sweeps, "{most}");

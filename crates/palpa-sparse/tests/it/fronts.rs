@@ -12,15 +12,16 @@ use palpa_sparse::{Block, ColumnPattern};
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-struct Noise(u64);
+/// Numbers between −0.5 and 0.5, the same in each run.
+struct Noise(fastrand::Rng);
 
 impl Noise {
+    fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        self.0.f64() - 0.5
     }
 }
 
@@ -33,7 +34,7 @@ struct Case {
 }
 
 fn case(nx: usize, ny: usize, n_levels: usize, is_tube: bool, zone_radius: f64) -> Case {
-    let mut noise = Noise(3);
+    let mut noise = Noise::new(3);
     let places: Vec<[f64; 3]> = (0..nx * ny)
         .map(|c| {
             let (x, y) = ((c % nx) as f64, (c / nx) as f64);
@@ -82,7 +83,7 @@ fn case(nx: usize, ny: usize, n_levels: usize, is_tube: bool, zone_radius: f64) 
 fn blocks(case: &Case, seed: u64) -> [Vec<Block<f64>>; 2] {
     let pattern = &case.pattern;
     let n = pattern.n_levels();
-    let mut noise = Noise(seed);
+    let mut noise = Noise::new(seed);
     let mut parts = [
         vec![[0.0; 9]; pattern.n_blocks()],
         vec![[0.0; 9]; pattern.n_blocks()],
@@ -225,7 +226,7 @@ fn errors<T: Number>(case: &Case, tree: &Tree) -> [f64; 2] {
         let [inner, _] = blocks(case, seed);
         let whole = dense(pattern, &[inner.clone(), rest.clone()]);
         let oracle = whole.llt(Side::Lower).unwrap();
-        let mut noise = Noise(9);
+        let mut noise = Noise::new(9);
         let force = Mat::from_fn(n, 1, |_, _| noise.next());
         let unit = Mat::from_fn(n, m, |i, j| {
             let push = &pushes[j];

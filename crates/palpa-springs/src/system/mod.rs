@@ -116,6 +116,13 @@ impl Structure {
         self.n_dofs
     }
 
+    pub(crate) fn n_factor_entries(&self) -> usize {
+        match self.solver {
+            Solver::HistoricalInverse => self.n_dofs * self.n_dofs,
+            _ => self.pattern.n_factor_entries(),
+        }
+    }
+
     pub(crate) fn solver(&self) -> Solver {
         self.solver
     }

@@ -93,12 +93,12 @@ async fn one_controls_the_others_watch_and_hand_over() {
         (1, Some(1)),
     ];
     let expected = expected.map(|(n, controller)| Clients { n, controller });
-    assert_eq!(*session.told.lock().unwrap(), expected);
+    assert_eq!(*session.told.borrow(), expected);
 }
 
 /// The number of the first connection of a session.
 fn first_of(session: &Session) -> u64 {
-    session.told.lock().unwrap()[0].controller.unwrap()
+    session.told.borrow()[0].controller.unwrap()
 }
 
 #[tokio::test]

@@ -254,7 +254,7 @@ async fn what_is_sent_and_asked_is_counted() {
     assert!(samples["palpa_web_sent_bytes_total"] > 500.0);
     // One that goes without a word was not let go.
     drop(page);
-    until("it is gone", || server.publisher().n_clients() == 0).await;
+    session.until_clients(0).await;
     let samples = parse_metrics(&get(&server, "/metrics").text);
     assert_eq!(samples["palpa_web_clients_dropped_total"], 0.0);
 }

@@ -147,14 +147,3 @@ impl Page {
         reply.error
     }
 }
-
-/// Waits until something is so, and says so when it is not for long.
-pub(crate) async fn until(what: &str, is_so: impl Fn() -> bool) {
-    for _ in 0..2000 {
-        if is_so() {
-            return;
-        }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-    panic!("not within 20 s: {what}");
-}

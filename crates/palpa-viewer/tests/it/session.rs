@@ -14,7 +14,9 @@ use std::{
     net::Ipv4Addr,
     sync::{Arc, Mutex, OnceLock, mpsc},
     thread,
+    time::Duration,
 };
+use tokio::sync::watch;
 
 pub(crate) const TOKEN: &str = "sesame, open & shut";
 /// Stiffness of the punch on the block per Young's modulus, m.
@@ -23,7 +25,8 @@ const STIFFNESS: f64 = 0.02;
 pub(crate) struct Session {
     inner: Mutex<Inner>,
     publisher: OnceLock<Publisher>,
-    pub(crate) told: Mutex<Vec<Clients>>,
+    /// All that the session was told of its clients, in order.
+    pub(crate) told: watch::Sender<Vec<Clients>>,
     slow: mpsc::Sender<Answer>,
 }
 
@@ -52,7 +55,7 @@ impl Session {
                 sequence: 0,
             }),
             publisher: OnceLock::new(),
-            told: Mutex::default(),
+            told: watch::Sender::default(),
             slow,
         });
         let server = Server::start(&params(token), session.clone()).unwrap();
@@ -63,6 +66,15 @@ impl Session {
 
     pub(crate) fn fail(&self, why: &str) {
         self.inner.lock().unwrap().problem = Some(why.into());
+    }
+
+    /// Waits until the session was told of this number of clients last.
+    pub(crate) async fn until_clients(&self, n: usize) {
+        let mut told = self.told.subscribe();
+        let is_so = told.wait_for(|told| told.last().is_some_and(|clients| clients.n == n));
+        // Only turns a hang into a failure.
+        let is_so = tokio::time::timeout(Duration::from_secs(60), is_so).await;
+        is_so.expect("the number of clients in time").unwrap();
     }
 
     fn publish(&self) {
@@ -232,7 +244,7 @@ impl Host for Session {
     }
 
     fn clients(&self, clients: Clients) {
-        self.told.lock().unwrap().push(clients);
+        self.told.send_modify(|told| told.push(clients));
         if clients.controller.is_none() {
             self.inner.lock().unwrap().hand = None;
         }

@@ -1,13 +1,13 @@
 //! How the server starts and ends.
 
 use crate::{
-    page::{Page, Told, socket_url, until},
+    page::{Page, Told, socket_url},
     session::{Session, TOKEN, params},
 };
 use palpa_viewer::{Server, ServerError, ServerParams};
 use std::{
     net::{Ipv4Addr, TcpListener},
-    time::{Duration, Instant},
+    time::Duration,
 };
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
@@ -61,22 +61,19 @@ async fn dropping_it_lets_all_go() {
     for _ in 0..3 {
         pages.push(Page::open(&server).await);
     }
-    let ending = tokio::task::spawn_blocking(move || {
-        let begun = Instant::now();
-        drop(server);
-        begun.elapsed()
-    });
+    let ending = tokio::task::spawn_blocking(move || drop(server));
     for page in &mut pages {
         assert!(matches!(page.end().await, Told::Closed(CloseCode::Away, _)));
     }
     drop(pages);
-    let took = ending.await.unwrap();
-    assert!(took < Duration::from_secs(3), "{took:?}");
+    // Only turns a hang into a failure.
+    let ended = tokio::time::timeout(Duration::from_secs(60), ending).await;
+    ended.expect("the server ends").unwrap();
     assert!(Page::open_url(&socket_url(address)).await.is_err());
     // Who publishes need not know.
     session.show_frame(1, 6);
     assert_eq!(publisher.n_clients(), 0);
-    assert_eq!(session.told.lock().unwrap().last().unwrap().n, 0);
+    assert_eq!(session.told.borrow().last().unwrap().n, 0);
 }
 
 #[tokio::test]
@@ -91,7 +88,7 @@ async fn a_hundred_connections_leave_nothing_behind() {
             page.socket.close(None).await.unwrap();
         }
     }
-    until("all are gone", || server.publisher().n_clients() == 0).await;
+    session.until_clients(0).await;
     // Every place is free again.
     let mut pages = vec![];
     for _ in 0..32 {

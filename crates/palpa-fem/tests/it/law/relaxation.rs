@@ -50,7 +50,7 @@ fn a_sudden_step_relaxes_exactly_whatever_the_steps() {
         for n_steps in [1, 7, 300] {
             let mut point = Point::new(&prony);
             assert_close(point.step(0.0, 500.0), 500.0 * prony.instantaneous(), 1e-14);
-            let mut chance = Chance(n_steps);
+            let mut chance = Chance::new(n_steps);
             let mut t = 0.0;
             for _ in 0..n_steps {
                 let dt = 0.05 * (1.0 + chance.signed());
@@ -199,7 +199,7 @@ fn long_term_moduli_are_instantaneous_ones_of_a_softer_law() {
     assert_close(instantaneous.long_term(), 0.35, 1e-15);
     assert_close(long_term.instantaneous(), 1.0 / 0.35, 1e-15);
     let (mut a, mut b) = (Point::new(&instantaneous), Point::new(&long_term));
-    let mut chance = Chance(3);
+    let mut chance = Chance::new(3);
     for _ in 0..50 {
         let (dt, elastic) = (0.1 * (1.0 + chance.signed()), 100.0 * chance.signed());
         let (found, expected) = (b.step(dt, 0.35 * elastic), a.step(dt, elastic));
@@ -216,7 +216,7 @@ fn components_do_not_mix() {
     let prony = series(Moduli::LongTerm);
     let mut six = vec![[0.0; 6]; prony.n_rows()];
     let mut ones = vec![vec![[0.0; 1]; prony.n_rows()]; 6];
-    let mut chance = Chance(9);
+    let mut chance = Chance::new(9);
     for _ in 0..20 {
         let step = prony.step(1.0 + chance.signed());
         let stress: [f64; 6] = std::array::from_fn(|_| chance.signed());
@@ -234,7 +234,7 @@ fn components_do_not_mix() {
 #[test]
 fn a_held_and_turning_solid_relaxes() {
     let prony = series(Moduli::Instantaneous);
-    let mut chance = Chance(21);
+    let mut chance = Chance::new(21);
     for law in every_law()
         .into_iter()
         .filter(|law| law.kinematics() == palpa_fem::Kinematics::Finite)
