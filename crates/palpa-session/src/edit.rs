@@ -1,4 +1,4 @@
-//! A scene as JSON, and changes of it: the keys are those of a scene file, and so are the errors.
+//! A scene as JSON, and edits of it. Keys, units and errors are those of a scene file.
 
 use std::path::Path;
 
@@ -7,14 +7,15 @@ use palpa_scene::{Scene, SceneError};
 use palpa_viewer::control::Edit;
 use serde_json::{Map, Value};
 
-/// Longest list that an edit may make: a scene is written by hand.
+/// Longest list that an edit may make.
 const MOST_ITEMS: usize = 100;
 
-/// The scene with every key.
+/// The scene as JSON, with every default written out.
 ///
 /// # Errors
-/// Never for a scene that was read; scenes made by programs may hold what TOML cannot say.
-pub fn to_json(scene: &Scene) -> anyhow::Result<Value> {
+/// Never for a scene that was read. A scene made by a program may hold values that TOML cannot
+/// express.
+pub(crate) fn to_json(scene: &Scene) -> anyhow::Result<Value> {
     as_json(&scene.to_toml_in_full())
 }
 
@@ -23,11 +24,11 @@ fn as_json(text: &str) -> anyhow::Result<Value> {
     Ok(serde_json::to_value(table)?)
 }
 
-/// The scene after the edits, in order; none counts if one fails.
+/// The scene after all edits, in order.
 ///
 /// # Errors
-/// Which edit leads nowhere, or what is wrong with the scene that they make.
-pub fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
+/// When the path of an edit does not exist, or the edited scene is not valid.
+pub(crate) fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
     let in_full = to_json(scene)?;
     let mut value = in_full.clone();
     for edit in edits {
@@ -38,7 +39,8 @@ pub fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
     Ok(Scene::parse(&text, &scene.base_dir).map_err(SceneError::by_key)?)
 }
 
-/// Tissues that are as they were get their names back, and with them what the catalogue knows of their sources.
+/// Puts the catalogue's names back in place of tissues that no edit has changed, so that their
+/// sources are known again.
 fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
     for list in ["layer", "lump"] {
         let tissues = |scene: &Value| -> Vec<Value> {
@@ -55,11 +57,11 @@ fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
     }
 }
 
-/// A scene from text, with the error in one line.
+/// A scene from the text of a scene file.
 ///
 /// # Errors
-/// What is wrong with it, and where.
-pub fn parsed(text: &str, base: &Path) -> anyhow::Result<Scene> {
+/// When the text is not a valid scene.
+pub(crate) fn parsed(text: &str, base: &Path) -> anyhow::Result<Scene> {
     Ok(Scene::parse(text, base)?)
 }
 
@@ -127,7 +129,7 @@ fn put(at: &mut Value, key: &str, value: Value) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// TOML has no null: what is null is not there.
+/// The value without its nulls, which TOML does not have.
 fn without_nulls(value: Value) -> Value {
     match value {
         Value::Object(table) => Value::Object(

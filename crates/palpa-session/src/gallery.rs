@@ -1,4 +1,4 @@
-//! The scenes that can be chosen in the viewer.
+//! The gallery: scenes that a page can choose.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use palpa_scene::Scene;
 use palpa_viewer::control::GalleryEntry;
 
-/// Key, name, text.
+/// Key, name in English, and text of each scene file.
 const SCENES: [(&str, &str, &str); 6] = [
     (
         "forearm",
@@ -40,10 +40,10 @@ const SCENES: [(&str, &str, &str); 6] = [
     ),
 ];
 
-/// The one that is shown when none is named.
+/// Key of the scene that is shown when none is named.
 pub const FIRST: &str = SCENES[0].0;
 
-/// All of them.
+/// All scenes of the gallery, in order.
 pub fn entries() -> Vec<GalleryEntry> {
     SCENES
         .iter()
@@ -54,10 +54,10 @@ pub fn entries() -> Vec<GalleryEntry> {
         .collect()
 }
 
-/// One of them.
+/// The scene with this key.
 ///
 /// # Errors
-/// When there is none of that key.
+/// When no scene has this key.
 pub fn scene(key: &str) -> anyhow::Result<Scene> {
     let known = || {
         let keys: Vec<&str> = SCENES.iter().map(|(key, ..)| *key).collect();

@@ -1,4 +1,4 @@
-//! Find the lump: lumps at random places, marks, and the truth.
+//! Find the lump: lumps hidden at random places, the user's marks, and the result.
 
 use std::time::Instant;
 
@@ -12,46 +12,46 @@ use crate::world::World;
 
 /// Radii of hidden lumps, m.
 const RADII: std::ops::RangeInclusive<f64> = 4.5e-3..=7e-3;
-/// Least tissue over a lump, and under it, m.
+/// Least depth of tissue above and below a hidden lump, m.
 const COVER: f64 = 2.5e-3;
 const BASE: f64 = 1.5e-3;
-/// Distance of hidden lumps from each other and from where the body was cut, m.
+/// Least distance of hidden lumps from each other, and from the rims where the body was cut, m.
 const APART: f64 = 30e-3;
 const FROM_RIM: f64 = 25e-3;
-/// The tissue that they are of.
+/// Tissue of hidden lumps, a name in the catalogue.
 const TISSUE: &str = "fibrous lump";
-/// A touch of at least this force counts, N.
+/// Least force that counts as a touch, N.
 const TOUCH: f64 = 0.05;
 /// Touches nearer to each other than this are one, m.
 const GRAIN: f64 = 2e-3;
 const MOST_TOUCHES: usize = 4000;
-/// A press tells of the skin as far round it, m.
+/// Radius around a touch that counts as explored, m.
 const REACH: f64 = 8e-3;
-/// Largest seed: a page has no larger whole numbers.
+/// Largest seed: the largest whole number that a page can represent.
 const MOST_SEED: u64 = (1 << 53) - 1;
 /// Most marks: nobody finds more lumps than that.
 const MOST_MARKS: usize = 10;
 
-/// A round.
+/// A round of the game.
 #[derive(Debug)]
 pub(super) struct Game {
     seed: u64,
     n_lumps: u32,
     marks: Vec<Vec3>,
     began: Option<Instant>,
-    /// Place and largest force, N.
+    /// Places on the skin (m) and the largest force at each, N.
     touches: Vec<(Vec3, f64)>,
     max_force: f64,
-    /// Force times time, N s, and time in contact, s.
+    /// Integral of the force over time, N s, and time in contact, s.
     impulse: f64,
     contact_time: f64,
     result: Option<(f64, GameResult)>,
-    /// The scene that is played on, as it was and will be again.
+    /// The scene without the hidden lumps, restored when the game ends.
     pub(super) before: Scene,
 }
 
 impl Game {
-    /// Hides lumps in a scene. Gives the round and the scene to be built.
+    /// Hides lumps in a scene. Returns the round, and the scene to build.
     ///
     /// # Errors
     /// When the body has no room for them.
@@ -115,17 +115,17 @@ impl Game {
         Ok((game, scene))
     }
 
-    /// The body is there: time runs.
+    /// Starts the clock: the body is there.
     pub(super) fn begin(&mut self) {
         self.began.get_or_insert_with(Instant::now);
     }
 
-    /// Whether the truth may be seen.
+    /// Whether the lumps are revealed.
     pub(super) fn is_revealed(&self) -> bool {
         self.result.is_some()
     }
 
-    /// The tool was at a place of the skin with a force (N) for `dt` seconds.
+    /// Notes a force (N) on a place of the skin, lasting `dt` seconds.
     pub(super) fn feel(&mut self, place: Vec3, force: f64, dt: f64) {
         if self.is_revealed() || force < TOUCH {
             return;
@@ -141,10 +141,10 @@ impl Game {
         }
     }
 
-    /// A lump is thought to be under a point of the skin.
+    /// Marks a point of the skin: the user suspects a lump under it.
     ///
     /// # Errors
-    /// When the truth is out, or there are more marks than sense.
+    /// When the lumps are revealed, or there are [`MOST_MARKS`] marks.
     pub(super) fn mark(&mut self, point: Vec3) -> anyhow::Result<()> {
         if self.is_revealed() {
             bail!("the truth is shown already; begin a new round");
@@ -156,14 +156,15 @@ impl Game {
         Ok(())
     }
 
-    /// The last mark was a mistake.
+    /// Takes the last mark back.
     pub(super) fn unmark(&mut self) {
         if !self.is_revealed() {
             self.marks.pop();
         }
     }
 
-    /// The truth. Each lump gets the mark that is nearest to it, the nearest pair first.
+    /// Reveals the lumps and computes the result. Marks are matched to lumps one to one, the
+    /// nearest pair first.
     pub(super) fn reveal(&mut self, world: &World) {
         if self.is_revealed() {
             return;
@@ -194,8 +195,8 @@ impl Game {
         self.result = Some((self.seconds(), result));
     }
 
-    /// Share of the skin (away from where the body was cut) that was pressed, or lies so near to where it was that a lump
-    /// under it would have been felt.
+    /// Share of the skin's area within [`REACH`] of a touch, 0 to 1; skin near the rims does not
+    /// count.
     fn covered(&self, skin: &Skin) -> f64 {
         let (mut all, mut pressed) = (0.0, 0.0);
         for (point, area, _) in skin.away_from_rim(FROM_RIM) {
@@ -216,7 +217,7 @@ impl Game {
         }
     }
 
-    /// As pages are told: without the truth until it is shown.
+    /// The round for the state; the result only once the lumps are revealed.
     pub(super) fn info(&self) -> GameInfo {
         GameInfo {
             seed: self.seed,
@@ -228,7 +229,7 @@ impl Game {
     }
 }
 
-/// The point of the skin over a lump.
+/// The point of the skin nearest to the centre of a lump, m.
 fn over(world: &World, lump: &LumpInfo) -> Vec3 {
     let centre = Vec3::from(lump.centre);
     world
@@ -237,7 +238,7 @@ fn over(world: &World, lump: &LumpInfo) -> Vec3 {
         .map_or(centre, |place| place.point)
 }
 
-/// For each place its distance from the mark that was meant for it, m.
+/// Distance of each place from the mark matched to it, m.
 fn matched(places: &[Vec3], marks: &[Vec3]) -> Vec<Option<f64>> {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (i, place) in places.iter().enumerate() {
@@ -257,7 +258,8 @@ fn matched(places: &[Vec3], marks: &[Vec3]) -> Vec<Option<f64>> {
     errors
 }
 
-/// A place of the skin with room for a lump: place, radius and depth of its centre, m.
+/// A random place of the skin with room for a lump: place, and radius and depth of the lump's
+/// centre, m.
 fn hiding_place(
     skin: &Skin,
     others: &[Vec3],

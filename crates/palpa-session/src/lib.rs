@@ -1,24 +1,33 @@
-//! A body under the hand of whoever looks at it: engine, hand, recording and game behind the viewer's server.
+//! A viewer's session: a body under the hand of whoever looks at it, behind the viewer's server.
 //!
 //! ```text
-//!  server ── requests ──► Remote ── orders ──► session thread, 60 Hz ──► hand ──► device of the engine
-//!         ◄── snapshots, state, figures ──────┘    ▲ looks at the body, ticks ◄── engine
+//!  server ── requests ──► remote ── orders ──► session (thread, 60 Hz) ──► desk
+//!
+//!   desk ┬─► builder   the scene that is wanted, built on a thread of its own
+//!        ├─► stage     the body under the hand and its engine:  world ──► engine ──► device
+//!        │     └ hand  who leads the tool, and its way:         hand ───► device
+//!        ├─► replay    the recording, and what is shown of it
+//!        ├─► game      find the lump;  veil: what pages may not see meanwhile
+//!        ├─► drill     faults on purpose
+//!        └─► publish   frames, meshes, fields, state, figures, notices ──► server
 //! ```
-//! The thread of the session waits for nobody: scenes are built on threads of their own while the body before is still there,
-//! fields over the body are computed beside it, files are put together by who asks for them.
+//! The session's thread waits for nobody: bodies and fields are computed on threads of their own, and
+//! a file is written on the server's thread that asked for it.
 
-pub mod edit;
-mod fields;
-mod figures;
-mod frame;
+mod builder;
+mod desk;
+mod drill;
+mod edit;
 pub mod gallery;
 mod game;
-pub mod hand;
-mod notes;
-mod recording;
+mod hand;
+mod publish;
 mod remote;
-mod run;
-pub mod world;
+mod replay;
+mod session;
+mod stage;
+mod veil;
+mod world;
 
 pub use remote::Remote;
-pub use run::{Handle, Session, SessionParams};
+pub use session::{Handle, Session, SessionParams};

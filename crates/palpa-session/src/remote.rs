@@ -1,4 +1,4 @@
-//! What the server sees of the session: a channel.
+//! The server's end of a session: sends orders to its thread, and puts files together.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
@@ -14,20 +14,20 @@ use palpa_viewer::{Answer, Clients, Host, HostFile};
 use crate::world::World;
 use palpa_plot::vtu::Grid;
 
-/// How long a file may wait for the session.
+/// Longest time that a file waits for the session's thread.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What the session is told.
+/// A message to the session's thread.
 pub(super) enum Order {
     Request(Request, Answer),
     Clients(Clients),
     File(HostFile, SyncSender<Option<Material>>),
-    /// A scene was built, or why not.
+    /// A scene was built, or could not be.
     Built(Box<anyhow::Result<World>>),
     Stop,
 }
 
-/// What a file is made of.
+/// The content of a file, before it is written.
 pub(super) enum Material {
     Scene(String),
     Tissue(Arc<Model>, Vec<Vec3>),
@@ -35,7 +35,7 @@ pub(super) enum Material {
     Log(PathBuf),
 }
 
-/// The session's end that the server holds.
+/// The server's end of a session.
 #[derive(Debug)]
 pub struct Remote {
     pub(super) orders: Sender<Order>,
@@ -89,8 +89,8 @@ fn written(file: HostFile, material: Material) -> anyhow::Result<Vec<u8>> {
     })
 }
 
-/// Two tables with a row per tick side by side; the second's first column is the tick again, and columns of its that are named as
-/// one of the first say that they are the device's.
+/// Joins two CSV tables with a row per tick. The second table's first column, the tick, is left
+/// out. Its columns whose names the first table has too get the prefix `device_`.
 fn joined(ticks: &str, device: &str) -> Vec<u8> {
     let mut out = String::with_capacity(ticks.len() + device.len());
     for (row, (a, b)) in ticks.lines().zip(device.lines()).enumerate() {

@@ -1,8 +1,10 @@
 //! The scene's device, and the way of the hand that holds it.
 
-use palpa_device::{DeviceModel, Grip, Path};
-use palpa_scene::{DevicePreset, Motion, MotionKind, Scene};
-use palpa_servo::{Pose, Vec3};
+use palpa_device::{
+    DeviceFault, DeviceModel, DeviceSetup, Driver, Grip, HandTarget, HapticDevice, Path,
+};
+use palpa_scene::{Device, DeviceKind, DevicePreset, Motion, MotionKind, Scene};
+use palpa_servo::{Pose, ServoParams, Vec3};
 
 /// Rest over the skin between two motions, s.
 const PAUSE: f64 = 0.3;
@@ -15,6 +17,37 @@ const CIRCLE: f64 = 2e-3;
 const CIRCLES: f64 = 2.0;
 /// Seed of the hand's tremor.
 const SEED: u64 = 7;
+
+/// Least step of a position sensor that the law reckons with, m; simulated sensors can be exact.
+const LEAST_RESOLUTION: f64 = 1e-6;
+
+/// Opens the device that a scene asks for. `target` is the motion of a simulated hand in the device's
+/// frame; a person's hand does not need it.
+///
+/// # Errors
+/// If a real device is not connected or does not answer. A simulated one always opens.
+pub fn open_device(
+    device: &Device,
+    target: impl Into<HandTarget>,
+) -> Result<Box<dyn HapticDevice>, DeviceFault> {
+    let setup = DeviceSetup {
+        driver: match device.kind {
+            DeviceKind::Simulated => Driver::Simulated,
+        },
+        model: device_model(device.preset),
+        grip: grip(device.grip),
+        target: target.into(),
+    };
+    setup.open()
+}
+
+/// Parameters of the 1 kHz law for a device.
+pub fn servo_params(device: &dyn HapticDevice) -> ServoParams {
+    ServoParams {
+        resolution: device.resolution().max(LEAST_RESOLUTION),
+        ..ServoParams::default()
+    }
+}
 
 /// The figures of the scene's device.
 pub fn device_model(preset: DevicePreset) -> DeviceModel {

@@ -15,7 +15,7 @@ mod springs;
 mod watch;
 
 pub use fine::FineScene;
-pub use hand::{device_model, grip, once_from, path};
+pub use hand::{device_model, grip, once_from, open_device, path, servo_params};
 pub use moving::LiveTissue;
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};

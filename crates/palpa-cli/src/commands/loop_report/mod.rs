@@ -7,15 +7,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use palpa_device::{HapticDevice, SimulatedDevice};
 use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
 use palpa_scene::Scene;
-use palpa_servo::ServoParams;
 
 use self::figures::Figures;
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{LiveScene, device_model, grip, notes_of, path};
+use palpa::live::{LiveScene, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
 /// The scene that is pressed when none is named.
@@ -128,15 +126,10 @@ fn run_engine(
     tissue: palpa::live::LiveTissue,
     log: PathBuf,
 ) -> anyhow::Result<(Vec<palpa_rt::ForceReport>, Report)> {
-    let model = device_model(scene.device.preset);
     let way = path(scene, &live.scene_from_device, args.seconds);
-    let device = SimulatedDevice::new(model, grip(scene.device.grip), way);
-    let devices: Vec<Box<dyn HapticDevice>> = vec![Box::new(device)];
+    let device = open_device(&scene.device, way)?;
     let params = EngineParams {
-        servo: ServoParams {
-            resolution: model.resolution.max(1e-6),
-            ..ServoParams::default()
-        },
+        servo: servo_params(&*device),
         spin: args.spin_us * 1e-6,
         ..EngineParams::default()
     };
@@ -147,7 +140,7 @@ fn run_engine(
     };
     context.begin_recording();
     let bar = context.progress(args.seconds.ceil() as usize, "real time");
-    let engine = Engine::start(tissue, devices, &params, &recorder)?;
+    let engine = Engine::start(tissue, vec![device], &params, &recorder)?;
     while engine.now() < args.seconds && !context.is_interrupted() {
         std::thread::sleep(Duration::from_millis(20));
         bar.set_position(engine.now() as u64);

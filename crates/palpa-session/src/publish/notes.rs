@@ -1,4 +1,4 @@
-//! Notes of the engine as pages get them.
+//! Notes on a scene, as pages receive them.
 
 use palpa::Note;
 use palpa_viewer::control;

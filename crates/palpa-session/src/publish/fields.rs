@@ -1,4 +1,4 @@
-//! Fields over the nodes, computed on a thread of their own: they cost more than a frame may.
+//! Fields over the nodes, computed on a thread of their own: a field takes longer than a frame.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
@@ -16,7 +16,7 @@ pub(super) struct NodeField {
     pub(super) mesh: u64,
     /// Which field.
     pub(super) field: Field,
-    /// Means of the prisms round each node. `[n_nodes]`
+    /// Mean of the prisms around each node. `[n_nodes]`
     pub(super) values: Vec<f64>,
 }
 
@@ -28,18 +28,18 @@ struct Job {
     displacements: Arc<[Vec3]>,
 }
 
-/// The worker, and the last field that it made.
+/// The worker, and the last field that it computed.
 #[derive(Debug)]
-pub(super) struct Fields {
+pub(crate) struct Fields {
     jobs: SyncSender<Job>,
     done: Receiver<NodeField>,
     latest: Option<NodeField>,
     is_busy: bool,
-    /// What it was last asked for.
+    /// Mesh, field and displacements of the latest job.
     asked: Option<(u64, Field, Arc<[Vec3]>)>,
 }
 
-/// A body whose displacements differ by less, m, has the same fields to the eye.
+/// Displacements that differ by less, m, give the same field to the eye.
 const UNSEEN: f64 = 1e-7;
 
 impl Fields {
@@ -47,7 +47,7 @@ impl Fields {
     ///
     /// # Errors
     /// When the system gives no thread.
-    pub(super) fn start() -> std::io::Result<Self> {
+    pub(crate) fn start() -> std::io::Result<Self> {
         let (jobs, inbox) = sync_channel::<Job>(1);
         let (outbox, done) = sync_channel(1);
         thread::Builder::new()
@@ -71,7 +71,7 @@ impl Fields {
                     if outbox.send(field).is_err() {
                         return;
                     }
-                    // Half of a core at most: the tissue, and who draws, want theirs.
+                    // Half of a core at most: tissue and browser need theirs.
                     thread::sleep(took);
                 }
             })?;
@@ -84,7 +84,8 @@ impl Fields {
         })
     }
 
-    /// The latest field of this kind on this mesh; asks for the one of these displacements if the worker is free.
+    /// The latest field of this kind on this mesh. Starts a job for these displacements if the
+    /// worker is free.
     pub(super) fn of(
         &mut self,
         mesh: u64,
@@ -120,7 +121,7 @@ impl Fields {
             .filter(|latest| latest.mesh == mesh && latest.field == field)
     }
 
-    /// Whether the field of these displacements was the last that was asked for.
+    /// Whether the latest job was for these displacements.
     fn is_asked(&self, mesh: u64, field: Field, displacements: &[Vec3]) -> bool {
         self.asked.as_ref().is_some_and(|(m, f, before)| {
             (*m, *f) == (mesh, field)
@@ -130,7 +131,7 @@ impl Fields {
     }
 }
 
-/// A field at the nodes: the mean of the prisms that meet there.
+/// A field at the nodes: the mean of the prisms that meet there. `[n_nodes]`
 fn at_nodes(model: &Model, displacements: &[Vec3], field: Field) -> Vec<f64> {
     let body = model.body();
     let value = |prism: &PrismField| match field {

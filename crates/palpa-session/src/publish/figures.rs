@@ -1,17 +1,17 @@
-//! How the engine fares, in numbers and words for a page.
+//! The engine's figures for a page: rates, times, limits and faults.
 
 use std::time::Instant;
 
-use palpa_rt::{Level, Quantiles, Report, StepStatus, TickEntry};
+use palpa_rt::{Level, Quantiles, Report, StepRecord, StepStatus, TickEntry};
 use palpa_servo::{Faults, Limits};
 use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeLevel};
 
-/// Events that a page is told of.
+/// Number of events that a page receives.
 const LATEST: usize = 30;
 
-/// Counts of the figures before.
+/// Counts at the time of the last figures, and what ticks met since.
 #[derive(Debug)]
-pub(super) struct Figures {
+pub(crate) struct Figures {
     at: Instant,
     steps: u64,
     ticks: u64,
@@ -22,8 +22,8 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// Of an engine that begins.
-    pub(super) fn new() -> Self {
+    /// The counts of an engine that starts.
+    pub(crate) fn new() -> Self {
         Self {
             at: Instant::now(),
             steps: 0,
@@ -35,19 +35,18 @@ impl Figures {
         }
     }
 
-    /// What a tick met.
-    pub(super) fn note(&mut self, entry: &TickEntry) {
+    /// Notes the limits and faults of a tick.
+    pub(crate) fn note(&mut self, entry: &TickEntry) {
         self.limits |= Limits::from_bits(entry.tick.limits as u16);
         self.faults |= Faults::from_bits(entry.tick.faults as u16);
     }
 
-    /// The figures of now, and notices of what was wrong since.
-    pub(super) fn make(
+    /// The present figures, and a notice of each error of the engine since the last ones.
+    pub(crate) fn make(
         &mut self,
         report: &Report,
         entry: &TickEntry,
-        status: u8,
-        meshes: u64,
+        step: &StepRecord,
         n_nodes: usize,
         snapshots: u64,
     ) -> (EngineFigures, Vec<Notice>) {
@@ -76,13 +75,13 @@ impl Figures {
             tick_histogram: report.tick_cpu_histogram.clone(),
             latency: finite(entry.tick.patch_age),
             n_nodes: n_nodes as u32,
-            n_meshes: meshes,
+            n_meshes: step.mesh,
             limits,
             faults,
             energy_in: device.energy_in,
             energy_out: device.energy_out,
             energy_budget: entry.tick.energy_budget,
-            step_status: status_name(status).to_owned(),
+            step_status: status_name(step.status).to_owned(),
             granted: report.granted.iter().map(ToString::to_string).collect(),
             events: events
                 .map(|event| EventInfo {

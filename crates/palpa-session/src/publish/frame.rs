@@ -1,4 +1,4 @@
-//! Snapshots: what is known of engine and body, as a page draws it.
+//! Snapshots of engine and body, in the units and types of the wire.
 
 use nalgebra::Point3;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
@@ -7,12 +7,12 @@ use palpa_servo::Pose;
 use palpa_viewer::control::Field;
 use palpa_viewer::wire::{FrameSnapshot, MeshSnapshot};
 
-use crate::fields::NodeField;
+use super::fields::NodeField;
 
-/// Displacements are sent in units of this at least, m: what is smaller is not seen.
+/// Smallest unit of displacements, m: nobody sees less.
 const LEAST_UNIT: f64 = 1e-8;
 
-/// A body at rest.
+/// The mesh of a body at rest. `stiffness` has a value for each prism, Pa. `[n_prisms]`
 pub(super) fn mesh(
     number: u32,
     body: &LayeredBody,
@@ -57,7 +57,8 @@ pub(super) fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3
         .extend(components.map(|x| (x / unit).round() as i16));
 }
 
-/// Puts what a tick of the loop says into a frame. `over` is the place of the skin (point, outward normal) from which depth counts.
+/// Puts a tick of the loop into a frame. `over` is the place of the skin (point, outward normal)
+/// from which depth counts.
 pub(super) fn put_tick(
     frame: &mut FrameSnapshot,
     entry: &TickEntry,
@@ -66,7 +67,7 @@ pub(super) fn put_tick(
 ) {
     let (tick, device) = (&entry.tick, &entry.devices[0]);
     let at = Vec3::from(device.position);
-    // The coupling is the same all round: the tool stands off the way that the tissue pushes it.
+    // The coupling is isotropic: the tool stands off in the direction of the tissue's push.
     let push = Vec3::from(device.tissue_force).try_normalize(1e-9);
     let tool = at + push.unwrap_or_default() * device.stretch;
     let place = |p: Vec3| (scene_from_device * Point3::from(p)).coords;

@@ -1,4 +1,4 @@
-//! The hand of a person at a screen: where the page wants the tool, reached as a hand would.
+//! The hand's way to its goal, at the speeds of a person's hand.
 //!
 //! ```text
 //!          travel, over the skin or round the body
@@ -7,163 +7,69 @@
 //!       │ ▼                                    ▼
 //!     pressed ── stroke, along the skin ──► pressed
 //! ```
-//! A place is a point of the skin at rest; the tip is `depth` under it, against the skin's normal.
+//! A place is a point of the skin at rest. The tool's tip is `depth` below it, along the inward
+//! normal.
 
 use nalgebra::{Rotation3, Unit, UnitQuaternion};
-use palpa_mesh::{Surface, SurfaceIndex, Vec3};
+use palpa_mesh::Vec3;
 use palpa_servo::Pose;
 
+use super::skin::{Place, Skin};
+
 /// How high the tip hovers over the skin, m.
-pub const HOVER: f64 = 6e-3;
-/// Speeds: down and up, along the skin while pressing, and in the air, m/s.
+pub(crate) const HOVER: f64 = 6e-3;
+/// Speeds, m/s: down and up, along the skin while pressing, and in the air.
 const PRESS_SPEED: f64 = 0.04;
 const STROKE_SPEED: f64 = 0.06;
 const AIR_SPEED: f64 = 0.35;
-/// A place further away than this is gone to through the air, m.
+/// The hand lifts and travels through the air to places further away than this, m.
 const STRIDE: f64 = 15e-3;
-/// Rest over a new place, s, and the longest: the mesh becomes fine there meanwhile.
+/// Shortest and longest wait over a new place, s, while the mesh is refined there.
 const SETTLE: f64 = 0.1;
 const LONGEST_SETTLE: f64 = 4.0;
-/// Within so much of the radius of what is fine a place is pressed.
+/// The hand presses a place within this share of the radius of the fine part of the mesh.
 const FINE: f64 = 0.5;
-/// Distance from the skin at which the tool goes round the body, beside its own size, m.
+/// Distance between skin and tool on the way round the body, m; the tool's size is added.
 const CLEARANCE: f64 = 12e-3;
-/// Deepest press, as a share of the tissue there.
-const MOST_OF_TISSUE: f64 = 0.65;
 
-/// The skin at rest, as the hand knows it.
-#[derive(Debug)]
-pub struct Skin {
-    surface: Surface,
-    index: SurfaceIndex,
-    normals: Vec<Vec3>,
-    /// Depth of the tissue under each vertex, m.
-    thickness: Vec<f64>,
-    middle: Vec3,
-    /// The way along which it is longest.
-    axis: Vec3,
-}
-
-/// A place on the skin.
+/// Where the hand shall go.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// The point, m.
-    pub point: Vec3,
-    /// The outward normal there.
-    pub normal: Vec3,
-    /// Depth of the tissue, m.
-    pub thickness: f64,
+pub(crate) struct Goal {
+    /// The place on the skin.
+    pub(crate) place: Place,
+    /// Depth of the tip below the place, m; negative above the skin.
+    pub(crate) depth: f64,
 }
 
-impl Place {
-    /// Deepest that a hand presses here, m.
-    pub fn deepest(&self) -> f64 {
-        MOST_OF_TISSUE * self.thickness
-    }
-}
-
-impl Skin {
-    /// Of a surface with the depth of the tissue under its vertices, m.
-    pub fn new(surface: Surface, thickness: Vec<f64>) -> Self {
-        let n = surface.points.len().max(1) as f64;
-        let middle = surface.points.iter().sum::<Vec3>() / n;
-        let spread = surface
-            .points
-            .iter()
-            .map(|p| (p - middle) * (p - middle).transpose())
-            .sum::<nalgebra::Matrix3<f64>>();
-        let eigen = spread.symmetric_eigen();
-        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imax());
-        Self {
-            index: SurfaceIndex::build(&surface),
-            normals: surface.vertex_normals(),
-            axis: axis.into(),
-            surface,
-            thickness,
-            middle,
-        }
-    }
-
-    /// The place nearest to a point.
-    pub fn nearest(&self, point: Vec3) -> Option<Place> {
-        let closest = self.index.closest(point)?;
-        let corners = self.surface.triangles.get(closest.triangle as usize)?;
-        let mut normal = Vec3::zeros();
-        let mut thickness = 0.0;
-        for (&v, share) in corners.iter().zip(closest.weights) {
-            normal += self.normals[v as usize] * share;
-            thickness += self.thickness[v as usize] * share;
-        }
-        Some(Place {
-            point: closest.point,
-            normal: normal.try_normalize(1e-9)?,
-            thickness,
-        })
-    }
-
-    /// Vertices at least so far (m) from where the body was cut: place, area that it stands for (m²), depth of the tissue (m).
-    pub fn away_from_rim(&self, distance: f64) -> impl Iterator<Item = (Vec3, f64, f64)> {
-        let surface = &self.surface;
-        let rim: Vec<Vec3> = (surface.boundary_loops().iter().flatten())
-            .map(|&v| surface.points[v as usize])
-            .collect();
-        let mut areas = vec![0.0; surface.points.len()];
-        for (t, corners) in surface.triangles.iter().enumerate() {
-            for &v in corners {
-                areas[v as usize] += surface.area_vector(t).norm() / 3.0;
-            }
-        }
-        (0..surface.points.len())
-            .map(move |v| (surface.points[v], areas[v], self.thickness[v]))
-            .filter(move |(p, ..)| rim.iter().all(|q| (p - q).norm() >= distance))
-    }
-
-    /// Distance of a point from the skin, m.
-    fn distance(&self, point: Vec3) -> f64 {
-        self.index
-            .closest(point)
-            .map_or(f64::INFINITY, |c| (c.point - point).norm())
-    }
-}
-
-/// Where the hand is to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal {
-    /// On the skin.
-    pub place: Place,
-    /// How deep, m.
-    pub depth: f64,
-}
-
-/// What the hand is about.
+/// The hand's state on its way.
 #[derive(Debug, Clone, PartialEq)]
 enum Doing {
-    /// Over or in the skin at the place.
+    /// At the place, over the skin or pressing.
     There,
-    /// On its way through the air: points that are left, the last first.
+    /// Travelling through the air; the points still ahead, the next one last.
     Travel(Vec<Vec3>),
-    /// Over a new place, for so long, s.
+    /// Waiting over a new place; time waited so far, s.
     Settling(f64),
 }
 
-/// The hand.
+/// The hand on its way to a goal.
 #[derive(Debug)]
-pub struct HandDriver {
+pub(crate) struct HandDriver {
     place: Place,
     depth: f64,
-    /// Where the tip is told to be, m.
+    /// Commanded place of the tip, scene's frame, m.
     tip: Vec3,
     doing: Doing,
     goal: Option<Goal>,
-    /// Direction that the tool's x points along as nearly as the skin lets it.
+    /// Preferred direction of the tool's x axis.
     along: Vec3,
-    /// Size of the tool, to go round the body with, m.
+    /// Size of the tool, m; kept clear of the skin on the way round the body.
     tool_size: f64,
 }
 
 impl HandDriver {
-    /// Hovering over a place, with the tool's x along a direction as nearly as the skin lets it.
-    pub fn over(place: Place, along: Vec3, tool_size: f64) -> Self {
+    /// A hand that hovers over `place`; `along` is the preferred direction of the tool's x axis.
+    pub(crate) fn over(place: Place, along: Vec3, tool_size: f64) -> Self {
         Self {
             place,
             depth: -HOVER,
@@ -175,42 +81,43 @@ impl HandDriver {
         }
     }
 
-    /// Where it is to go; none lifts it off the skin.
-    pub fn set_goal(&mut self, goal: Option<Goal>) {
+    /// Sets the goal; its depth is limited to the tissue there. `None` lifts the hand off the skin.
+    pub(crate) fn set_goal(&mut self, goal: Option<Goal>) {
         self.goal = goal.map(|goal| Goal {
             depth: goal.depth.clamp(-HOVER, goal.place.deepest()),
             ..goal
         });
     }
 
-    /// Deepest that it goes where it is to be, m.
-    pub fn deepest(&self) -> f64 {
+    /// Deepest press at the goal, or at the present place without a goal, m.
+    pub(crate) fn deepest(&self) -> f64 {
         self.goal.map_or(self.place, |goal| goal.place).deepest()
     }
 
-    /// The place that it is over or in.
-    pub fn place(&self) -> &Place {
+    /// The place that the hand hovers over or presses.
+    pub(crate) fn place(&self) -> &Place {
         &self.place
     }
 
-    /// Where the tip is told to be, m.
-    pub fn tip(&self) -> Vec3 {
+    /// Commanded place of the tip, scene's frame, m.
+    pub(crate) fn tip(&self) -> Vec3 {
         self.tip
     }
 
-    /// Whether it is on its way through the air.
-    pub fn is_travelling(&self) -> bool {
+    /// Whether the hand travels through the air.
+    pub(crate) fn is_travelling(&self) -> bool {
         matches!(self.doing, Doing::Travel(_))
     }
 
-    /// Whether it is at rest over the skin.
-    pub fn is_lifted(&self) -> bool {
+    /// Whether the hand hovers at rest.
+    pub(crate) fn is_lifted(&self) -> bool {
         self.doing == Doing::There && self.depth <= -HOVER
     }
 
-    /// Goes on for `dt` seconds; where the tool is to be, in the scene's frame. `fine` is where the mesh is fine (place and
-    /// radius, m), if that moves: a new place is not pressed before.
-    pub fn advance(&mut self, skin: &Skin, fine: Option<(Vec3, f64)>, dt: f64) -> Pose {
+    /// Moves the hand on by `dt` seconds. Returns the commanded pose of the tool in the scene's
+    /// frame. `fine` is the fine part of the mesh (centre and radius, m) where it moves with the
+    /// hand: the hand waits over a new place until the mesh is fine there.
+    pub(crate) fn advance(&mut self, skin: &Skin, fine: Option<(Vec3, f64)>, dt: f64) -> Pose {
         match &mut self.doing {
             Doing::Travel(points) => {
                 let mut way = AIR_SPEED * dt;
@@ -273,7 +180,8 @@ impl HandDriver {
         }
         let ahead = self.place.point + off * (way / off.norm());
         if let Some(mut place) = skin.nearest(ahead) {
-            // The normal turns towards that of the goal at the pace of the way: no jump where triangles meet.
+            // The normal turns towards that of the goal at the pace of the way: no jump where
+            // triangles meet.
             let share = way / off.norm();
             let turned = self.place.normal.lerp(&to.normal, share);
             place.normal = turned.try_normalize(1e-6).unwrap_or(to.normal);
@@ -305,7 +213,7 @@ fn is_outside(skin: &Skin, at: Vec3) -> bool {
         .is_none_or(|place| (at - place.point).dot(&place.normal) > 0.0)
 }
 
-/// Points of a way round the body's long axis, at a distance that is clear of all of it.
+/// Points of an arc round the body's long axis, at least `clear` (m) from every vertex of the skin.
 fn round_the_body(skin: &Skin, from: Vec3, to: Vec3, clear: f64) -> Vec<Vec3> {
     const POINTS: i32 = 12;
     let axis = Unit::new_normalize(skin.axis);
@@ -338,7 +246,7 @@ fn round_the_body(skin: &Skin, from: Vec3, to: Vec3, clear: f64) -> Vec<Vec3> {
         .collect()
 }
 
-/// The frame of a tool whose z points along `normal`, its x as nearly as that lets it along `along`.
+/// Orientation of a tool whose z axis is `normal` and whose x axis is nearest to `along`.
 fn turned_to(normal: &Vec3, along: &Vec3) -> UnitQuaternion<f64> {
     let flat = |v: &Vec3| (v - normal * normal.dot(v)).try_normalize(0.1);
     let x = flat(along)
@@ -351,6 +259,7 @@ fn turned_to(normal: &Vec3, along: &Vec3) -> UnitQuaternion<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::skin::MOST_OF_TISSUE;
     use super::*;
     use palpa_mesh::generate::limb;
 

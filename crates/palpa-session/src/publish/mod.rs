@@ -1,0 +1,21 @@
+//! What pages are sent: the picture (meshes, frames, fields) and the words (state, figures,
+//! notices).
+//!
+//! ```text
+//!  body, tick, look ──► Screen ── mesh before its frames ──────┐
+//!                         └─ Fields, on a thread of their own  ├──► Publisher ──► pages
+//!  state, problem ────► Status ── state, figures, notices ─────┘
+//! ```
+
+mod fields;
+mod figures;
+mod frame;
+mod notes;
+mod screen;
+mod status;
+
+pub(crate) use fields::Fields;
+pub(crate) use figures::Figures;
+pub(crate) use notes::shown;
+pub(crate) use screen::{MeshBytes, Screen};
+pub(crate) use status::{Status, Told};

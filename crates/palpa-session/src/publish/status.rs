@@ -1,0 +1,151 @@
+//! The words: the state of the session, its problem, and notices.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use palpa_scene::Scene;
+use palpa_viewer::Publisher;
+use palpa_viewer::control::{
+    EngineFigures, Field, GameInfo, Notice, NoticeLevel, Phase, RecordingInfo, State,
+};
+
+use crate::veil::Veil;
+use crate::world::World;
+use crate::{edit, gallery};
+
+/// The parts of the state that change by themselves.
+#[derive(Debug)]
+pub(crate) struct Told {
+    /// What the engine does.
+    pub(crate) phase: Phase,
+    /// Whether the scene's motion runs.
+    pub(crate) is_motion_running: bool,
+    /// The recording.
+    pub(crate) recording: RecordingInfo,
+    /// The game, if one is on.
+    pub(crate) game: Option<GameInfo>,
+}
+
+/// The state as pages know it.
+pub(crate) struct Status {
+    publisher: Publisher,
+    state: State,
+    is_changed: bool,
+    /// The problem as the server knows it: only while nothing runs.
+    problem: Arc<Mutex<Option<String>>>,
+}
+
+impl Status {
+    /// The state of a session that begins. `problem` is shared with the server.
+    pub(crate) fn new(
+        publisher: Publisher,
+        allows_faults: bool,
+        problem: Arc<Mutex<Option<String>>>,
+    ) -> Self {
+        Self {
+            publisher,
+            state: State {
+                gallery: gallery::entries(),
+                allows_faults,
+                ..State::default()
+            },
+            is_changed: true,
+            problem,
+        }
+    }
+
+    /// Something of the state has changed: it is sent with the next frame.
+    pub(crate) fn change(&mut self) {
+        self.is_changed = true;
+    }
+
+    /// The field that frames carry.
+    pub(crate) fn field(&self) -> Field {
+        self.state.field
+    }
+
+    /// Sets the field that frames carry.
+    pub(crate) fn set_field(&mut self, field: Field) {
+        self.state.field = field;
+        self.is_changed = true;
+    }
+
+    /// Key of the scene that pages see, if it is of the gallery.
+    pub(crate) fn gallery_key(&self) -> Option<&str> {
+        self.state.gallery_key.as_deref()
+    }
+
+    /// Describes the body that is there.
+    pub(crate) fn describe(&mut self, world: &World, key: Option<&str>, veil: Veil<'_>) {
+        self.is_changed = true;
+        let scene: Scene = veil.scene(&world.scene);
+        let state = &mut self.state;
+        // A scene that was read can be written.
+        state.scene = edit::to_json(&scene).unwrap_or_default();
+        state.gallery_key = key.map(str::to_owned);
+        state.layers.clone_from(&world.layers);
+        state.lumps = veil.lumps(&world.lumps);
+        state.tool = world.tool.clone();
+        state.home = world.home_hand();
+        state.usual_depth = world.scene.motion.depth.min(world.greatest_depth());
+        state.greatest_depth = world.greatest_depth();
+        state.max_force = palpa::live::device_model(world.scene.device.preset)
+            .spec
+            .max_force;
+        state.method = world.method;
+        state.notes = veil.notes(&world.notes);
+        state.n_nodes = world.n_nodes() as u32;
+    }
+
+    /// Tells a problem, which stays until all is well. `is_running` says whether a body is there
+    /// all the same.
+    pub(crate) fn fail(&mut self, problem: String, is_running: bool) {
+        self.notice(NoticeLevel::Error, problem.clone());
+        self.set_problem(Some(problem), is_running);
+    }
+
+    /// All is well.
+    pub(crate) fn well(&mut self) {
+        self.set_problem(None, true);
+    }
+
+    fn set_problem(&mut self, problem: Option<String>, is_running: bool) {
+        self.is_changed = true;
+        self.state.problem.clone_from(&problem);
+        // The session is well as long as something runs.
+        let shown = problem.filter(|_| !is_running);
+        *self.problem.lock().unwrap_or_else(PoisonError::into_inner) = shown;
+    }
+
+    /// Sends a notice.
+    pub(crate) fn notice(&self, level: NoticeLevel, text: String) {
+        self.publisher.notice(Notice { level, text });
+    }
+
+    /// Sends the engine's figures, and notices of its errors.
+    pub(crate) fn tell_figures(&self, figures: EngineFigures, notices: Vec<Notice>) {
+        self.publisher.engine(figures);
+        for notice in notices {
+            self.publisher.notice(notice);
+        }
+    }
+
+    /// Sends the state if it has changed.
+    pub(crate) fn tell(&mut self, told: impl FnOnce() -> Told) {
+        if !std::mem::take(&mut self.is_changed) {
+            return;
+        }
+        let Told {
+            phase,
+            is_motion_running,
+            recording,
+            game,
+        } = told();
+        let state = &mut self.state;
+        state.revision += 1;
+        state.phase = phase;
+        state.is_motion_running = is_motion_running;
+        state.recording = recording;
+        state.game = game;
+        self.publisher.state(state.clone());
+    }
+}

@@ -1,0 +1,148 @@
+//! The session and its thread: orders in, a picture out, sixty times a second.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use palpa_scene::Scene;
+use palpa_viewer::Publisher;
+
+use crate::desk::Desk;
+use crate::publish::Fields;
+use crate::remote::{Order, Remote};
+use crate::world::BEFORE_THE_BROWSER;
+
+/// Time between two frames.
+const PERIOD: Duration = Duration::from_micros(16_667);
+/// Longest time by which a frame moves the hand on, s: after a hold-up the hand does not jump.
+const LONGEST_FRAME: f64 = 0.1;
+/// Most orders taken between two frames: all that may come in a second, as a page may send more
+/// requests than there are frames.
+const MOST_ORDERS: u32 = 1000;
+/// Time between two tellings of the engine's figures.
+const FIGURES_PERIOD: Duration = Duration::from_millis(500);
+
+/// How a session begins.
+#[derive(Debug, Clone)]
+pub struct SessionParams {
+    /// The scene.
+    pub scene: Scene,
+    /// The scene's key, if it is of the gallery.
+    pub gallery_key: Option<String>,
+    /// The folder for recordings.
+    pub out: PathBuf,
+    /// Seed of the first round of "find the lump", where the page gives none. Later rounds count
+    /// on.
+    pub seed: Option<u64>,
+    /// Whether pages may ask for faults.
+    pub allows_faults: bool,
+}
+
+/// A session that does not run yet.
+#[derive(Debug)]
+pub struct Session {
+    params: SessionParams,
+    inbox: Receiver<Order>,
+    orders: Sender<Order>,
+    problem: Arc<Mutex<Option<String>>>,
+}
+
+/// A running session. Dropped, it stops: the engine ramps down and a recording is closed.
+#[derive(Debug)]
+pub struct Handle {
+    orders: Sender<Order>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        let _ = self.orders.send(Order::Stop);
+        if let Some(thread) = self.thread.take() {
+            // A panic has been reported where it happened.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Session {
+    /// A session, and the server's end of it.
+    pub fn new(params: SessionParams) -> (Self, Arc<Remote>) {
+        let (orders, inbox) = channel();
+        let problem = Arc::<Mutex<Option<String>>>::default();
+        let remote = Arc::new(Remote {
+            orders: orders.clone(),
+            problem: Arc::clone(&problem),
+        });
+        let session = Self {
+            params,
+            inbox,
+            orders,
+            problem,
+        };
+        (session, remote)
+    }
+
+    /// Runs the session on a thread of its own.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn start(self, publisher: Publisher) -> anyhow::Result<Handle> {
+        let orders = self.orders.clone();
+        let fields = Fields::start()?;
+        let thread = thread::Builder::new()
+            .name("palpa-session".to_owned())
+            .spawn(move || {
+                // It moves the hand: as high a priority as the tissue's, where the system grants
+                // it.
+                BEFORE_THE_BROWSER.ask("palpa-session");
+                let desk = Desk::new(self.params, self.orders, self.problem, publisher, fields);
+                run(desk, &self.inbox);
+            })?;
+        Ok(Handle {
+            orders,
+            thread: Some(thread),
+        })
+    }
+}
+
+/// The thread: takes orders as they come, and makes a frame when one is due.
+fn run(mut desk: Desk, inbox: &Receiver<Order>) {
+    desk.build();
+    let mut due = Instant::now();
+    let mut figures_due = due;
+    let mut last = due;
+    loop {
+        let rest = due.saturating_duration_since(Instant::now());
+        let mut next = match inbox.recv_timeout(rest) {
+            Err(RecvTimeoutError::Disconnected) => return desk.end(),
+            next => next.ok(),
+        };
+        let mut n_left = MOST_ORDERS;
+        while let Some(order) = next {
+            if matches!(order, Order::Stop) {
+                return desk.end();
+            }
+            desk.obey(order);
+            n_left -= 1;
+            next = if n_left > 0 {
+                inbox.try_recv().ok()
+            } else {
+                None
+            };
+        }
+        let now = Instant::now();
+        if now < due {
+            continue;
+        }
+        due = (due + PERIOD).max(now);
+        desk.advance((now - last).as_secs_f64().min(LONGEST_FRAME), now);
+        last = now;
+        if now >= figures_due {
+            figures_due = now + FIGURES_PERIOD;
+            desk.tell_figures();
+        }
+        desk.tell_state();
+    }
+}

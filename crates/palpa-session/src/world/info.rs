@@ -1,0 +1,128 @@
+//! The description of a world for a page: its layers, lumps, tool and stiffness.
+
+use palpa_fem::lump::{Lump as PlacedLump, LumpShape};
+use palpa_mesh::{LayeredBody, Vec3};
+use palpa_scene::{ContactShape, MaterialStatus, Scene, Tool};
+use palpa_viewer::control::{LayerInfo, LumpForm, LumpInfo, ToolForm, ToolInfo};
+
+use super::World;
+
+impl World {
+    /// Largest extent of the tool from its axis, m.
+    pub(crate) fn tool_size(&self) -> f64 {
+        match self.tool.shape {
+            ToolForm::Sphere { radius } | ToolForm::FlatPunch { radius, .. } => radius,
+            ToolForm::Capsule { radius, length } => radius + 0.5 * length,
+            ToolForm::Box { size, .. } => 0.5 * size[0].max(size[1]),
+            ToolForm::Fingertip { radii } => radii[0].max(radii[1]),
+            ToolForm::Node => 0.0,
+        }
+    }
+
+    /// Young's modulus at small strain of every prism of a body, Pa; for a network of bars the
+    /// stiffness of a bar, N/m. `[n_prisms]`
+    pub(crate) fn stiffness(&self, body: &LayeredBody, shows_lumps: bool) -> Vec<f32> {
+        let lumps = if shows_lumps { self.placed() } else { &[] };
+        let n_intervals = body.n_levels - 1;
+        let mut all = Vec::with_capacity(body.n_prisms());
+        for t in 0..body.skin.triangles.len() {
+            for i in 0..n_intervals {
+                let mut young = self.layers[body.interval_layer[i]].stiffness;
+                let corners = body.prism(t, i);
+                let middle = corners.iter().map(|&n| body.positions[n]).sum::<Vec3>() / 6.0;
+                for (lump, info) in lumps.iter().zip(&self.lumps) {
+                    young += lump.fraction(&middle) * (info.stiffness - young);
+                }
+                all.push(young as f32);
+            }
+        }
+        all
+    }
+}
+
+/// The layers from the skin down, with their mean thickness.
+pub(super) fn layer_infos(scene: &Scene, body: &LayeredBody) -> Vec<LayerInfo> {
+    let status = scene.material_status();
+    let mut thickness = vec![0.0; scene.layers.len()];
+    for v in 0..body.n_vertices() {
+        for (i, &layer) in body.interval_layer.iter().enumerate() {
+            let [above, below] = [i, i + 1].map(|l| body.positions[body.node(v, l)]);
+            thickness[layer] += (below - above).norm() / body.n_vertices() as f64;
+        }
+    }
+    status
+        .into_iter()
+        .zip(thickness)
+        .map(|(status, thickness)| LayerInfo {
+            stiffness: stiffness_of(&status),
+            law: status.law.to_owned(),
+            name: status.tissue,
+            thickness,
+        })
+        .collect()
+}
+
+fn stiffness_of(status: &MaterialStatus) -> f64 {
+    status.young.or(status.spring).unwrap_or(0.0)
+}
+
+/// The lumps where they lie. `placed` has the same order as the lumps of the scene.
+pub(super) fn lump_infos(scene: &Scene, placed: &[PlacedLump]) -> Vec<LumpInfo> {
+    let status = scene.lump_status();
+    scene
+        .lumps
+        .iter()
+        .zip(placed)
+        .zip(status)
+        .map(|((lump, placed), status)| {
+            let axes = placed.pose().rotation.to_rotation_matrix();
+            LumpInfo {
+                name: lump.name.clone(),
+                shape: match placed.shape() {
+                    LumpShape::Sphere(sphere) => LumpForm::Ellipsoid {
+                        radii: [sphere.radius(); 3],
+                    },
+                    LumpShape::Ellipsoid(ellipsoid) => LumpForm::Ellipsoid {
+                        radii: ellipsoid.radii().into(),
+                    },
+                    LumpShape::Capsule(capsule) => LumpForm::Capsule {
+                        radius: capsule.radius(),
+                        length: capsule.length(),
+                    },
+                    LumpShape::Mesh(_) => LumpForm::Mesh {
+                        radius: placed.bounding_sphere().1,
+                    },
+                },
+                centre: placed.pose().translation.vector.into(),
+                axes: [0, 1, 2].map(|c| axes.matrix().column(c).into_owned().into()),
+                stiffness: stiffness_of(&status),
+            }
+        })
+        .collect()
+}
+
+/// The tool.
+pub(super) fn tool_info(tool: &Tool) -> ToolInfo {
+    let Tool::Contact(tool) = tool else {
+        return ToolInfo {
+            shape: ToolForm::Node,
+            friction: 0.0,
+        };
+    };
+    ToolInfo {
+        shape: match tool.shape {
+            ContactShape::Sphere { radius } => ToolForm::Sphere { radius },
+            ContactShape::FlatPunch {
+                radius,
+                edge_radius,
+            } => ToolForm::FlatPunch {
+                radius,
+                edge_radius,
+            },
+            ContactShape::Capsule { radius, length } => ToolForm::Capsule { radius, length },
+            ContactShape::Box { size, edge_radius } => ToolForm::Box { size, edge_radius },
+            ContactShape::Fingertip { radii } => ToolForm::Fingertip { radii },
+        },
+        friction: tool.friction,
+    }
+}
