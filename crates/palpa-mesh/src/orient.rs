@@ -154,9 +154,13 @@ pub(crate) fn facing(surface: &mut Surface, triangles: &[u32]) -> (Enclosed, Opt
     let shape = Enclosed::of(surface, triangles);
     let mut facing = shape.facing();
     if facing == Some(false) {
-        triangles.iter().for_each(|&t| flip(surface, t));
+        for &t in triangles {
+            flip(surface, t);
+        }
         let turned = Enclosed::of(surface, triangles).facing();
-        triangles.iter().for_each(|&t| flip(surface, t));
+        for &t in triangles {
+            flip(surface, t);
+        }
         facing = (turned == Some(true)).then_some(false);
     }
     (shape, facing)

@@ -32,12 +32,12 @@ impl<'a> Veil<'a> {
     }
 
     /// Whether lumps are hidden.
-    pub(crate) fn is_drawn(&self) -> bool {
+    pub(crate) fn is_drawn(self) -> bool {
         matches!(self, Self::Drawn { .. })
     }
 
     /// Refuses a field that shows where lumps are.
-    pub(crate) fn check_field(&self, field: Field) -> anyhow::Result<()> {
+    pub(crate) fn check_field(self, field: Field) -> anyhow::Result<()> {
         if self.is_drawn() && field != Field::None {
             bail!("while lumps are hidden, only displacement may be shown");
         }
@@ -45,7 +45,7 @@ impl<'a> Veil<'a> {
     }
 
     /// Refuses a recording: its log holds the scene with its lumps.
-    pub(crate) fn check_recording(&self) -> anyhow::Result<()> {
+    pub(crate) fn check_recording(self) -> anyhow::Result<()> {
         if self.is_drawn() {
             bail!(
                 "a log holds the whole scene, hidden lumps as well: record after the truth is shown"
@@ -55,17 +55,17 @@ impl<'a> Veil<'a> {
     }
 
     /// Whether the file of the body may be had: its mesh is finer around lumps.
-    pub(crate) fn shows_body_file(&self) -> bool {
+    pub(crate) fn shows_body_file(self) -> bool {
         !self.is_drawn()
     }
 
     /// Whether a mesh may carry the stiffness of lumps.
-    pub(crate) fn shows_lumps(&self) -> bool {
+    pub(crate) fn shows_lumps(self) -> bool {
         !self.is_drawn()
     }
 
     /// The scene for the file of the scene.
-    pub(crate) fn scene_file(&self, scene: &'a Scene) -> &'a Scene {
+    pub(crate) fn scene_file(self, scene: &'a Scene) -> &'a Scene {
         match self {
             Self::Lifted => scene,
             Self::Drawn { before } => before,
@@ -73,7 +73,7 @@ impl<'a> Veil<'a> {
     }
 
     /// The scene for the state: the one that is pressed, without hidden lumps.
-    pub(crate) fn scene(&self, scene: &Scene) -> Scene {
+    pub(crate) fn scene(self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
         if self.is_drawn() {
             scene.lumps.clear();
@@ -82,7 +82,7 @@ impl<'a> Veil<'a> {
     }
 
     /// The lumps for the state.
-    pub(crate) fn lumps(&self, lumps: &[LumpInfo]) -> Vec<LumpInfo> {
+    pub(crate) fn lumps(self, lumps: &[LumpInfo]) -> Vec<LumpInfo> {
         if self.is_drawn() {
             Vec::new()
         } else {
@@ -91,7 +91,7 @@ impl<'a> Veil<'a> {
     }
 
     /// The notes for the state.
-    pub(crate) fn notes(&self, notes: &[Note]) -> Vec<control::Note> {
+    pub(crate) fn notes(self, notes: &[Note]) -> Vec<control::Note> {
         (notes.iter())
             // A note on a lump says where it is.
             .filter(|note| !(self.is_drawn() && note.is_about_lumps()))

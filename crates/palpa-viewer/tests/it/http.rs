@@ -1,9 +1,6 @@
 //! What can be had over HTTP.
 
-use crate::{
-    page::{Page, until},
-    session::Session,
-};
+use crate::{page::Page, session::Session};
 use palpa_viewer::{
     Server,
     control::{EngineFigures, Reply, Request, State},

@@ -73,7 +73,7 @@ impl Session {
         let mut told = self.told.subscribe();
         let is_so = told.wait_for(|told| told.last().is_some_and(|clients| clients.n == n));
         // Only turns a hang into a failure.
-        let is_so = tokio::time::timeout(Duration::from_secs(60), is_so).await;
+        let is_so = tokio::time::timeout(Duration::from_mins(1), is_so).await;
         is_so.expect("the number of clients in time").unwrap();
     }
 
