@@ -27,12 +27,12 @@ pub struct Found {
     /// Whether it was not interrupted.
     pub is_complete: bool,
     /// One for each device, hand, observer and damping.
-    pub rows: Vec<Row>,
+    pub rows: Vec<WallRow>,
 }
 
 /// The largest stable stiffness at one damping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct WallRow {
     /// Name of the device.
     pub device: &'static str,
     /// Name of the hand.
@@ -84,7 +84,7 @@ impl Study {
                         }
                         let damping = share * model.spec.max_damping;
                         let (stiffness, is_open) = largest(&model, &grip, damping, has_observer);
-                        rows.push(Row {
+                        rows.push(WallRow {
                             device,
                             grip: grip_name,
                             has_observer,
@@ -134,7 +134,7 @@ fn largest(model: &DeviceModel, grip: &Grip, damping: f64, has_observer: bool) -
 }
 
 /// A chart for each device: below its line a hand is safe.
-pub fn picture(rows: &[Row]) -> Picture {
+pub fn picture(rows: &[WallRow]) -> Picture {
     let stable = rows.iter().map(|row| row.stiffness.max(SOFTEST));
     let (low, high) = stable.fold((STIFFEST, SOFTEST), |(low, high), k| {
         (low.min(k), high.max(k))

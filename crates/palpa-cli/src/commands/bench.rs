@@ -9,7 +9,7 @@ use palpa_fem::Model;
 use super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
-use palpa_lab::bench::cases::{Case, Run, Shape, Tissue, cases};
+use palpa_lab::bench::cases::{BenchCase, Run, Shape, Tissue, cases};
 use palpa_lab::bench::ratios::{Ratio, dense_inverse, full_factor};
 use palpa_lab::bench::refined::Problem;
 use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
@@ -98,7 +98,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
 }
 
 /// Forces on refined meshes, as they are recorded in the source.
-fn refined(chosen: &[&Case], context: &Context) -> anyhow::Result<Outcome> {
+fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Result<Outcome> {
     let mut found = Vec::new();
     for problem in Problem::ALL {
         if !chosen.iter().any(|case| case.problem == problem) {
@@ -123,7 +123,7 @@ fn refined(chosen: &[&Case], context: &Context) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
+fn chosen(args: &Args) -> anyhow::Result<Vec<&'static BenchCase>> {
     let is_known = |name: &String| cases().iter().any(|case| case.name == name.as_str());
     if let Some(unknown) = args.cases.iter().find(|name| !is_known(name)) {
         let known: Vec<&str> = cases().iter().map(|case| case.name).collect();
@@ -132,7 +132,7 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
             known.join(", ")
         );
     }
-    let is_named = |case: &Case| {
+    let is_named = |case: &BenchCase| {
         args.cases.is_empty() && (!args.quick || case.is_quick)
             || args.cases.iter().any(|name| name == case.name)
     };
@@ -140,7 +140,11 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
 }
 
 /// Measures all lines; whether it was not interrupted.
-fn measure(chosen: &[&Case], context: &Context, report: &mut BenchReport) -> anyhow::Result<bool> {
+fn measure(
+    chosen: &[&BenchCase],
+    context: &Context,
+    report: &mut BenchReport,
+) -> anyhow::Result<bool> {
     let n_runs = chosen.iter().map(|case| case.runs.len() + 1).sum();
     let progress = context.progress(n_runs, "measuring");
     for case in chosen {
@@ -182,7 +186,7 @@ fn measure(chosen: &[&Case], context: &Context, report: &mut BenchReport) -> any
 }
 
 /// Forces of the converged body.
-fn truth(case: &Case, model: &Model, speed: f64) -> anyhow::Result<Vec<Known>> {
+fn truth(case: &BenchCase, model: &Model, speed: f64) -> anyhow::Result<Vec<Known>> {
     converged(model, &case.ride(), speed, case.every).map_err(|(at, outcome)| {
         anyhow!(
             "case \"{}\": {:.1} mm along the way the body did not converge: {outcome:?}",
@@ -193,7 +197,7 @@ fn truth(case: &Case, model: &Model, speed: f64) -> anyhow::Result<Vec<Known>> {
 }
 
 fn row(
-    case: &Case,
+    case: &BenchCase,
     run: &Run,
     model: &Model,
     ridden: &Ridden,
@@ -256,7 +260,7 @@ fn row(
 }
 
 /// Compares a case's zone and whole steps with a full factor, and the smallest body with the dense inverse.
-fn ratios(case: &Case, model: &Arc<Model>, report: &mut BenchReport) -> anyhow::Result<()> {
+fn ratios(case: &BenchCase, model: &Arc<Model>, report: &mut BenchReport) -> anyhow::Result<()> {
     const DENSE: [(&str, usize); 1] = [("324", 9)];
     const BUDGET: Duration = Duration::from_millis(500);
     const N_FACTORS: usize = 5;

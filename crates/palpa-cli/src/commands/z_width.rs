@@ -1,7 +1,7 @@
 //! `palpa z-width`: how stiff and how damped a wall each simulated device can render without rattling.
 
 use palpa_device::DeviceModel;
-use palpa_lab::z_width::{GRIPS, Row, Study, picture};
+use palpa_lab::z_width::{GRIPS, Study, WallRow, picture};
 
 use super::Outcome;
 use crate::cli::Context;
@@ -42,7 +42,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         !context.is_interrupted()
     });
     bar.finish_and_clear();
-    let mut csv = out.table::<Row>("z_width.csv")?;
+    let mut csv = out.table::<WallRow>("z_width.csv")?;
     for row in &found.rows {
         csv.push(row)?;
     }
@@ -62,7 +62,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
 }
 
 /// The limits without damping, which is what the law relies on.
-fn say(rows: &[Row], context: &Context) -> anyhow::Result<()> {
+fn say(rows: &[WallRow], context: &Context) -> anyhow::Result<()> {
     let mut table = Table::new([
         "stable to, N/m",
         "soft",

@@ -359,7 +359,7 @@ fn the_shipped_scenes_can_be_read_and_those_without_files_pressed() {
         n += 1;
         if matches!(scene.body.skin, palpa_scene::Skin::Generated(_)) {
             let built = palpa::build::build(&scene).unwrap();
-            let indentation = palpa::press::reference::Indentation::build(&scene, &built);
+            let indentation = palpa::press::reference::BarIndentation::build(&scene, &built);
             if !scene.tool.is_bonded() || !scene.lumps.is_empty() {
                 // Bars neither touch nor hold a lump.
                 let refusal = indentation.unwrap_err().to_string();

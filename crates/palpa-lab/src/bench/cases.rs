@@ -43,16 +43,16 @@ pub enum Tissue {
 
 /// The shape and its mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
+pub enum BenchShape {
     /// The layered block, of so many equal columns a side and an interval a layer.
     Block {
         /// Columns a side.
         columns: usize,
     },
     /// The layered block, fine where it is pressed.
-    Graded(Grading),
+    Graded(BenchGrading),
     /// A block of one tissue, fine where it is pressed.
-    OneTissue(Grading),
+    OneTissue(BenchGrading),
     /// A limb about its bone, an interval a layer.
     Limb {
         /// Length of the skin's edges, m.
@@ -64,7 +64,7 @@ pub enum Shape {
 
 /// A mesh that is graded toward a tool in its middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grading {
+pub struct BenchGrading {
     /// Length of edges in the ring, m.
     pub spacing: f64,
     /// Its radius, m.
@@ -94,11 +94,11 @@ pub struct Run {
 
 /// A body, a tool on its way, and the modes to measure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Case {
+pub struct BenchCase {
     /// Its name on the command line.
     pub name: &'static str,
     /// The body.
-    pub shape: Shape,
+    pub shape: BenchShape,
     /// What it is made of.
     pub tissue: Tissue,
     /// Radius of the sphere, m.
@@ -136,7 +136,7 @@ fn material(tissue: Tissue, young: f64) -> Material {
     material
 }
 
-impl Grading {
+impl BenchGrading {
     fn body(&self, layers: &[(f64, f64)]) -> LayeredBody {
         let block = GradedBlock {
             outline: Outline::Square,
@@ -161,7 +161,7 @@ impl Grading {
     }
 }
 
-impl Shape {
+impl BenchShape {
     fn body(&self) -> LayeredBody {
         match *self {
             Self::Block { columns } => {
@@ -213,7 +213,7 @@ impl Shape {
     }
 }
 
-impl Case {
+impl BenchCase {
     /// The body with its materials, on its bone.
     ///
     /// # Errors
@@ -226,10 +226,10 @@ impl Case {
     ///
     /// # Errors
     /// When it cannot be computed with.
-    pub fn model_of(&self, shape: &Shape) -> Result<Arc<Model>, FemError> {
+    pub fn model_of(&self, shape: &BenchShape) -> Result<Arc<Model>, FemError> {
         let body = shape.body();
         let youngs: Vec<f64> = match shape {
-            Shape::OneTissue(_) => vec![ONE_TISSUE.0],
+            BenchShape::OneTissue(_) => vec![ONE_TISSUE.0],
             _ => LAYERS.map(|l| l.1).to_vec(),
         };
         let materials = youngs
@@ -248,13 +248,13 @@ impl Case {
     /// The way of the tool.
     pub fn ride(&self) -> Ride {
         let at = match self.shape {
-            Shape::Block { .. } => Vec3::new(-0.5 * self.way[1], 0.0, 0.0),
-            Shape::Graded(grading) | Shape::OneTissue(grading) => {
+            BenchShape::Block { .. } => Vec3::new(-0.5 * self.way[1], 0.0, 0.0),
+            BenchShape::Graded(grading) | BenchShape::OneTissue(grading) => {
                 let [x, y] =
                     [0, 1].map(|i| grading.centre[i] + grading.beside[i] * grading.spacing);
                 Vec3::new(x, y, 0.0)
             }
-            Shape::Limb { .. } => Vec3::new(0.5 * (LIMB[0] - self.way[1]), 0.0, LIMB[1]),
+            BenchShape::Limb { .. } => Vec3::new(0.5 * (LIMB[0] - self.way[1]), 0.0, LIMB[1]),
         };
         Ride {
             at,
@@ -279,10 +279,10 @@ fn run(mode: Mode, zone_radius: f64, target: Option<f64>) -> Run {
 }
 
 /// A block of equal columns under modes with their targets.
-fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> Case {
-    Case {
+fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> BenchCase {
+    BenchCase {
         name,
-        shape: Shape::Block { columns },
+        shape: BenchShape::Block { columns },
         tissue: Tissue::Elastic,
         radius: LARGE,
         way: [5e-3, 20e-3],
@@ -294,13 +294,13 @@ fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> Case {
 }
 
 /// What a mesh that is graded toward the tool is measured with, pressed straight down.
-fn graded(name: &'static str, shape: Shape, problem: Problem, depth: f64) -> Case {
+fn graded(name: &'static str, shape: BenchShape, problem: Problem, depth: f64) -> BenchCase {
     let runs = vec![
         run(Mode::Full, 15e-3, None),
         run(Mode::Zone, 12e-3, None),
         run(Mode::Zone, 8e-3, Some(500.0)),
     ];
-    Case {
+    BenchCase {
         shape,
         way: [depth, 0.0],
         problem,
@@ -316,8 +316,8 @@ fn grading(
     growth: f64,
     levels: [(f64, f64); 3],
     beside: [f64; 2],
-) -> Grading {
-    Grading {
+) -> BenchGrading {
+    BenchGrading {
         spacing: ring / n_on_radius,
         ring,
         growth,
@@ -327,23 +327,28 @@ fn grading(
     }
 }
 
-fn one_tissue(name: &'static str, grading: Grading) -> Case {
-    graded(name, Shape::OneTissue(grading), Problem::OneTissue, 6e-3)
+fn one_tissue(name: &'static str, grading: BenchGrading) -> BenchCase {
+    graded(
+        name,
+        BenchShape::OneTissue(grading),
+        Problem::OneTissue,
+        6e-3,
+    )
 }
 
-fn layers(name: &'static str, grading: Grading) -> Case {
-    graded(name, Shape::Graded(grading), Problem::Layers, 5e-3)
+fn layers(name: &'static str, grading: BenchGrading) -> BenchCase {
+    graded(name, BenchShape::Graded(grading), Problem::Layers, 5e-3)
 }
 
 /// Near the middle of a triangle, and half-way there from a vertex, in spacings.
 const INSIDE: [f64; 2] = [0.5, 0.3];
 const HALF_WAY: [f64; 2] = [0.25, 0.15];
 
-static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
+static CASES: LazyLock<Vec<BenchCase>> = LazyLock::new(|| {
     use Mode::{Full, Whole, Zone};
     let usual = 15e-3;
     vec![
-        Case {
+        BenchCase {
             is_quick: true,
             ..block(
                 "324",
@@ -369,7 +374,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
                 run(Zone, usual, Some(500.0)),
             ],
         ),
-        Case {
+        BenchCase {
             every: 3,
             ..block(
                 "16k",
@@ -381,7 +386,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
                 ],
             )
         },
-        Case {
+        BenchCase {
             every: 8,
             radius: SMALL,
             problem: Problem::LayersSmall,
@@ -391,17 +396,17 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
                 vec![run(Whole, 10e-3, Some(10.0)), run(Zone, 10e-3, Some(60.0))],
             )
         },
-        Case {
+        BenchCase {
             tissue: Tissue::Relaxing,
             ..block("4k-prony", 32, vec![run(Zone, usual, None)])
         },
-        Case {
+        BenchCase {
             tissue: Tissue::Ogden,
             problem: Problem::Ogden,
             ..block("4k-ogden", 32, vec![run(Zone, usual, None)])
         },
-        Case {
-            shape: Shape::Limb {
+        BenchCase {
+            shape: BenchShape::Limb {
                 spacing: 7.3e-3,
                 intervals: 1,
             },
@@ -442,6 +447,6 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
 });
 
 /// All cases, in the order of the table.
-pub fn cases() -> &'static [Case] {
+pub fn cases() -> &'static [BenchCase] {
     &CASES
 }

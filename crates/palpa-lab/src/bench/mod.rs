@@ -11,5 +11,5 @@ pub mod refined;
 pub mod ride;
 pub mod row;
 
-pub use cases::{Case, cases};
+pub use cases::{BenchCase, cases};
 pub use row::{BenchReport, BenchRow, Mode};

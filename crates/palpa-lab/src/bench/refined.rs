@@ -3,7 +3,7 @@
 use palpa_fem::Outcome;
 use serde::Serialize;
 
-use super::cases::{Case, Grading, Shape, Tissue, cases};
+use super::cases::{BenchCase, BenchGrading, BenchShape, Tissue, cases};
 use super::ride::{Known, Ride, converged};
 use palpa_fem::FemError;
 
@@ -81,8 +81,8 @@ impl Problem {
     }
 
     /// The refined mesh.
-    fn shape(self, centre: [f64; 2]) -> Shape {
-        let grading = |spacing, ring| Grading {
+    fn shape(self, centre: [f64; 2]) -> BenchShape {
+        let grading = |spacing, ring| BenchGrading {
             spacing,
             ring,
             growth: 0.3,
@@ -91,13 +91,13 @@ impl Problem {
             beside: [0.5, 0.3],
         };
         match self {
-            Self::Layers | Self::Ogden => Shape::Graded(grading(0.7e-3, 8e-3)),
-            Self::LayersSmall => Shape::Graded(grading(0.6e-3, 5e-3)),
-            Self::OneTissue => Shape::OneTissue(Grading {
+            Self::Layers | Self::Ogden => BenchShape::Graded(grading(0.7e-3, 8e-3)),
+            Self::LayersSmall => BenchShape::Graded(grading(0.6e-3, 5e-3)),
+            Self::OneTissue => BenchShape::OneTissue(BenchGrading {
                 levels: [(0.6e-3, 0.3); 3],
                 ..grading(0.7e-3, 7e-3)
             }),
-            Self::Limb => Shape::Limb {
+            Self::Limb => BenchShape::Limb {
                 spacing: 3.6e-3,
                 intervals: 2,
             },
@@ -115,7 +115,7 @@ impl Problem {
             .ok_or(RefinedError::NoCase)?;
         let centre = like.ride().at;
         let shape = self.shape([centre.x, centre.y]);
-        let case = Case {
+        let case = BenchCase {
             shape,
             way: [like.way[0], 0.0],
             tissue: if like.tissue == Tissue::Relaxing {

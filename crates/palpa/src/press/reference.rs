@@ -25,7 +25,7 @@ const SOUND_ASPECT: std::ops::RangeInclusive<f64> = 0.5..=1.2;
 
 /// An indentation that is set up: what does not change while it runs.
 #[derive(Debug)]
-pub struct Indentation {
+pub struct BarIndentation {
     /// The spring model of the body under the tool.
     pub model: SpringModel,
     /// Where it is pressed.
@@ -40,7 +40,7 @@ pub struct Indentation {
 
 /// One line of the result. Forces act on the tool.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sample {
+pub struct BarSample {
     /// Part of the indentation.
     pub phase: Phase,
     /// Time since the start. s
@@ -67,13 +67,13 @@ pub struct Sample {
     pub n_inverted: usize,
     /// How the step ended. If it diverged, the state is the one before, the forces are those of the sample before, and the
     /// run ends.
-    pub outcome: SampleOutcome,
+    pub outcome: BarOutcome,
 }
 
 /// How the step to a sample ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum SampleOutcome {
+pub enum BarOutcome {
     /// By incremental finite elements.
     Converged,
     /// The step was singular and was done by explicit Euler.
@@ -84,8 +84,8 @@ pub enum SampleOutcome {
 
 /// What moves while an indentation runs.
 #[derive(Debug)]
-pub struct Run<'a> {
-    indentation: &'a Indentation,
+pub struct BarRun<'a> {
+    indentation: &'a BarIndentation,
     body: &'a LayeredBody,
     /// The body's state.
     pub state: SpringState,
@@ -95,7 +95,7 @@ pub struct Run<'a> {
     time: f64,
 }
 
-impl Indentation {
+impl BarIndentation {
     /// Sets up the indentation that `scene` asks for on its body.
     ///
     /// # Errors
@@ -161,8 +161,8 @@ impl Indentation {
     }
 
     /// Begins a run at rest. `body` is the one that this was built on.
-    pub fn start<'a>(&'a self, body: &'a LayeredBody) -> Run<'a> {
-        Run {
+    pub fn start<'a>(&'a self, body: &'a LayeredBody) -> BarRun<'a> {
+        BarRun {
             indentation: self,
             body,
             state: SpringState::new(&self.model),
@@ -174,10 +174,10 @@ impl Indentation {
     }
 }
 
-impl Run<'_> {
+impl BarRun<'_> {
     /// Goes on to the next sample; `None` at the end. A sample that diverged is the last.
-    pub fn advance(&mut self) -> Option<Sample> {
-        let Indentation {
+    pub fn advance(&mut self) -> Option<BarSample> {
+        let BarIndentation {
             model,
             place: Place { direction, .. },
             params,
@@ -205,18 +205,18 @@ impl Run<'_> {
             params,
         );
         let outcome = match report.outcome {
-            Outcome::Converged => SampleOutcome::Converged,
-            Outcome::EulerFallback { .. } => SampleOutcome::EulerFallback,
-            Outcome::Diverged { .. } | Outcome::NotFinite => SampleOutcome::Diverged,
+            Outcome::Converged => BarOutcome::Converged,
+            Outcome::EulerFallback { .. } => BarOutcome::EulerFallback,
+            Outcome::Diverged { .. } | Outcome::NotFinite => BarOutcome::Diverged,
         };
-        self.next = if outcome == SampleOutcome::Diverged {
+        self.next = if outcome == BarOutcome::Diverged {
             path.len()
         } else {
             self.next + 1
         };
         (self.depth, self.time) = (waypoint.depth, waypoint.time);
         let shapes = prism_shapes(self.body, &self.state.positions);
-        Some(Sample {
+        Some(BarSample {
             phase: waypoint.phase,
             time_s: tidy(waypoint.time),
             depth_mm: tidy(waypoint.depth * 1e3),

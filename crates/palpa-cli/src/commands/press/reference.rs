@@ -12,7 +12,7 @@ use super::files::remove_older;
 use crate::commands::Outcome;
 use palpa::Note;
 use palpa::build::build;
-use palpa::press::reference::{Indentation, SampleOutcome};
+use palpa::press::reference::{BarIndentation, BarOutcome};
 
 /// Runs the press.
 pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
@@ -26,7 +26,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     let spinner = context.progress(0, "growing the body");
     let built = build(scene)?;
     drop(spinner);
-    let indentation = Indentation::build(scene, &built)?;
+    let indentation = BarIndentation::build(scene, &built)?;
     let notes: Vec<String> = (built.notes.iter().chain(&indentation.notes))
         .map(Note::to_string)
         .collect();
@@ -57,7 +57,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     conclude(context, out.path(), &recorded, &report, &pictures, &notes)?;
     Ok(match (context.is_interrupted(), report.result.outcome) {
         (true, _) => Outcome::Interrupted,
-        (_, SampleOutcome::Diverged) => Outcome::NotGood,
+        (_, BarOutcome::Diverged) => Outcome::NotGood,
         _ => Outcome::Done,
     })
 }

@@ -10,7 +10,7 @@ use super::record::Recorded;
 use super::report::PressResult;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
-use palpa::press::reference::{Indentation, Sample, SampleOutcome};
+use palpa::press::reference::{BarIndentation, BarOutcome, BarSample};
 use palpa_plot::output::OutDir;
 use palpa_plot::section::{Panel, ToolOutline, cut_body, draw};
 use palpa_plot::{Axis, Chart, Guide};
@@ -19,14 +19,14 @@ pub(super) fn draw_pictures(
     out: &OutDir,
     scene: &Scene,
     built: &BuiltBody,
-    indentation: &Indentation,
+    indentation: &BarIndentation,
     recorded: &Recorded,
     result: &PressResult,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let samples: Vec<&Sample> = recorded
+    let samples: Vec<&BarSample> = recorded
         .samples
         .iter()
-        .filter(|s| s.outcome != SampleOutcome::Diverged)
+        .filter(|s| s.outcome != BarOutcome::Diverged)
         .collect();
     let of_phase = |phases: &[Phase]| -> Vec<[f64; 2]> {
         samples
@@ -85,7 +85,7 @@ pub(super) fn draw_pictures(
 fn section_picture(
     scene: &Scene,
     built: &BuiltBody,
-    indentation: &Indentation,
+    indentation: &BarIndentation,
     recorded: &Recorded,
 ) -> Option<palpa_plot::Picture> {
     let body = &built.growth.body;

@@ -6,13 +6,13 @@ use super::super::Args;
 use super::super::files::{Series, with_making};
 use crate::cli::Context;
 use palpa::build::BuiltBody;
-use palpa::press::reference::{Indentation, Run, Sample, SampleOutcome};
+use palpa::press::reference::{BarIndentation, BarOutcome, BarRun, BarSample};
 use palpa_plot::output::OutDir;
 use palpa_plot::vtu::Grid;
 
 /// What came out of a run.
 pub(super) struct Recorded {
-    pub(super) samples: Vec<Sample>,
+    pub(super) samples: Vec<BarSample>,
     /// Positions at the deepest sample reached.
     pub(super) deepest: Vec<Vec3>,
     pub(super) deepest_depth: f64,
@@ -24,9 +24,9 @@ pub(super) fn record(
     context: &Context,
     out: &OutDir,
     built: &BuiltBody,
-    indentation: &Indentation,
+    indentation: &BarIndentation,
 ) -> anyhow::Result<Recorded> {
-    let mut table = out.table::<Sample>("press.csv")?;
+    let mut table = out.table::<BarSample>("press.csv")?;
     let mut series = Series::new(args.frames, indentation.n_samples(), indentation.deepest());
     let mut run = indentation.start(&built.growth.body);
     let mut recorded = Recorded {
@@ -37,7 +37,7 @@ pub(super) fn record(
     let progress = context.progress(indentation.n_samples(), "pressing");
     while let Some(sample) = run.advance() {
         table.push(&sample)?;
-        if sample.outcome != SampleOutcome::Diverged {
+        if sample.outcome != BarOutcome::Diverged {
             if series.wants(recorded.samples.len()) {
                 series.push(out, sample.time_s, &grid(built, &run))?;
             }
@@ -58,7 +58,7 @@ pub(super) fn record(
 }
 
 /// The body as it is now, with what moves it and how it was made.
-fn grid(built: &BuiltBody, run: &Run<'_>) -> Grid {
+fn grid(built: &BuiltBody, run: &BarRun<'_>) -> Grid {
     let growth = &built.growth;
     let body = &growth.body;
     let displacement: Vec<Vec3> = (run.state.positions.iter().zip(&body.positions))

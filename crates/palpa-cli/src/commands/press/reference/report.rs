@@ -12,7 +12,7 @@ use crate::cli::Context;
 use crate::table::Table;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
-use palpa::press::reference::{Indentation, Sample, SampleOutcome};
+use palpa::press::reference::{BarIndentation, BarOutcome, BarSample};
 
 /// What `--json` prints and press.json holds.
 #[derive(Debug, Serialize)]
@@ -24,7 +24,7 @@ pub(super) struct PressReport<'a> {
     pub(super) press: PressFacts,
     pub(super) result: PressResult,
     pub(super) notes: &'a [String],
-    pub(super) samples: &'a [Sample],
+    pub(super) samples: &'a [BarSample],
 }
 
 #[derive(Debug, Serialize)]
@@ -41,7 +41,7 @@ pub(super) struct PressFacts {
 
 #[derive(Debug, Serialize)]
 pub(super) struct PressResult {
-    pub(super) outcome: SampleOutcome,
+    pub(super) outcome: BarOutcome,
     /// Whether the whole script was run; not after Ctrl-C or a divergence.
     pub(super) is_complete: bool,
     pub(super) max_force_n: f64,
@@ -53,7 +53,7 @@ pub(super) struct PressResult {
     pub(super) material_status: String,
 }
 
-pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
+pub(super) fn facts(scene: &Scene, indentation: &BarIndentation) -> PressFacts {
     PressFacts {
         vertex: indentation.place.vertex,
         at_m: indentation.place.at.into(),
@@ -67,23 +67,23 @@ pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
 }
 
 pub(super) fn result_of(
-    samples: &[Sample],
+    samples: &[BarSample],
     materials: &[MaterialStatus],
     is_interrupted: bool,
 ) -> PressResult {
-    let good: Vec<&Sample> = samples
+    let good: Vec<&BarSample> = samples
         .iter()
-        .filter(|s| s.outcome != SampleOutcome::Diverged)
+        .filter(|s| s.outcome != BarOutcome::Diverged)
         .collect();
     let max = good.iter().max_by(|a, b| a.force_n.total_cmp(&b.force_n));
     let (max_force_n, at_depth_mm) = max.map_or((0.0, 0.0), |s| (s.force_n, s.depth_mm));
-    let is_any = |outcome: SampleOutcome| samples.iter().any(|s| s.outcome == outcome);
+    let is_any = |outcome: BarOutcome| samples.iter().any(|s| s.outcome == outcome);
     PressResult {
-        is_complete: !is_interrupted && !is_any(SampleOutcome::Diverged),
+        is_complete: !is_interrupted && !is_any(BarOutcome::Diverged),
         outcome: match () {
-            () if is_any(SampleOutcome::Diverged) => SampleOutcome::Diverged,
-            () if is_any(SampleOutcome::EulerFallback) => SampleOutcome::EulerFallback,
-            () => SampleOutcome::Converged,
+            () if is_any(BarOutcome::Diverged) => BarOutcome::Diverged,
+            () if is_any(BarOutcome::EulerFallback) => BarOutcome::EulerFallback,
+            () => BarOutcome::Converged,
         },
         max_force_n,
         at_depth_mm,
@@ -102,7 +102,7 @@ pub(super) fn announce(
     scene_name: &str,
     scene: &Scene,
     built: &BuiltBody,
-    indentation: &Indentation,
+    indentation: &BarIndentation,
     materials: &[MaterialStatus],
 ) -> anyhow::Result<()> {
     let r = &built.growth.report;
@@ -132,7 +132,7 @@ pub(super) fn conclude(
     notes: &[String],
 ) -> anyhow::Result<()> {
     const ROWS: usize = 12;
-    let loading: Vec<&Sample> = recorded
+    let loading: Vec<&BarSample> = recorded
         .samples
         .iter()
         .filter(|s| s.phase == Phase::Load)
@@ -174,7 +174,7 @@ pub(super) fn conclude(
             "back at the start {left:.3} N are left: the drift of a force summed along the path, nothing that tissue does"
         ))?;
     }
-    if r.outcome == SampleOutcome::Diverged {
+    if r.outcome == BarOutcome::Diverged {
         context.say(
             "the last step DIVERGED; results end before it. Use more substeps or a smaller step",
         )?;
