@@ -9,7 +9,7 @@ use palpa_fem::Model;
 use super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
-use palpa_lab::bench::cases::{BenchCase, Run, Shape, Tissue, cases};
+use palpa_lab::bench::cases::{BenchCase, Run, BenchShape, Tissue, cases};
 use palpa_lab::bench::ratios::{Ratio, dense_inverse, full_factor};
 use palpa_lab::bench::refined::Problem;
 use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
@@ -73,7 +73,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         cases().iter().any(|case| {
             case.name == row.case
                 && case.tissue == Tissue::Elastic
-                && matches!(case.shape, Shape::Block { .. })
+                && matches!(case.shape, BenchShape::Block { .. })
         })
     };
     report.growth = growth::growth(&report.rows.iter().filter(|row| is_of_growth(row)));
@@ -264,7 +264,7 @@ fn ratios(case: &BenchCase, model: &Arc<Model>, report: &mut BenchReport) -> any
     const DENSE: [(&str, usize); 1] = [("324", 9)];
     const BUDGET: Duration = Duration::from_millis(500);
     const N_FACTORS: usize = 5;
-    if !matches!(case.shape, Shape::Block { .. }) || case.tissue != Tissue::Elastic {
+    if !matches!(case.shape, BenchShape::Block { .. }) || case.tissue != Tissue::Elastic {
         return Ok(());
     }
     let own: Vec<BenchRow> = report
