@@ -14,7 +14,8 @@ pub(crate) struct Inverted {
     pub(crate) at: Vec3,
 }
 
-/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given. Forces are `∂W/∂u`.
+/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given. Forces
+/// are `∂W/∂u`.
 ///
 /// Groups are stored interval by interval, so that a run of them has one layer's material.
 pub(crate) fn assemble(

@@ -4,8 +4,9 @@
 //! M a + C v + f(u) = p,   C = a₀ M + a₁ K
 //! v_new = v + Δt [(1 − γ) a + γ a_new],   u_new = u + Δt v + Δt² [(½ − β) a + β a_new]        (Newmark)
 //! ```
-//! with γ = 0.6 and β = (γ + ½)²/4: unconditionally stable for linear bodies, and with enough damping of the highest
-//! frequencies that contact does not chatter. First-order accurate in Δt through that damping.
+//! with γ = 0.6 and β = (γ + ½)²/4: unconditionally stable for linear bodies, and with enough
+//! damping of the highest frequencies that contact does not chatter. First-order accurate in Δt
+//! through that damping.
 
 use palpa_mesh::Vec3;
 
@@ -26,7 +27,7 @@ pub struct Dynamics {
     pub stiffness_damping: f64,
 }
 
-/// What one step adds.
+/// Inertia and damping of one step, in addition to the static forces.
 #[derive(Debug)]
 pub(crate) struct Inertia {
     dynamics: Dynamics,
@@ -34,7 +35,8 @@ pub(crate) struct Inertia {
     displacements: Vec<Vec3>,
     velocities: Vec<Vec3>,
     accelerations: Vec<Vec3>,
-    /// Stiffness at the beginning of the step, which damps during all of it; empty without such damping.
+    /// Stiffness at the beginning of the step, which damps during all of it; empty without such
+    /// damping.
     stiffness: Vec<Mat3>,
 }
 

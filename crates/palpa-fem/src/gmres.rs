@@ -1,4 +1,5 @@
-//! GMRES, for systems of which the factor is only a guess: friction makes them unsymmetric, or the factor is an older one.
+//! GMRES, for systems of which the factor is only a guess: friction makes them unsymmetric, or the
+//! factor is an older one.
 
 use palpa_mesh::Vec3;
 
@@ -19,8 +20,9 @@ fn norm(a: &[Vec3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad & Schultz 1986). Stops when the
-/// residual is `tolerance` of `b`, or with what there is when the basis has `most` vectors or will not be enough with them.
+/// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad &
+/// Schultz 1986). Stops when the residual is `tolerance` of `b`, or with what there is when the
+/// basis has `most` vectors or will not be enough with them.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,

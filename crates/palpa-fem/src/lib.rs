@@ -1,8 +1,8 @@
-//! The continuum model: tissue as a nonlinear, nearly incompressible, viscoelastic solid on layered prisms.
+//! The continuum model: tissue as a nonlinear, nearly incompressible, viscoelastic solid on layered
+//! prisms.
 
 mod assembly;
 mod columns;
-mod contact;
 mod dynamics;
 mod element;
 mod error;
@@ -13,21 +13,24 @@ pub mod lump;
 mod materials;
 mod model;
 pub mod pairing;
+mod posed_tool;
 pub mod realtime;
 pub mod shape;
 mod state;
 mod statics;
 mod system;
 
-pub use contact::{ContactResiduals, PosedTool};
 pub use dynamics::Dynamics;
 pub use error::FemError;
 pub use fields::{PrismField, level_forces, prism_fields, relaxed_fields};
 pub use law::{Kinematics, Law, Material, Response, VolumeMeasure};
 pub use materials::{Materials, StiffnessField};
 pub use model::{Model, ModelParams, Supports};
+pub use posed_tool::PosedTool;
 pub use state::{State, Touch};
-pub use statics::{Load, Outcome, SolveParams, StepReport, Workspace, advance, equilibrate};
+pub use statics::{
+    ContactResiduals, Load, Outcome, SolveParams, StepReport, Workspace, advance, equilibrate,
+};
 
 /// A 3 × 3 matrix, such as a deformation gradient.
 pub type Mat3 = nalgebra::Matrix3<f64>;

@@ -1,4 +1,4 @@
-//! A body ready to be pressed: what never changes while it is.
+//! A body ready to be pressed: everything that does not change while it is pressed.
 
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -32,7 +32,8 @@ impl Supports {
 /// Parameters of the element and of its surroundings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParams {
-    /// Share of the pair's mean deviator, 0 to below 1; the rest is each wedge's own. Near 1 single nodes hourglass.
+    /// Share of the pair's mean deviator, 0 to below 1; the rest is each wedge's own. Near 1 single
+    /// nodes hourglass.
     pub alpha: f64,
 }
 
@@ -65,10 +66,12 @@ pub struct Model {
 }
 
 impl Model {
-    /// Builds a model. Cost: the symbolic factor, which grows a little faster than the number of nodes.
+    /// Builds a model. Cost: the symbolic factor, which grows a little faster than the number of
+    /// nodes.
     ///
     /// # Errors
-    /// When a prism is not valid, materials do not fit the body or each other, or the body is too large.
+    /// When a prism is not valid, materials do not fit the body or each other, or the body is too
+    /// large.
     pub fn build(
         body: &LayeredBody,
         materials: &Materials,
@@ -134,7 +137,8 @@ impl Model {
         self.supports.iter().filter(|hold| hold.n < 3).count()
     }
 
-    /// Number of skin triangles without a partner; prisms under them are too stiff where tissue keeps its volume.
+    /// Number of skin triangles without a partner; prisms under them are too stiff where tissue
+    /// keeps its volume.
     pub fn n_single_triangles(&self) -> usize {
         self.n_singles
     }

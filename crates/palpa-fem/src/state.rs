@@ -1,4 +1,4 @@
-//! What evolves while a body is pressed.
+//! The state of a body: everything that evolves while it is pressed.
 
 use palpa_mesh::Vec3;
 
@@ -51,7 +51,8 @@ pub struct State {
     pub touches: Vec<Touch>,
     /// Time, in s.
     pub time: f64,
-    /// For each phase of a viscous material the last elastic stress and the memories, point by point.
+    /// For each phase of a viscous material the last elastic stress and the memories, point by
+    /// point.
     pub(crate) history: Vec<PhaseHistory>,
 }
 
@@ -64,7 +65,8 @@ pub(crate) struct PhaseHistory {
 }
 
 impl PhaseHistory {
-    /// Takes over what the phases of other pairs remember in which this pair's two wedges are, and which of their two.
+    /// Takes over the memory of the phases of other pairs in which this pair's two wedges are;
+    /// `old` has for each wedge the phase, and which of its pair's two wedges.
     pub(crate) fn carry(&mut self, old: [(&Self, usize); 2]) {
         let n = self.points.len() / N_POINTS;
         let mean = |a: f64, b: f64| 0.5 * (a + b);
@@ -125,7 +127,7 @@ impl State {
     }
 }
 
-/// What a step of a given duration makes of every material: factors and constant stresses.
+/// Factors and constant stresses of all materials in a step of a given duration.
 #[derive(Debug, Clone)]
 pub(crate) struct Memory {
     /// For each material the factors of its deviatoric and volumetric part.
@@ -164,7 +166,7 @@ impl Memory {
         }
     }
 
-    /// What the step makes of every material, without the groups.
+    /// Factors of every material, without the constant stresses of the groups.
     pub(crate) fn begin_materials(&mut self, model: &Model, dt: f64) {
         for ((material, scale), step) in model
             .materials

@@ -1,4 +1,5 @@
-//! The linear system of a Newton iteration: blocks assembled, constraints put on, factored and solved.
+//! The linear system of a Newton iteration: blocks assembled, constraints put on, factored and
+//! solved.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::{Factor, Singular};
@@ -9,7 +10,8 @@ use crate::columns::Structure;
 /// A pivot smaller than this, relative to the diagonal entry that it came from, is taken for zero.
 const SINGULAR_PIVOT: f64 = 1e-13;
 
-/// First shift of a matrix that is not positive definite, relative to its diagonal, its growth, and how often it may grow.
+/// First shift of a matrix that is not positive definite, relative to its diagonal, its growth, and
+/// how often it may grow.
 const FIRST_SHIFT: f64 = 1e-3;
 const SHIFT_GROWTH: f64 = 4.0;
 const MOST_SHIFTS: usize = 9;
@@ -125,8 +127,8 @@ impl LinearSystem {
         }
     }
 
-    /// Factors the blocks under constraints. A matrix that is not positive definite is shifted; returns the shift,
-    /// relative to the diagonal.
+    /// Factors the blocks under constraints. A matrix that is not positive definite is shifted;
+    /// returns the shift, relative to the diagonal.
     pub(crate) fn refactor(
         &mut self,
         structure: &Structure,
@@ -176,7 +178,8 @@ impl LinearSystem {
             }
             let is_diagonal = row == column;
             if is_diagonal {
-                // Any positive number does for what is held; one of the matrix's size keeps pivots alike.
+                // Any positive number does for what is held; one of the matrix's size keeps pivots
+                // alike.
                 let size = self.blocks[i].trace().abs() / 3.0;
                 for r in 0..usize::from(row_hold.n) {
                     block[(r, r)] = if size > 0.0 { size } else { 1.0 };
@@ -194,8 +197,9 @@ impl LinearSystem {
         }
     }
 
-    /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A direction that was held is a spring by itself, so
-    /// that no force leads to no displacement there, and a factor from before it was let go is still a guess.
+    /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A direction that was held
+    /// is a spring by itself, so that no force leads to no displacement there, and a factor from
+    /// before it was let go is still a guess.
     pub(crate) fn solve(
         &mut self,
         structure: &Structure,

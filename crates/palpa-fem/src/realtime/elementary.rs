@@ -9,7 +9,8 @@ use std::f64::consts::LOG2_E;
 
 use super::lanes::Lanes;
 
-/// `ln 2` but for [`LN_2_REST`], in so few bits that whole numbers times it are exact in single precision, too.
+/// `ln 2` but for [`LN_2_REST`], in so few bits that whole numbers times it are exact in single
+/// precision, too.
 const LN_2_SHORT: f64 = 0.693359375;
 const LN_2_REST: f64 = -2.121_944_400_546_905_8e-4;
 /// Exponents of `e` beyond this size would leave the normal numbers of single precision.

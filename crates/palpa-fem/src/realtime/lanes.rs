@@ -1,5 +1,5 @@
-//! Several numbers at once, whatever the machine's vectors are: the kernel is written on [`Lanes`] and compiled for each
-//! instruction set; which one runs is decided when the program starts.
+//! Several numbers at once, whatever the machine's vectors are: the kernel is written on [`Lanes`]
+//! and compiled for each instruction set; which one runs is decided when the program starts.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -15,7 +15,7 @@ pub(super) trait Lanes:
 {
     /// One of the numbers.
     type Element: Number;
-    /// What proves that the machine has the instructions.
+    /// A proof that the machine has the instructions.
     type Token: Copy;
     /// How many there are.
     const N: usize;

@@ -7,9 +7,10 @@
 use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
-use super::contact::{Candidate, ContactProblem, factor_symmetric, substitute_symmetric};
+use super::candidate::Candidate;
+use super::contact_problem::{ContactProblem, factor_symmetric, substitute_symmetric};
 use crate::Mat3;
-use crate::contact::PosedTool;
+use crate::posed_tool::PosedTool;
 use crate::shape::Pose;
 
 /// A skin vertex under or near a tool, or two that press side by side.
@@ -33,7 +34,7 @@ pub struct LocalContact {
     pub anchor: Vec3,
 }
 
-/// What the body feels of a tool.
+/// A tool, and the body's force on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalTool {
     /// Where it is.
@@ -42,7 +43,8 @@ pub struct LocalTool {
     pub friction: f64,
     /// Force of the tissue on it, N.
     pub force: Vec3,
-    /// By how much that force resists a displacement of the tool, along the normals of the vertices that press, N/m.
+    /// By how much that force resists a displacement of the tool, along the normals of the vertices
+    /// that press, N/m.
     pub stiffness: Mat3,
 }
 
@@ -65,7 +67,8 @@ impl LocalModel {
     }
 }
 
-/// Pivot below which a body without its supports counts as not stable, relative to what it would be on its own.
+/// Pivot below which a body without its supports counts as not stable, relative to what it would be
+/// on its own.
 const LEAST_RELEASE: f64 = 0.05;
 
 /// One or two candidates, and their share of the force.
@@ -81,7 +84,6 @@ impl ContactProblem {
         &mut self,
         tools: &[PosedTool],
         skin: &[Vec3],
-        has_friction: bool,
         most: usize,
         out: &mut LocalModel,
     ) {
@@ -91,7 +93,7 @@ impl ContactProblem {
         }; MOST_CANDIDATES];
         let n = self.clusters(skin, most, &mut clusters);
         let clusters = &clusters[..n];
-        self.release(has_friction);
+        self.release();
         out.contacts.clear();
         out.contacts.extend(clusters.iter().map(|cluster| {
             let members = cluster.members.map(|m| &self.candidates[m]);
@@ -140,7 +142,7 @@ impl ContactProblem {
                     for (b, &share_b) in cj.members.iter().zip(&cj.shares) {
                         let share = share_a * share_b;
                         if share > 0.0 {
-                            block += self.full_block(*a, *b, has_friction) * share;
+                            block += self.full_block(*a, *b) * share;
                         }
                     }
                 }
@@ -164,17 +166,19 @@ impl ContactProblem {
         }
     }
 
-    /// Makes the compliance without the supports, which only the step's matrix has: with those of the vertices that have one in
-    /// `N`,
+    /// Makes the compliance without the supports, which only the step's matrix has: with those of
+    /// the vertices that have one in `N`,
     ///
     /// ```text
     /// W + W N (1/κ − Nᵀ W N)⁻¹ Nᵀ W
     /// ```
-    /// Where the free body is not stable this is no compliance of anything, and as much of the supports is left as it takes.
-    fn release(&mut self, has_friction: bool) {
+    /// Where the free body is not stable this is no compliance of anything, and as much of the
+    /// supports is left as it takes.
+    fn release(&mut self) {
         /// Shares of the supports that are tried to be left out.
         const SHARES: [f64; 5] = [1.0, 0.9, 0.7, 0.4, 0.1];
-        let (n, per) = (self.candidates.len(), if has_friction { 3 } else { 1 });
+        let (n, has_friction) = (self.candidates.len(), self.has_friction);
+        let per = if has_friction { 3 } else { 1 };
         let size = per * n;
         self.released[..size * size].copy_from_slice(&self.compliance[..size * size]);
         let mut rows = [0; MOST_CANDIDATES];
@@ -232,9 +236,9 @@ impl ContactProblem {
     }
 
     /// A block of the compliance without supports.
-    fn full_block(&self, i: usize, j: usize, has_friction: bool) -> Mat3 {
+    fn full_block(&self, i: usize, j: usize) -> Mat3 {
         let n = self.candidates.len();
-        if has_friction {
+        if self.has_friction {
             let n = 3 * n;
             return Mat3::from_fn(|r, c| self.released[3 * i + r + n * (3 * j + c)]);
         }
@@ -242,7 +246,8 @@ impl ContactProblem {
         self.candidates[i].normal * self.candidates[j].normal.transpose() * along
     }
 
-    /// Puts neighbours that press together until there are few enough, and leaves out the farthest of the others.
+    /// Puts neighbours that press together until there are few enough, and leaves out the farthest
+    /// of the others.
     fn clusters(&self, skin: &[Vec3], most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
         let n = self.candidates.len();
         let mut partner = [usize::MAX; MOST_CANDIDATES];
@@ -314,7 +319,8 @@ impl ContactProblem {
         filled
     }
 
-    /// By how much the vertices that press resist a displacement of their tool, along their normals, N/m.
+    /// By how much the vertices that press resist a displacement of their tool, along their
+    /// normals, N/m.
     fn tool_stiffness(&mut self, tool: usize) -> Mat3 {
         let mut rows = [0; MOST_CANDIDATES];
         let mut m = 0;

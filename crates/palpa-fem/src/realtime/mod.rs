@@ -1,22 +1,34 @@
 //! The moving step: the same element and laws, fast enough for a hand.
 //!
-//! A step follows the tools by one Newton iteration, two where forces are far out of balance. The stiffness of a *zone* round
-//! the tools is made anew in every step, in single precision; forces and displacements are in double precision, so that the
-//! stiffness decides how fast a step converges, and not to what. The stiffness of the rest of the body is an earlier one,
-//! made anew in the background ([`Rebuild`]). Contact is a small problem of its own on the compliance of a few vertices
-//! (`contact.rs`), which is also what the haptic loop gets.
+//! A step follows the tools by one Newton iteration, or two where forces are far out of balance.
+//! The stiffness of a *zone* round the tools is made anew in every step, in single precision.
+//! Forces and displacements are in double precision, so that the stiffness decides how fast a step
+//! converges, and not to which result. The stiffness of the rest of the body, the *exterior*, is an
+//! earlier one, made anew in the background ([`Rebuild`]). Contact is a small problem of its own on
+//! the compliance of a few vertices (`contact_problem.rs`); the haptic loop gets the same
+//! compliance.
+//!
+//! ```text
+//! lanes, elementary, principal ─► kernel ─► batch ─► inside (zone) ────┐
+//!                                             └────► outside (exterior) ┤─► live ─► local ─► haptic loop
+//! plan (which columns are in the zone) ─────────────────────────────────┤
+//! candidate ─► contact_problem ─────────────────────────────────────────┘
+//! ```
 
 mod batch;
-mod contact;
+mod candidate;
+mod contact_problem;
 mod elementary;
+mod inside;
 mod kernel;
 mod lanes;
 mod live;
 mod local;
+mod outside;
+mod plan;
 mod principal;
 #[cfg(test)]
 mod tests;
-mod zone;
 
 pub use live::{
     ExteriorMode, FineBodies, Glance, Live, LiveParams, LiveReport, Rebuild, Rebuilt, RoamDone,
@@ -28,7 +40,7 @@ use palpa_sparse::ColumnPattern;
 
 use crate::model::Model;
 
-/// How many vertices may be candidates for contact.
+/// Most skin vertices that may be candidates for contact.
 pub const MOST_CANDIDATES: usize = 160;
 
 /// The columns of a body's skin, and which of them are neighbours.

@@ -1,15 +1,17 @@
 //! Laws in powers of the principal stretches, in lanes.
 //!
-//! With `C = Σ x_a v_a⊗v_a`, `x_a = λ_a²`, `e_a = ln λ̄_a`, and for half the shear modulus at rest `w`
+//! With `C = Σ x_a v_a⊗v_a`, `x_a = λ_a²`, `e_a = ln λ̄_a`, and `w` for half the shear modulus at
+//! rest
 //!
 //! ```text
 //! g_a  = ∂W_d/∂ ln λ_a = 4/3 w Σ_p share_p Σ_b (λ̄_a^α − λ̄_b^α)/α,      S = Σ_a S_a v_a⊗v_a,   S_a = g_a/x_a
 //! h_ab = ∂g_a/∂ ln λ_b = 4 w Σ_p share_p [δ_ab λ̄_a^α + (m − λ̄_a^α − λ̄_b^α)/3],   m = ⅓ Σ_c λ̄_c^α
 //! dS_aa = Σ_b (h_ab − 2 δ_ab g_a)/(x_a x_b) dE_bb,      dS_ab = 2 (S_a − S_b)/(x_a − x_b) dE_ab,   a ≠ b
 //! ```
-//! in the frame of the `v_a`. Differences are taken as `λ̄_a^α − λ̄_b^α = 2 (λ̄_a λ̄_b)^(α/2) sinh z`, `z = α (e_a − e_b)/2`, so that
-//! equal stretches are no special case. What works on vectors stands in loops: closures may be compiled without the machine's
-//! instructions.
+//! in the frame of the `v_a`. Differences are taken as
+//! `λ̄_a^α − λ̄_b^α = 2 (λ̄_a λ̄_b)^(α/2) sinh z`, `z = α (e_a − e_b)/2`, so that equal stretches are
+//! no special case. Work on vectors is written as loops: closures may be compiled without the
+//! machine's instructions.
 
 #![expect(
     clippy::inline_always,
@@ -33,7 +35,8 @@ const WIDE: f64 = 0.5;
 /// Symmetric: `xx, yy, zz, xy, yz, zx`.
 pub(super) type Six<R> = [R; 6];
 
-/// Where the stretches lie, and how the second Piola–Kirchhoff stress changes with Green's strain there.
+/// Where the stretches lie, and how the second Piola–Kirchhoff stress changes with Green's strain
+/// there.
 #[derive(Clone, Copy)]
 pub(super) struct Frame<R> {
     /// `v_a`.
@@ -86,8 +89,8 @@ fn eigen<R: Lanes>(token: R::Token, symmetric: &Six<R>) -> (V3<R>, M3<R>) {
     ([a[0], a[1], a[2]], axes)
 }
 
-/// The deviatoric second Piola–Kirchhoff stress at Cauchy and Green's `C`, Pa, of a law whose half shear modulus at rest is
-/// `slope`, Pa; and how it changes.
+/// The deviatoric second Piola–Kirchhoff stress at Cauchy and Green's `C`, Pa, of a law whose half
+/// shear modulus at rest is `slope`, Pa; and how it changes.
 #[inline(always)]
 pub(super) fn respond<R: Lanes>(
     token: R::Token,
@@ -188,8 +191,9 @@ fn sinh_by<R: Lanes>(token: R::Token, z: R, difference: R, middle: R) -> R {
 }
 
 impl<R: Lanes> Frame<R> {
-    /// Green's strains `aa` and then `01, 12, 20` for the three directions of a node's displacement, 1/m: of its gradient
-    /// `hat`, and of the change `turn` (1/m) of the stretch of `carried` along `normal`.
+    /// Green's strains `aa` and then `01, 12, 20` for the three directions of a node's
+    /// displacement, 1/m: of its gradient `hat`, and of the change `turn` (1/m) of the stretch of
+    /// `carried` along `normal`.
     #[inline(always)]
     pub(super) fn strains(
         &self,
@@ -219,7 +223,8 @@ impl<R: Lanes> Frame<R> {
         strains
     }
 
-    /// The stresses of these strains, times `volume`, so that the product with other strains is their stiffness.
+    /// The stresses of these strains, times `volume`, so that the product with other strains is
+    /// their stiffness.
     #[inline(always)]
     pub(super) fn stresses(&self, volume: R, strains: &[V3<R>; 6]) -> [V3<R>; 6] {
         let mut stresses = *strains;

@@ -1,11 +1,15 @@
-//! From one mesh of a body to another of the same body.
+//! From one mesh of a body to another of the same body: displacements, contact forces and memory.
 
 use palpa_mesh::{SurfaceIndex, Vec3};
 
-use super::{History, Live, State};
+use super::super::batch::History;
+use super::Live;
+use super::candidates::SkinForces;
 use crate::model::Model;
+use crate::state::State;
 
-/// Where the columns and prisms of a body are in another mesh of it, whose skin at rest and whose levels are the same.
+/// Where the columns and prisms of a body are in another mesh of it, whose skin at rest and whose
+/// levels are the same.
 #[derive(Debug, Clone)]
 pub(super) struct Carry {
     /// For each vertex those of the old triangle that it is in, and their weights.
@@ -16,34 +20,30 @@ pub(super) struct Carry {
     wedges: Vec<[(u32, u8); 2]>,
 }
 
-/// What a body has come to.
+/// The state of a body, to go on from on another mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Come {
     pub(super) state: State,
     pub(super) history: Option<History>,
-    pub(super) pressures: Vec<f64>,
-    pub(super) frictions: Vec<Vec3>,
-    pub(super) anchors: Vec<Vec3>,
+    pub(super) skin: SkinForces,
 }
 
 impl Come {
+    /// At rest.
     pub(super) fn rest(model: &Model) -> Self {
-        let n = model.body.n_vertices();
         Self {
             state: State::new(model),
             history: None,
-            pressures: vec![0.0; n],
-            frictions: vec![Vec3::zeros(); n],
-            anchors: vec![Vec3::zeros(); n],
+            skin: SkinForces::none(model.body.n_vertices()),
         }
     }
 
-    /// What a body has come to, all of it up to date but for the memory of a linear exterior.
+    /// The state of a body, all of it up to date except the memory of a linear exterior.
     pub(super) fn of(live: &mut Live) -> Self {
         live.settle();
         let history = live.model.has_memory.then(|| {
             let mut history = History::new(&live.model);
-            if let Some(shop) = &live.shop {
+            if let Some(shop) = live.jobs.shop() {
                 shop.follower.batches.store(&mut history);
             }
             live.remember(&mut history);
@@ -52,9 +52,7 @@ impl Come {
         Self {
             state: live.state.clone(),
             history,
-            pressures: live.pressures.clone(),
-            frictions: live.frictions.clone(),
-            anchors: live.anchors.clone(),
+            skin: live.skin.clone(),
         }
     }
 }
@@ -97,7 +95,7 @@ impl Carry {
         }
     }
 
-    /// What the old mesh came to, on the new one.
+    /// The state on the old mesh, on the new one.
     pub(super) fn onto(&self, old: &Model, come: &Come, new: &Model) -> Come {
         let mut out = Come::rest(new);
         for v in 0..self.parts.len() {
@@ -106,9 +104,9 @@ impl Carry {
                     self.displacement(v, l, new, &come.state.displacements);
             }
             if let Some(u) = self.same[v] {
-                out.pressures[v] = come.pressures[u as usize];
-                out.frictions[v] = come.frictions[u as usize];
-                out.anchors[v] = come.anchors[u as usize];
+                out.skin.pressures[v] = come.skin.pressures[u as usize];
+                out.skin.frictions[v] = come.skin.frictions[u as usize];
+                out.skin.anchors[v] = come.skin.anchors[u as usize];
             }
         }
         if new.has_memory {
@@ -134,7 +132,7 @@ impl Carry {
         self.same[v].map(|u| u as usize)
     }
 
-    /// What pairs in lanes remember.
+    /// Memory of the pairs in lanes.
     pub(super) fn history(&self, old: &Model, from: &History, new: &Model) -> History {
         let mut history = History::new(new);
         for (pair, places) in self.pairs(old, new) {
@@ -143,7 +141,7 @@ impl Carry {
         history
     }
 
-    /// What pairs that are evaluated one by one remember.
+    /// Memory of the pairs that are evaluated one by one.
     fn carry_phases(&self, old: &Model, from: &State, new: &Model, into: &mut State) {
         let phases = |model: &Model, pair: usize| {
             model.first_phase[pair] as usize..model.first_phase[pair + 1] as usize

@@ -1,22 +1,24 @@
-//! A look at a body that is pressed, taken in passing and made whole elsewhere.
+//! A copy of a body's displacements, taken between two steps and completed on another thread.
 
 use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::SolveScratch;
 
-use super::super::zone::{Outside, Plan};
+use super::super::outside::Outside;
+use super::super::plan::Plan;
 use super::Live;
 use crate::model::Model;
 
 /// The displacements of a [`Live`] body at one moment.
 ///
-/// Where the exterior answers linearly, those outside the zone are left for [`Self::settled`], to be called where nobody
-/// waits.
+/// Where the exterior answers linearly, those outside the zone are computed by [`Self::settled`],
+/// to be called where nobody waits.
 #[derive(Debug)]
 pub struct Glance {
     model: Arc<Model>,
-    /// What the displacements outside the zone follow from; none where they are there.
+    /// The exterior that the displacements outside the zone follow from; none where they are up to
+    /// date.
     exterior: Option<(Arc<Plan>, Arc<Outside>)>,
     displacements: Vec<Vec3>,
 }
@@ -41,15 +43,15 @@ impl Glance {
 }
 
 impl Live {
-    /// Looks at the body, in the memory of an older look where there is one. Cost: a copy of the displacements.
+    /// Copies the displacements, into the memory of an older copy where there is one. Cost: a copy
+    /// of the displacements.
     pub fn glance(&self, old: Option<Glance>) -> Glance {
         let mut displacements = old.map_or_else(Vec::new, |old| old.displacements);
         displacements.clear();
         displacements.extend_from_slice(&self.state.displacements);
-        let is_followed = self.follower.is_some() || self.is_outside_lost;
         Glance {
             model: Arc::clone(&self.model),
-            exterior: (!is_followed).then(|| (Arc::clone(&self.plan), Arc::clone(&self.outside))),
+            exterior: self.exterior.origin(&self.plan, &self.outside),
             displacements,
         }
     }

@@ -6,21 +6,24 @@ use std::sync::Arc;
 use palpa_mesh::Vec3;
 
 use super::carry::{Carry, Come};
-use super::{Live, LiveParams, LiveReport, Pressed, Rebuild, Rebuilt, StepOutcome, nearest_point};
-use crate::contact::PosedTool;
+use super::pressed::{Pressed, nearest_point};
+use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome};
 use crate::error::FemError;
 use crate::model::Model;
+use crate::posed_tool::PosedTool;
 
-/// Steps in which a body is brought to equilibrium on a new mesh at most, each with a stiffness of its own.
+/// Steps in which a body is brought to equilibrium on a new mesh at most, each with a stiffness of
+/// its own.
 const MOST_SETTLING: usize = 8;
-/// How far from the middle of what is fine the tools may be before it moves, as a share of its radius, and how far ahead of them it
-/// is then put.
+/// How far the tools may be from the middle of the fine part before the mesh moves, as a share of
+/// its radius; and how far ahead of them the next middle is put, likewise.
 const LEAVE: f64 = 0.25;
 const LEAD: f64 = 0.5;
 
-/// Meshes of one body, each fine round another place. All have the same levels, and the same skin at rest.
+/// Meshes of one body, each fine round another place. All have the same levels, and the same skin
+/// at rest.
 pub trait FineBodies: Debug + Send + Sync {
-    /// Round which place (at rest, m) it is fine that serves a point of the skin best. Cost: none to speak of.
+    /// The place (at rest, m) whose mesh serves a point of the skin best. Cost: negligible.
     fn place(&self, point: Vec3) -> Vec3;
 
     /// Radius round a place within which it is fine, m.
@@ -35,24 +38,27 @@ pub trait FineBodies: Debug + Send + Sync {
 
 /// [`Live`] on a mesh that moves with the tools.
 ///
-/// The mesh is fine round a place; when the tools leave its middle, the mesh of a place ahead of them is made in the background,
-/// the body as it is then is carried over to it and brought to equilibrium there, and what has happened since is added when it
-/// takes over. Zones move on each mesh as they do on any.
+/// The mesh is fine round a place; when the tools leave its middle, the mesh of a place ahead of
+/// them is made in the background, the body as it is then is carried over to it and brought to
+/// equilibrium there. The changes since then are added when it takes over. Zones move on each
+/// mesh as they do on any.
 #[derive(Debug)]
 pub struct Roaming {
     bodies: Option<Arc<dyn FineBodies>>,
     params: LiveParams,
     live: Box<Live>,
+    /// The middle of the fine part at rest, m.
     place: Vec3,
-    /// The mesh that is to be taken up, and its place.
+    /// The mesh that is to be taken up, with its place at rest, m.
     next: Option<(Vec3, Arc<Model>)>,
     is_job_out: bool,
-    /// Whether the last job was a zone: then a mesh that is wanted comes first.
+    /// Whether the last job was a zone: then a mesh comes first, if one is due.
     was_zone: bool,
-    /// Counts meshes.
+    /// Number of meshes so far, and of meshes that could not be taken up.
     n_meshes: u64,
     n_failed: u64,
-    /// A place that there was no mesh for, or none that the body could be carried over to.
+    /// The last place without a mesh, or with one that the body could not be carried over to; at
+    /// rest, m.
     refused: Option<Vec3>,
     /// No longer needed: freed where nobody waits.
     retired: Option<Box<Live>>,
@@ -72,7 +78,7 @@ enum Kind {
     Move(Box<Move>),
 }
 
-/// What came of it.
+/// The result of a [`RoamJob`].
 #[derive(Debug)]
 pub struct RoamDone(Done);
 
@@ -108,7 +114,8 @@ struct Moved {
 }
 
 impl RoamJob {
-    /// Does the work. Cost: that of a zone; of a mesh; or, of a body that moves to it, some zones and steps.
+    /// Does the work. Cost: that of a zone; of a mesh; or, of a body that moves to it, some zones
+    /// and steps.
     pub fn run(self) -> RoamDone {
         drop(self.retired);
         RoamDone(match self.kind {
@@ -130,10 +137,10 @@ impl Move {
         let (params, n) = (self.params, self.n_before);
         let live = Live::at(model, &self.tools, params, self.centre, come, n).ok()?;
         let mut live = Box::new(live);
-        live.lag = self.lag;
+        live.exterior.set_lag(self.lag);
         for round in 0..MOST_SETTLING {
             // All of the body takes part: each step asks for a stiffness of the exterior.
-            live.depth_at_factor = f64::INFINITY;
+            live.jobs.ask_for_factor();
             let report = live.step(&self.tools, 0.0);
             if let Some(job) = live.take_job() {
                 live.install(job.run());
@@ -165,7 +172,7 @@ impl Moved {
         let (now, then) = (&old.state.displacements, &self.then.state.displacements);
         let plan = Arc::clone(&live.plan);
         let model = Arc::clone(&live.model);
-        let is_followed = live.follower.is_some();
+        let is_followed = live.exterior.is_followed();
         let is_moved = |v: usize| is_followed || plan.is_inside[v];
         for v in (0..model.body.n_vertices()).filter(|&v| is_moved(v)) {
             for l in 0..model.structure.n_free_levels {
@@ -175,26 +182,28 @@ impl Moved {
             let Some(u) = self.carry.same(v) else {
                 continue;
             };
-            let more = old.pressures[u] - self.then.pressures[u];
-            live.pressures[v] = (live.pressures[v] + more).max(0.0);
-            live.frictions[v] += old.frictions[u] - self.then.frictions[u];
-            live.anchors[v] = old.anchors[u];
+            let (skin, now, then) = (&mut live.skin, &old.skin, &self.then.skin);
+            let more = now.pressures[u] - then.pressures[u];
+            skin.pressures[v] = (skin.pressures[v] + more).max(0.0);
+            skin.frictions[v] += now.frictions[u] - then.frictions[u];
+            skin.anchors[v] = now.anchors[u];
         }
         if model.has_memory {
             let history = self.carry.history(&old.model, &old.history(), &model);
             live.inside.batches.load(&history);
-            if let Some(follower) = &mut live.follower {
+            if let Some(follower) = live.exterior.follower_mut() {
                 follower.batches.load(&history);
             }
         }
-        live.lag = (live.lag + old.lag - self.lag).max(0.0);
-        live.tools.copy_from_slice(&old.tools);
-        live.drift = old.drift;
-        live.latency = old.latency;
-        live.pace = old.pace;
-        live.clearance = old.clearance;
+        let lag = live.exterior.lag() + old.exterior.lag() - self.lag;
+        live.exterior.set_lag(lag.max(0.0));
+        live.course.tools.copy_from_slice(&old.course.tools);
+        live.course.drift = old.course.drift;
+        live.course.clearance = old.course.clearance;
+        live.jobs.latency = old.jobs.latency;
+        live.recovery.pace = old.recovery.pace;
         live.forget_forces();
-        live.depth_at_factor = old.depth();
+        live.jobs.is_factored_at(old.depth());
         live.keep_good();
         live
     }
@@ -221,7 +230,8 @@ impl Roaming {
     /// At rest, fine where the tools are.
     ///
     /// # Errors
-    /// When there is no mesh for the place, the body is too large to be factored, or cannot be at rest.
+    /// When there is no mesh for the place, the body is too large to be factored, or cannot be at
+    /// rest.
     pub fn new(
         bodies: Arc<dyn FineBodies>,
         tools: &[PosedTool],
@@ -247,7 +257,8 @@ impl Roaming {
         &mut self.live
     }
 
-    /// Round which place (at rest, m) the mesh is fine, and up to which distance, m; none where it is the same all over or stays.
+    /// Round which place (at rest, m) the mesh is fine, and up to which distance, m; none where it
+    /// is the same all over or stays.
     pub fn fine(&self) -> Option<(Vec3, f64)> {
         let bodies = self.bodies.as_ref()?;
         Some((self.place, bodies.radius()))
@@ -258,7 +269,8 @@ impl Roaming {
         [self.n_meshes, self.n_failed]
     }
 
-    /// See [`Live::step`]. Where the tools press beyond what is fine, the body counts as behind.
+    /// See [`Live::step`]. Where the tools press beyond the fine part of the mesh,
+    /// the body counts as behind.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.live.step(tools, dt);
         if report.outcome == StepOutcome::Arrived && self.is_beyond() {
@@ -275,8 +287,8 @@ impl Roaming {
         (pressed.middle - self.place).norm() + reach > bodies.radius()
     }
 
-    /// Work for another thread, if any is due; its result is to be given to [`Self::install`]. Zones and
-    /// meshes take turns; a mesh that is made is taken up first.
+    /// Work for another thread, if any is due; its result is to be given to [`Self::install`].
+    /// Zones and meshes take turns; a mesh that is made is taken up first.
     pub fn take_job(&mut self) -> Option<RoamJob> {
         if self.is_job_out {
             return None;
@@ -304,11 +316,11 @@ impl Roaming {
                 old: Arc::clone(&self.live.model),
                 new,
                 come: Come::of(&mut self.live),
-                tools: self.live.tools.clone(),
+                tools: self.live.course.tools.clone(),
                 params: self.params,
                 centre: self.live.next_centre(),
-                lag: self.live.lag,
-                n_before: self.live.n_zones.max(self.live.n_jobs),
+                lag: self.live.exterior.lag(),
+                n_before: self.live.jobs.n_zones.max(self.live.jobs.n_asked),
             })));
         }
         let (middle, ahead) = self.heading(bodies.radius());
@@ -321,20 +333,21 @@ impl Roaming {
         (is_nearer && is_new).then(|| Kind::Mesh(bodies, place))
     }
 
-    /// Where the skin is pressed, or would be, and how far ahead of that the next mesh is to be fine; at rest, m.
+    /// Where the skin is pressed, or would be, and how far ahead of that the next mesh is to be
+    /// fine; at rest, m.
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
         if let Some(Pressed { middle, along }) = live.pressed() {
-            let drift = live.drift - along * along.dot(&live.drift);
+            let drift = live.course.drift - along * along.dot(&live.course.drift);
             let ahead = drift.try_normalize(1e-6).unwrap_or_default();
             return (middle, ahead * (LEAD * radius));
         }
         let displacements = &live.state.displacements;
-        let (_, point) = nearest_point(&live.model, displacements, &live.tools, None);
+        let (_, point) = nearest_point(&live.model, displacements, &live.course.tools, None);
         (point, Vec3::zeros())
     }
 
-    /// Takes over what came of a job.
+    /// Takes over the result of a job.
     pub fn install(&mut self, done: RoamDone) {
         self.is_job_out = false;
         match done.0 {

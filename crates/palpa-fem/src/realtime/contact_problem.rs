@@ -1,12 +1,24 @@
-//! The small contact problem of a moving step: forces on a few skin vertices, given how these answer to them.
+//! The small contact problem of a moving step: forces on a few skin vertices (the *candidates*),
+//! given their compliance.
+//!
+//! The project solves contact in three places:
+//!
+//! | who | where | unknowns | friction |
+//! | --- | --- | --- | --- |
+//! | statics, each Newton iteration | [`crate::statics`], `active_set.rs` | displacements of all nodes; a touching vertex is held on the tool's surface | each touching vertex sticks (held at its anchor) or slides; decided between iterations |
+//! | moving step, each iteration at some 100 Hz | here | forces on at most 160 candidates, on their compliance | decided in sweeps over the candidates (`rub`), once an iteration |
+//! | servo, each tick at 1 kHz | `palpa-servo`, `solve.rs` and `contact.rs` | forces on at most 60 vertices of the patch, and the coupling's displacement | decided each tick, on the round cone, one vertex after the other |
 //!
 //! ```text
 //! s = s0 + w (f − p0),   p = f − κ s,   0 ≤ g0 + s − s0 ⟂ p ≥ 0
 //! ```
-//! along the normals: `s` the displacement of a vertex, `p` its pressure (N), `g` its gap. Where `κ > 0` the compliance `w` is that of a
-//! body whose vertex is held by a spring, which `p` leaves out again: deep under a tool the free body is not stable, and only
-//! the tool holds it. Without friction this is all, and an active set solves it exactly. With friction,
-//! `|t| ≤ μ p` against the slip from the anchor where it reaches that, projected Gauss–Seidel sweeps go on from there.
+//! along the normals: `s` the displacement of a vertex, m, `p` its pressing force, N, `g` its gap,
+//! m, `f` the force that the linear system takes, N. Where `κ > 0` the compliance `w`, m/N, is that
+//! of a body whose vertex is held by a spring, and `p` leaves the spring out again: deep under a
+//! tool the free body is not stable, and only the tool holds it. Without friction this is all, and
+//! an active set solves it exactly. With friction, `|t| ≤ μ p`, and where `t` reaches that limit it
+//! opposes the slip from the anchor; projected Gauss–Seidel sweeps go on from the solution without
+//! friction.
 
 #![expect(
     clippy::needless_range_loop,
@@ -16,8 +28,9 @@
 use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
+use super::candidate::Candidate;
 use crate::Mat3;
-use crate::contact::PosedTool;
+use crate::posed_tool::PosedTool;
 
 /// Changes of the active set.
 const MOST_CHANGES: usize = 40;
@@ -28,45 +41,18 @@ const SETTLED: f64 = 1e-6;
 /// A gap (m) that counts as none.
 const NO_GAP: f64 = 1e-12;
 
-/// A skin vertex near a tool.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
-    pub(super) vertex: u32,
-    pub(super) tool: u32,
-    /// Where it is at the start of the iteration, m.
-    pub(super) start: Vec3,
-    /// From the tool to the tissue.
-    pub(super) normal: Vec3,
-    /// Gap at the start, m.
-    pub(super) gap: f64,
-    /// Pressing force, N: `p0`, then `p`.
-    pub(super) pressure: f64,
-    /// Force of friction on it, N.
-    pub(super) friction: Vec3,
-    /// `κ`, N/m.
-    pub(super) support: f64,
-    /// Where friction holds it, in the tool's frame, m.
-    pub(super) anchor: Vec3,
-    /// Displacement of the iteration, m: with the forces of the start, then with those found. Along the normal alone where no
-    /// tool rubs.
-    pub(super) displacement: Vec3,
-}
-
-impl Candidate {
-    /// Force of the tool on it, N.
-    pub(super) fn force(&self) -> Vec3 {
-        self.normal * self.pressure + self.friction
-    }
-}
-
-/// Memory for so many candidates.
+/// The problem, in memory for [`MOST_CANDIDATES`].
 #[derive(Debug)]
 pub(super) struct ContactProblem {
+    /// Sorted by vertex.
     pub(super) candidates: Vec<Candidate>,
-    /// Compliance, column by column, m/N: `n × n` along the normals, or `3 n × 3 n` along the axes with friction.
+    /// Whether any tool has friction: then there are three unknowns to a candidate, else one.
+    pub(super) has_friction: bool,
+    /// Compliance, column by column, m/N: `n × n` along the normals, or `3 n × 3 n` along the axes
+    /// with friction.
     pub(super) compliance: Vec<f64>,
-    /// By how much the force that the linear system takes is more than before: `f − p0` along the normals, or along the
-    /// axes, N.
+    /// By how much the force that the linear system takes is more than before: `f − p0` along the
+    /// normals, or along the axes, N.
     pub(super) change: Vec<f64>,
     /// Compliance along the normals, m/N.
     pub(super) along: Vec<f64>,
@@ -82,6 +68,7 @@ impl ContactProblem {
         let n = MOST_CANDIDATES;
         Self {
             candidates: Vec::with_capacity(n),
+            has_friction: false,
             compliance: vec![0.0; 9 * n * n],
             change: vec![0.0; 3 * n],
             along: vec![0.0; n * n],
@@ -92,15 +79,21 @@ impl ContactProblem {
         }
     }
 
+    /// The candidates that press.
+    pub(super) fn pressing(&self) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter().filter(|c| c.pressure > 0.0)
+    }
+
     /// The block of the compliance between two candidates, with friction.
     pub(super) fn block(&self, i: usize, j: usize) -> Mat3 {
         let n = 3 * self.candidates.len();
         Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
 
-    /// Finds forces and displacements. Cost: some n³ of vertices that press, and with friction n² of candidates a sweep.
-    pub(super) fn solve(&mut self, tools: &[PosedTool], has_friction: bool) {
-        let n = self.candidates.len();
+    /// Finds forces and displacements. Cost: some n³ of vertices that press, and with friction n²
+    /// of candidates a sweep.
+    pub(super) fn solve(&mut self, tools: &[PosedTool]) {
+        let (n, has_friction) = (self.candidates.len(), self.has_friction);
         self.change.fill(0.0);
         for j in 0..n {
             for i in 0..n {
@@ -120,7 +113,8 @@ impl ContactProblem {
         }
         let before: [Vec3; MOST_CANDIDATES] =
             std::array::from_fn(|i| self.candidates.get(i).map_or(Vec3::zeros(), |c| c.friction));
-        // Pressures have been found along the normals; what they do across these is not yet in the displacements.
+        // Pressures have been found along the normals; what they do across these is not yet in the
+        // displacements.
         self.respond();
         self.rub(tools, &start, &before);
     }
@@ -231,7 +225,8 @@ impl ContactProblem {
         }
     }
 
-    /// Adds what the change of the pressures does across the normals, which the frictionless solution leaves out.
+    /// Adds what the change of the pressures does across the normals, which the frictionless
+    /// solution leaves out.
     fn respond(&mut self) {
         let n = self.candidates.len();
         for i in 0..n {

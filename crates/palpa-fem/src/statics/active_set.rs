@@ -1,56 +1,51 @@
-//! Which skin vertices touch which tool, and what the tool demands of them.
+//! Which skin vertices touch which tool, and where the tool holds them.
 //!
-//! Contact is a complementarity problem, solved as one: a vertex either has a gap and no traction, or no gap and a
-//! traction that presses, `0 ≤ g ⟂ λ ≥ 0`; with friction its tangential traction lies in Coulomb's cone, `|t| ≤ μ λ`, and
-//! opposes its slip where it reaches the border. Newton's method and the choice of the active vertices go together
-//! (a primal–dual active set): those with a gap below zero are held on the tool's surface, those that would be pulled are
-//! let go, and so on until nothing changes.
+//! Contact is a complementarity problem, solved as one: a vertex either has a gap and no traction,
+//! or no gap and a traction that presses, `0 ≤ g ⟂ λ ≥ 0`. With friction its tangential traction
+//! lies in Coulomb's cone, `|t| ≤ μ λ`, and opposes its slip where it reaches the border. Newton's
+//! method and the choice of the active vertices go together (a primal–dual active set): vertices
+//! with a gap below zero are held on the tool's surface, vertices that would be pulled are let go,
+//! and so on until nothing changes.
 
 use palpa_mesh::Vec3;
 
 use crate::Mat3;
 use crate::model::Model;
-use crate::shape::{Pose, Tool};
+use crate::posed_tool::PosedTool;
 use crate::state::Touch;
 use crate::system::Hold;
-
-/// A tool and where it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PosedTool {
-    /// Its shape and friction.
-    pub tool: Tool,
-    /// From the tool's frame to the body's.
-    pub pose: Pose,
-}
 
 /// A slip below this (m) has no direction of its own.
 const LEAST_SLIP: f64 = 1e-10;
 
-/// A vertex at the current positions.
+/// A vertex that touches a tool, at the current positions.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Contact {
-    pub(crate) node: usize,
-    pub(crate) vertex: usize,
-    pub(crate) friction: f64,
-    pub(crate) touch: Touch,
+pub(super) struct ActiveVertex {
+    pub(super) node: usize,
+    /// Index of the skin vertex.
+    pub(super) vertex: usize,
+    /// Coefficient of friction of its tool.
+    pub(super) friction: f64,
+    pub(super) touch: Touch,
     /// m, negative inside the tool.
-    pub(crate) gap: f64,
-    /// From the tool to the tissue.
+    pub(super) gap: f64,
+    /// Unit normal of the tool's surface, from the tool to the tissue.
     normal: Vec3,
+    /// Curvature of the tool's surface, 1/m.
     curvature: Mat3,
-    /// Where the anchor is now, from the vertex, m.
+    /// From the vertex to its anchor, m.
     to_anchor: Vec3,
-    /// See [`Contacts::smoothing`].
+    /// See [`ActiveSet::smoothing`].
     smoothing: f64,
 }
 
-/// Contacts of all tools at the current positions.
+/// The vertices that touch any tool, at the current positions.
 #[derive(Debug, Default)]
-pub(crate) struct Contacts {
-    pub(crate) active: Vec<Contact>,
-    /// A slip (m) over which friction turns round gradually, all vertices sliding: a detour to a good first guess where
-    /// the exact law does not converge from afar. 0 is the exact law.
-    pub(crate) smoothing: f64,
+pub(super) struct ActiveSet {
+    pub(super) active: Vec<ActiveVertex>,
+    /// A slip (m) over which friction turns round gradually, all vertices sliding: a detour to a
+    /// good first guess where the exact law does not converge from afar. 0 is the exact law.
+    pub(super) smoothing: f64,
 }
 
 /// How far a state is from obeying the laws of contact.
@@ -64,15 +59,18 @@ pub struct ContactResiduals {
     pub tension: f64,
     /// Largest tangential force beyond the friction cone, N.
     pub cone: f64,
-    /// Largest part of a friction force at the cone's border that does not oppose the slip, as a share of it.
+    /// Largest part of a friction force at the cone's border that does not oppose the slip, as a
+    /// share of it.
     pub slip: f64,
 }
 
-impl Contacts {
-    /// Finds gaps, normals and anchors of the vertices that touch now, and takes up those that have come to touch.
+impl ActiveSet {
+    /// Finds gaps, normals and anchors of the vertices that touch now, and takes up those that have
+    /// come to touch.
     ///
-    /// `touches` is the state; vertices that are `held` in all directions cannot touch. Returns how many are new.
-    pub(crate) fn update(
+    /// `touches` is the state; vertices that are `held` in all directions cannot touch. Returns how
+    /// many are new.
+    pub(super) fn update(
         &mut self,
         model: &Model,
         displacements: &[Vec3],
@@ -110,8 +108,8 @@ impl Contacts {
                     Touch::Slip { tool, anchor }
                 };
             }
-            let contact = Contact::new(node, vertex, *touch, &tools[k], &x);
-            self.active.push(Contact {
+            let contact = ActiveVertex::new(node, vertex, *touch, &tools[k], &x);
+            self.active.push(ActiveVertex {
                 smoothing: self.smoothing,
                 ..contact
             });
@@ -119,8 +117,9 @@ impl Contacts {
         n_new
     }
 
-    /// Vertices that slide under pressure with friction: node, friction per pressure `μ d`, and normal.
-    pub(crate) fn sliding(&self, body_forces: &[Vec3]) -> Vec<(usize, Vec3, Vec3)> {
+    /// Vertices that slide under pressure with friction: node, friction per pressure `μ d`, and
+    /// normal.
+    pub(super) fn sliding(&self, body_forces: &[Vec3]) -> Vec<(usize, Vec3, Vec3)> {
         self.active
             .iter()
             .filter_map(|contact| {
@@ -139,7 +138,7 @@ impl Contacts {
     }
 }
 
-impl Contact {
+impl ActiveVertex {
     /// A touching vertex at the place `x`.
     fn new(node: usize, vertex: usize, touch: Touch, tool: &PosedTool, x: &Vec3) -> Self {
         let PosedTool { tool, pose } = tool;
@@ -164,18 +163,19 @@ impl Contact {
     }
 
     /// The same vertex at another place.
-    pub(crate) fn moved(&self, tools: &[PosedTool], x: &Vec3) -> Self {
+    pub(super) fn moved(&self, tools: &[PosedTool], x: &Vec3) -> Self {
         match self.touch.tool() {
             Some(tool) => Self::new(self.node, self.vertex, self.touch, &tools[tool], x),
             None => *self,
         }
     }
 
-    /// What the tool demands: directions held, and the move along them. `body_force` is what friction has held against.
+    /// What the tool demands: directions held, and the move along them. `body_force` is what
+    /// friction has held against.
     ///
-    /// A vertex that is just released can only go against the friction that held it: that of a slip as short turns at once
-    /// to wherever the vertex goes, which is infinitely stiff across.
-    pub(crate) fn demand(&self, hold: Hold, body_force: &Vec3) -> (Hold, Vec3) {
+    /// A vertex that is just released can only go against the friction that held it: that of a slip
+    /// as short turns at once to wherever the vertex goes, which is infinitely stiff across.
+    pub(super) fn demand(&self, hold: Hold, body_force: &Vec3) -> (Hold, Vec3) {
         match self.touch {
             Touch::Stick { .. } => return (Hold::all(), self.to_anchor),
             Touch::Slip { .. } if self.is_just_released() => {
@@ -190,12 +190,13 @@ impl Contact {
     }
 
     /// Pressing part of the tool's force on the vertex, which balances the body's force on it, N.
-    pub(crate) fn pressure(&self, body_force: &Vec3) -> f64 {
+    pub(super) fn pressure(&self, body_force: &Vec3) -> f64 {
         body_force.dot(&self.normal)
     }
 
-    /// Whether friction has held the vertex until now. It then leaves in the direction in which it was held back: what
-    /// would soften it, a bent surface and friction that falls as it slides, is left out until it does.
+    /// Whether friction has held the vertex until now. It then leaves in the direction in which it
+    /// was held back: what would soften it, a bent surface and friction that falls as it slides, is
+    /// left out until it does.
     fn is_just_released(&self) -> bool {
         self.friction > 0.0
             && self.smoothing == 0.0
@@ -203,7 +204,7 @@ impl Contact {
     }
 
     /// Largest curvature of the tool's surface here, 1/m.
-    pub(crate) fn sharpness(&self) -> f64 {
+    pub(super) fn sharpness(&self) -> f64 {
         self.curvature.norm()
     }
 
@@ -211,9 +212,10 @@ impl Contact {
         v - self.normal * self.normal.dot(v)
     }
 
-    /// Friction on a sliding vertex, N, and its stiffness (`−∂t/∂u`, positive semidefinite). `body_force` is that of the
-    /// last iteration, whose pressure and, before there is any slip, direction are taken.
-    pub(crate) fn friction(&self, body_force: &Vec3) -> (Vec3, Mat3) {
+    /// Friction on a sliding vertex, N, and its stiffness (`−∂t/∂u`, positive semidefinite).
+    /// `body_force` is that of the last iteration, whose pressure and, before there is any slip,
+    /// direction are taken.
+    pub(super) fn friction(&self, body_force: &Vec3) -> (Vec3, Mat3) {
         let limit = self.friction * self.pressure(body_force).max(0.0);
         if limit == 0.0 {
             return (Vec3::zeros(), Mat3::zeros());
@@ -241,7 +243,7 @@ impl Contact {
     }
 
     /// Stiffness that the bending of the tool's surface adds at an active vertex: `−λ ∂n/∂x`.
-    pub(crate) fn geometric(&self, body_force: &Vec3) -> Mat3 {
+    pub(super) fn geometric(&self, body_force: &Vec3) -> Mat3 {
         match self.touch {
             Touch::Stick { .. } => Mat3::zeros(),
             Touch::Slip { .. } if self.is_just_released() => Mat3::zeros(),
@@ -249,9 +251,10 @@ impl Contact {
         }
     }
 
-    /// The other touch that the laws of contact ask for, if they do, and by which force, N, the present one breaks them.
-    /// `body_force` is that on the vertex; `least` is a force that counts as none.
-    pub(crate) fn revised(&self, body_force: &Vec3, least: f64) -> Option<(Touch, f64)> {
+    /// The other touch that the laws of contact ask for, if they do, and by which force, N, the
+    /// present one breaks them. `body_force` is that on the vertex; `least` is a force that counts
+    /// as none.
+    pub(super) fn revised(&self, body_force: &Vec3, least: f64) -> Option<(Touch, f64)> {
         let pressure = self.pressure(body_force);
         if pressure < -least {
             return Some((Touch::Open, -pressure));
@@ -274,7 +277,7 @@ impl Contact {
     }
 
     /// What a vertex that slides with smoothed friction most likely does by the exact law.
-    pub(crate) fn sharpened(&self) -> Touch {
+    pub(super) fn sharpened(&self) -> Touch {
         match self.touch {
             Touch::Slip { tool, anchor }
                 if self.friction > 0.0
@@ -287,7 +290,7 @@ impl Contact {
     }
 
     /// Adds this vertex to the residuals.
-    pub(crate) fn measure(&self, body_force: &Vec3, residuals: &mut ContactResiduals) {
+    pub(super) fn measure(&self, body_force: &Vec3, residuals: &mut ContactResiduals) {
         let pressure = self.pressure(body_force);
         let tangential = self.tangential(body_force);
         residuals.gap = residuals.gap.max(self.gap.abs());
@@ -304,8 +307,8 @@ impl Contact {
     }
 }
 
-/// Ends a step: what slides or has just come to stick is anchored where it is.
-pub(crate) fn settle(
+/// Ends a step: vertices that slide are anchored where they are now.
+pub(super) fn anchor_slides(
     model: &Model,
     displacements: &[Vec3],
     tools: &[PosedTool],

@@ -1,0 +1,89 @@
+//! Where the tools are, and how far they may go in a step.
+
+use palpa_mesh::Vec3;
+
+use super::Live;
+use crate::posed_tool::PosedTool;
+
+/// How near to the edge of its zone a pressed vertex may come, as a share of the radius, before
+/// tools are followed no farther that way.
+const EDGE: f64 = 0.95;
+/// Share of the last step in the smoothed one.
+const NEW: f64 = 0.2;
+
+/// The tools on their way.
+#[derive(Debug)]
+pub(super) struct Course {
+    /// The tools where the body has followed them to.
+    pub(super) tools: Vec<PosedTool>,
+    /// How far they go in a step, smoothed, m.
+    pub(super) drift: Vec3,
+    /// Least gap between tools and the zone's skin, m; 0 where it is not known.
+    pub(super) clearance: f64,
+}
+
+impl Course {
+    pub(super) fn new(tools: &[PosedTool]) -> Self {
+        Self {
+            tools: tools.to_vec(),
+            drift: Vec3::zeros(),
+            clearance: 0.0,
+        }
+    }
+
+    /// Moves the tools to where they are asked to be, each by at most `most`, m, and not in the
+    /// direction `held`. Returns whether any stays short of its target.
+    fn advance(&mut self, targets: &[PosedTool], held: Option<Vec3>, most: f64) -> bool {
+        debug_assert_eq!(self.tools.len(), targets.len());
+        let mut is_short = false;
+        let before: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
+        for (tool, target) in self.tools.iter_mut().zip(targets) {
+            let mut target = *target;
+            let way = target.pose.translation.vector - tool.pose.translation.vector;
+            let outward = held.map_or(0.0, |outward| outward.dot(&way));
+            if let (Some(direction), true) = (held, outward > 0.0) {
+                is_short = true;
+                target.pose.translation.vector -= direction * outward;
+            }
+            let way = (target.pose.translation.vector - tool.pose.translation.vector).norm();
+            let pose = if way <= most {
+                target.pose
+            } else {
+                is_short = true;
+                tool.pose.lerp_slerp(&target.pose, most / way)
+            };
+            *tool = PosedTool {
+                tool: target.tool,
+                pose,
+            };
+        }
+        let after: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
+        let way = (after - before) / self.tools.len().max(1) as f64;
+        self.drift += (way - self.drift) * NEW;
+        is_short
+    }
+}
+
+impl Live {
+    /// Moves the tools, no farther than one step may. Returns whether any stays short of its
+    /// target.
+    pub(super) fn move_tools(&mut self, targets: &[PosedTool]) -> bool {
+        let held = self.held_direction();
+        let most = (self.params.longest_move * self.recovery.pace).max(self.course.clearance);
+        self.course.advance(targets, held, most)
+    }
+
+    /// The direction across the skin in which tools are not followed: pressed vertices have come to
+    /// the edge of the zone there, and beyond it none is a candidate. None where there is room.
+    fn held_direction(&self) -> Option<Vec3> {
+        if self.plan.exterior.is_empty()
+            || self.contact_radius(self.plan.centre) < EDGE * self.plan.radius
+        {
+            return None;
+        }
+        let pressed = self.pressed()?;
+        let out = pressed.middle - self.plan.centre;
+        let out = out - pressed.along * pressed.along.dot(&out);
+        out.try_normalize(1e-9)
+    }
+}

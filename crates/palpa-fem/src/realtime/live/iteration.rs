@@ -1,0 +1,257 @@
+//! One Newton iteration of the zone.
+
+use std::sync::Arc;
+
+use palpa_mesh::Vec3;
+
+use super::super::plan::Trouble;
+use super::Live;
+use super::report::{LiveReport, StepOutcome};
+use crate::model::Model;
+
+/// Share of an iteration below which it has failed.
+const LEAST_SHARE: f64 = 0.05;
+/// A body that nothing touches is still where an iteration moves its zone by no more than this, m,
+/// and its forces are in balance within this share of the tolerance.
+const STILL: f64 = 1e-8;
+const STILL_SHARE: f64 = 0.1;
+
+/// What is known of the body where it is now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Known {
+    /// Nothing: it is elsewhere, or on another zone, since forces were last evaluated.
+    Nothing,
+    /// The internal forces of zone and followed exterior.
+    Forces,
+    /// The forces; and nothing touched the body in the last step, which left it as it was. There is
+    /// nothing to solve until a tool comes near.
+    Still,
+}
+
+/// Which iteration of a step it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pass {
+    /// The first one.
+    First,
+    /// A later one, with a new stiffness and new candidates.
+    Anew,
+    /// A later one near equilibrium, with the factor, compliance and candidates of the one before.
+    Near,
+}
+
+/// Arrays that iterations work in.
+#[derive(Debug)]
+pub(super) struct Scratch {
+    /// Internal forces of the zone's prisms, N. `[n_nodes]`
+    forces: Vec<Vec3>,
+    /// Right side, then displacements, in the order of elimination, N or m. `[n_dofs]`
+    x: Vec<f32>,
+    /// Scratch of the exterior. `[n_dofs]`
+    pub(super) moves: Vec<f32>,
+    /// Displacements before the iteration, m. `[n_nodes]`
+    before: Vec<Vec3>,
+}
+
+impl Scratch {
+    pub(super) fn new(model: &Model) -> Self {
+        let (n, n_dofs) = (model.n_nodes(), model.structure.n_dofs());
+        Self {
+            forces: vec![Vec3::zeros(); n],
+            x: vec![0.0; n_dofs],
+            moves: vec![0.0; n_dofs],
+            before: vec![Vec3::zeros(); n],
+        }
+    }
+}
+
+impl Live {
+    /// One Newton iteration. After an error the state is not one to go on from.
+    pub(super) fn iterate(
+        &mut self,
+        dt: f64,
+        pass: Pass,
+        report: &mut LiveReport,
+    ) -> Result<(), Trouble> {
+        let plan = Arc::clone(&self.plan);
+        self.evaluate_forces(pass)?;
+        if pass == Pass::Near {
+            self.measure_gaps();
+        } else {
+            self.find_candidates(dt);
+            if let Some(residual) = self.residual_at_rest() {
+                report.iterations = 0;
+                report.residual = residual;
+                return Ok(());
+            }
+            self.refactor(report)?;
+        }
+        self.right_side();
+        let x = &mut self.ws.x;
+        self.inside.substitute(&plan, x);
+        if pass != Pass::Near {
+            self.inside.comply(&plan, &mut self.problem);
+        }
+        self.inside.project(&plan, x, &mut self.problem);
+        self.problem.solve(&self.course.tools);
+        self.inside.push(&plan, &self.problem, x);
+        self.inside.back_substitute(&plan, x);
+        let share = self.advance(report)?;
+        self.accept_contact(share);
+        report.n_candidates = self.problem.candidates.len();
+        report.n_active = self.problem.pressing().count();
+        report.residual = self.residual();
+        Ok(())
+    }
+
+    /// Evaluates the internal forces where those of the last iteration do not hold any more: the
+    /// body is elsewhere, or its materials remember and time has passed.
+    fn evaluate_forces(&mut self, pass: Pass) -> Result<(), Trouble> {
+        let has_aged = pass == Pass::First && self.model.has_memory;
+        if !has_aged && self.known != Known::Nothing {
+            return Ok(());
+        }
+        self.internal_forces()?;
+        self.follow()?;
+        if self.known == Known::Nothing {
+            self.known = Known::Forces;
+        }
+        Ok(())
+    }
+
+    /// Takes the step that is in `x`, or as large a share of it as turns no prism inside out.
+    /// Returns the share.
+    fn advance(&mut self, report: &mut LiveReport) -> Result<f64, Trouble> {
+        for &[node, _] in &self.plan.zone {
+            self.ws.before[node as usize] = self.state.displacements[node as usize];
+        }
+        let mut share = 1.0;
+        loop {
+            self.take(share);
+            if self.internal_forces().is_ok() {
+                return Ok(share);
+            }
+            share *= 0.5;
+            report.outcome = StepOutcome::BackedOff;
+            if share < LEAST_SHARE {
+                self.take(0.0);
+                return Err(Trouble::Singular);
+            }
+        }
+    }
+
+    /// Takes a share of the step that is in `x`, from the displacements before it.
+    fn take(&mut self, share: f64) {
+        for &[node, dof] in &self.plan.zone {
+            let step = Vec3::from_fn(|c, _| f64::from(self.ws.x[dof as usize + c]));
+            let step = self.model.supports[node as usize].free_part(&step);
+            self.state.displacements[node as usize] = self.ws.before[node as usize] + step * share;
+        }
+    }
+
+    /// Internal forces of the zone's prisms at the present displacements.
+    fn internal_forces(&mut self) -> Result<(), Trouble> {
+        let levels = self.model.body.n_levels;
+        for &v in &self.plan.vertices {
+            let first = v as usize * levels;
+            self.ws.forces[first..first + levels].fill(Vec3::zeros());
+        }
+        self.inside.batches.add_forces(
+            &self.model,
+            &self.memory,
+            &self.state.displacements,
+            &mut self.ws.forces,
+        )?;
+        Ok(())
+    }
+
+    /// Forces out of balance, with those of the tools, reduced to the zone, into `x`.
+    fn right_side(&mut self) {
+        let (x, forces) = (&mut self.ws.x, &self.ws.forces);
+        for &[node, dof] in &self.plan.zone {
+            let node = node as usize;
+            let force = self.model.supports[node].free_part(&-forces[node]);
+            for c in 0..3 {
+                x[dof as usize + c] = force[c] as f32;
+            }
+        }
+        for candidate in &self.problem.candidates {
+            let vertex = candidate.vertex as usize;
+            let force = candidate.force();
+            let dof = self.plan.tree.first_dof(vertex);
+            let node = self.model.body.node(vertex, 0);
+            let sum = self.model.supports[node].free_part(&(force - forces[node]));
+            for c in 0..3 {
+                x[dof + c] = sum[c] as f32;
+            }
+        }
+        let displacements = &self.state.displacements;
+        self.outside
+            .push(&self.plan, displacements, x, &mut self.ws.moves);
+    }
+
+    /// Forces out of balance in the zone without its ring, as a share of the tools' force.
+    fn residual(&self) -> f64 {
+        let levels = self.model.body.n_levels;
+        let ring = self.first_ring_dof();
+        let sum: f64 = self
+            .plan
+            .zone
+            .iter()
+            .filter(|n| (n[1] as usize) < ring && !(n[0] as usize).is_multiple_of(levels))
+            .map(|n| self.model.supports[n[0] as usize].free_part(&self.ws.forces[n[0] as usize]))
+            .map(|force| force.norm_squared())
+            .sum();
+        let skin: f64 = self
+            .plan
+            .vertices
+            .iter()
+            .filter(|&&v| self.plan.tree.first_dof(v as usize) < ring)
+            .map(|&v| {
+                let node = self.model.body.node(v as usize, 0);
+                let pressed = self
+                    .problem
+                    .candidates
+                    .binary_search_by_key(&v, |c| c.vertex);
+                let tool = pressed.map_or(Vec3::zeros(), |i| self.problem.candidates[i].force());
+                let force = tool - self.ws.forces[node];
+                self.model.supports[node].free_part(&force).norm_squared()
+            })
+            .sum();
+        (sum + skin).sqrt() / self.tools_force()
+    }
+
+    /// First unknown of the zone's ring, whose columns are eliminated last.
+    pub(super) fn first_ring_dof(&self) -> usize {
+        self.ws.x.len() - 3 * self.plan.ring.len()
+    }
+
+    /// The residual of a body that nothing touches, if it is still where it was.
+    fn residual_at_rest(&mut self) -> Option<f64> {
+        if self.known != Known::Still {
+            return None;
+        }
+        let is_untouched = self.problem.candidates.is_empty();
+        let residual = is_untouched.then(|| self.residual());
+        let residual = residual.filter(|r| *r <= STILL_SHARE * self.params.tolerance);
+        if residual.is_none() {
+            self.known = Known::Forces;
+        }
+        residual
+    }
+
+    /// Whether nothing touches the body, and the last iteration moved nothing.
+    pub(super) fn is_still_now(&self, report: &LiveReport) -> bool {
+        let move_of = |node: u32| {
+            (self.state.displacements[node as usize] - self.ws.before[node as usize]).amax()
+        };
+        report.n_candidates == 0
+            && report.residual.max(report.outside) <= STILL_SHARE * self.params.tolerance
+            && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
+    }
+
+    /// To be called when the body is elsewhere, or on another zone: its forces are not known any
+    /// more.
+    pub(super) fn forget_forces(&mut self) {
+        self.known = Known::Nothing;
+    }
+}

@@ -1,0 +1,96 @@
+//! Where the tools press, or would press.
+
+use palpa_mesh::Vec3;
+
+use super::Live;
+use crate::model::Model;
+use crate::posed_tool::PosedTool;
+
+/// A force below which a residual is not taken relative to it, N.
+const LEAST_FORCE: f64 = 0.01;
+
+/// The place where tools press.
+pub(super) struct Pressed {
+    /// Mean of the vertices at rest, weighted with the forces, m.
+    pub(super) middle: Vec3,
+    /// Mean direction of the forces; a unit vector.
+    pub(super) along: Vec3,
+}
+
+impl Live {
+    /// The place where tools press, if any does.
+    pub(super) fn pressed(&self) -> Option<Pressed> {
+        let points = &self.model.body.skin.points;
+        let (mut force, mut middle, mut along) = (0.0, Vec3::zeros(), Vec3::zeros());
+        for candidate in &self.problem.candidates {
+            force += candidate.pressure;
+            middle += points[candidate.vertex as usize] * candidate.pressure;
+            along += candidate.normal * candidate.pressure;
+        }
+        (force > 0.0).then(|| Pressed {
+            middle: middle / force,
+            along: along.normalize(),
+        })
+    }
+
+    /// How far from a point of the skin at rest vertices press, m.
+    pub(super) fn contact_radius(&self, centre: Vec3) -> f64 {
+        let points = &self.model.body.skin.points;
+        self.problem
+            .pressing()
+            .map(|c| (points[c.vertex as usize] - centre).norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// Largest displacement of a vertex that presses, m.
+    pub(super) fn depth(&self) -> f64 {
+        self.problem
+            .pressing()
+            .map(|c| self.state.displacements[self.model.body.node(c.vertex as usize, 0)].norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// The force that residuals are relative to, N: the sum of the contact forces' sizes.
+    pub(super) fn tools_force(&self) -> f64 {
+        let candidates = self.problem.candidates.iter();
+        let size: f64 = candidates.map(|c| c.force().norm()).sum();
+        size.max(LEAST_FORCE)
+    }
+}
+
+/// The least distance of the skin (or of the vertices `among`) from the tools, m, and where at rest
+/// that vertex is, m.
+pub(super) fn nearest_point(
+    model: &Model,
+    displacements: &[Vec3],
+    tools: &[PosedTool],
+    among: Option<&[u32]>,
+) -> (f64, Vec3) {
+    let (distance, vertex) = nearest_vertex(model, displacements, tools, among);
+    (distance, model.body.skin.points[vertex])
+}
+
+/// The least distance of the skin (or of the vertices `among`) from the tools, m, and that vertex.
+pub(super) fn nearest_vertex(
+    model: &Model,
+    displacements: &[Vec3],
+    tools: &[PosedTool],
+    among: Option<&[u32]>,
+) -> (f64, usize) {
+    let mut best = (f64::INFINITY, 0);
+    let mut look = |vertex: usize| {
+        let point = model.body.skin.points[vertex];
+        let x = point + displacements[model.body.node(vertex, 0)];
+        for tool in tools {
+            let distance = tool.tool.distance_at(&tool.pose, &x).distance;
+            if distance < best.0 {
+                best = (distance, vertex);
+            }
+        }
+    };
+    match among {
+        Some(vertices) => vertices.iter().for_each(|&v| look(v as usize)),
+        None => (0..model.body.n_vertices()).for_each(look),
+    }
+    best
+}

@@ -1,0 +1,145 @@
+//! The way back from steps that failed: the last good state, a slower pace, and the start again at
+//! rest.
+
+use palpa_mesh::Vec3;
+
+use super::Live;
+use super::pressed::nearest_vertex;
+use crate::posed_tool::PosedTool;
+
+/// The slowest pace.
+const LEAST_PACE: f64 = 1.0 / 64.0;
+/// Failed steps in a row after which a body begins again at rest.
+const MOST_FAILED: u32 = 8;
+/// How far tools are lifted from a body at rest at a time, m, and how often at most.
+const LIFT: f64 = 2e-3;
+const MOST_LIFTS: usize = 100;
+
+/// The state to come back to, and how fast to go on.
+#[derive(Debug)]
+pub(super) struct Recovery {
+    /// Displacements of the last state near equilibrium, m; up to date in the zone, and everywhere
+    /// if the exterior is followed. `[n_nodes]`
+    displacements: Vec<Vec3>,
+    /// Pressing forces then, N. `[n_vertices]`
+    pressures: Vec<f64>,
+    /// The tools then.
+    tools: Vec<PosedTool>,
+    /// Share of the longest move that a step may make, 1/64 to 1.
+    pub(super) pace: f64,
+    /// Steps in a row that failed.
+    n_failed: u32,
+}
+
+impl Recovery {
+    pub(super) fn new(displacements: &[Vec3], pressures: &[f64], tools: &[PosedTool]) -> Self {
+        Self {
+            displacements: displacements.to_vec(),
+            pressures: pressures.to_vec(),
+            tools: tools.to_vec(),
+            pace: 1.0,
+            n_failed: 0,
+        }
+    }
+
+    /// After a good step.
+    pub(super) fn speed_up(&mut self) {
+        self.pace = (self.pace * 2.0).min(1.0);
+        self.n_failed = 0;
+    }
+
+    /// After a rough step.
+    pub(super) fn slow_down(&mut self) {
+        self.pace = (self.pace * 0.5).max(LEAST_PACE);
+    }
+}
+
+impl Live {
+    /// Keeps the present state as one to come back to.
+    pub(super) fn keep_good(&mut self) {
+        let good = &mut self.recovery;
+        // A linear exterior goes with the zone.
+        if self.exterior.is_followed() {
+            good.displacements
+                .copy_from_slice(&self.state.displacements);
+        } else {
+            for &[node, _] in &self.plan.zone {
+                good.displacements[node as usize] = self.state.displacements[node as usize];
+            }
+        }
+        for &v in &self.plan.vertices {
+            good.pressures[v as usize] = self.skin.pressures[v as usize];
+        }
+        good.tools.copy_from_slice(&self.course.tools);
+    }
+
+    /// After a step that has lost the body: back to the last good state, or after several such
+    /// steps in a row to rest. The tools are followed more slowly from there.
+    pub(super) fn recover(&mut self) {
+        self.recovery.n_failed += 1;
+        if self.recovery.n_failed < MOST_FAILED {
+            self.return_to_good();
+        } else {
+            self.start_again();
+        }
+        self.recovery.pace = (self.recovery.pace * 0.25).max(LEAST_PACE);
+    }
+
+    /// Goes back to the last good state.
+    fn return_to_good(&mut self) {
+        let good = &self.recovery;
+        if self.exterior.is_followed() {
+            self.state
+                .displacements
+                .copy_from_slice(&good.displacements);
+        } else {
+            for &[node, _] in &self.plan.zone {
+                self.state.displacements[node as usize] = good.displacements[node as usize];
+            }
+        }
+        for &v in &self.plan.vertices {
+            self.skin.pressures[v as usize] = good.pressures[v as usize];
+            self.skin.frictions[v as usize] = Vec3::zeros();
+        }
+        self.course.tools.copy_from_slice(&good.tools);
+        self.course.clearance = 0.0;
+        self.springs.take_off();
+        self.forget_forces();
+    }
+
+    /// Begins at rest with the tools off the skin, because no step leads on from the last good
+    /// state.
+    fn start_again(&mut self) {
+        self.recovery.n_failed = 0;
+        self.state.displacements.fill(Vec3::zeros());
+        self.skin.pressures.fill(0.0);
+        self.skin.frictions.fill(Vec3::zeros());
+        self.springs.take_off();
+        self.forget_forces();
+        self.jobs.ask_for_factor();
+        self.exterior.lose();
+        self.lift_tools();
+        self.course.clearance = 0.0;
+        self.keep_good();
+    }
+
+    /// Lifts the tools off the zone's skin.
+    fn lift_tools(&mut self) {
+        let (model, displacements) = (&self.model, &self.state.displacements);
+        let tools = &mut self.course.tools;
+        let (_, vertex) = nearest_vertex(model, displacements, tools, None);
+        let body = &model.body;
+        let outward = body.positions[body.node(vertex, 0)] - body.positions[body.node(vertex, 1)];
+        let step = outward.normalize() * LIFT;
+        for _ in 0..MOST_LIFTS {
+            let among = Some(&*self.plan.vertices);
+            let (gap, _) = nearest_vertex(model, displacements, tools, among);
+            if gap > 0.0 {
+                break;
+            }
+            for tool in tools.iter_mut() {
+                tool.pose.translation.vector += step;
+            }
+        }
+    }
+}

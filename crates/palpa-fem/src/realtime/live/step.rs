@@ -1,0 +1,141 @@
+//! One step: the tools move, the body follows, and the result is judged.
+
+use super::iteration::{Known, Pass};
+use super::report::{LiveReport, StepOutcome};
+use super::{ExteriorState, Live};
+use crate::posed_tool::PosedTool;
+
+/// Residual above which tools are followed more slowly, as a share of the tools' force.
+const ROUGH: f64 = 0.1;
+/// Residual above which a step has lost the body, as a share of the tools' force.
+const LOST: f64 = 0.6;
+
+/// How a step is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    /// Near equilibrium, with the body's own stiffness.
+    Good,
+    /// Something to go on from, but not to come back to or to render.
+    Rough,
+    /// Nothing to go on from.
+    Lost,
+}
+
+impl Live {
+    /// Follows the tools to where they are now; their number must be the one that the body was made
+    /// with. `dt` is the time since the last step, s.
+    pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
+        let mut report = self.begin_step(tools, dt);
+        self.iterations(dt, &mut report);
+        match self.judge(&mut report) {
+            Verdict::Good => {
+                self.recovery.speed_up();
+                self.keep_good();
+                if self.is_still_now(&report) {
+                    self.known = Known::Still;
+                }
+            }
+            Verdict::Rough => {
+                report.outcome = StepOutcome::BackedOff;
+                self.recovery.slow_down();
+            }
+            Verdict::Lost => {
+                report.outcome = StepOutcome::Failed;
+                self.recover();
+            }
+        }
+        if report.outcome != StepOutcome::Failed {
+            self.commit_memory(dt);
+        }
+        self.ask(dt);
+        report
+    }
+
+    /// Moves the tools, and takes over what the step's duration makes of materials that remember.
+    fn begin_step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
+        let is_short = self.move_tools(tools);
+        self.jobs.grow_older();
+        self.problem.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
+        if self.model.has_memory {
+            let (model, state) = (&*self.model, &self.state);
+            self.memory.begin_materials(model, dt);
+            self.inside.batches.begin(model, &mut self.memory, state);
+            if let Some(follower) = self.exterior.follower_mut() {
+                follower.batches.begin(model, &mut self.memory, state);
+            }
+        }
+        LiveReport {
+            outcome: if is_short {
+                StepOutcome::Behind
+            } else {
+                StepOutcome::Arrived
+            },
+            iterations: 0,
+            residual: 0.0,
+            outside: 0.0,
+            n_active: 0,
+            n_candidates: 0,
+            shift: 0.0,
+            spring: 0.0,
+            zone: self.plan.id,
+            factor: self.outside.id,
+        }
+    }
+
+    /// Newton iterations until the zone is in balance, or there have been enough.
+    fn iterations(&mut self, dt: f64, report: &mut LiveReport) {
+        while report.iterations < self.params.max_iterations {
+            let pass = if report.iterations == 0 {
+                Pass::First
+            } else if report.residual < ROUGH && report.shift == 0.0 {
+                // The first iteration has come near: its stiffness and contact directions serve.
+                Pass::Near
+            } else {
+                Pass::Anew
+            };
+            report.iterations += 1;
+            match self.iterate(dt, pass, report) {
+                Ok(()) if report.residual <= self.params.tolerance => break,
+                Ok(()) => {}
+                Err(_) => {
+                    report.outcome = StepOutcome::Failed;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Brings a followed exterior along, unless the zone is lost already, and judges both.
+    fn judge(&mut self, report: &mut LiveReport) -> Verdict {
+        let is_lost = |residual: f64| residual.is_nan() || residual > LOST;
+        // A zone that is lost goes back to where the exterior is known.
+        if report.outcome == StepOutcome::Failed || is_lost(report.residual) {
+            return Verdict::Lost;
+        }
+        let has_failed = self.known != Known::Still && self.bring_exterior().is_err();
+        report.outside = self.exterior.residual() / self.tools_force();
+        if has_failed || is_lost(report.outside) {
+            return Verdict::Lost;
+        }
+        if report.residual.max(report.outside) > ROUGH || report.shift > 0.0 {
+            Verdict::Rough
+        } else {
+            Verdict::Good
+        }
+    }
+
+    /// Ends the step for materials that remember.
+    fn commit_memory(&mut self, dt: f64) {
+        if !self.model.has_memory {
+            return;
+        }
+        let (model, memory) = (&*self.model, &self.memory);
+        self.inside.batches.commit(model, memory, &mut self.state);
+        match &mut self.exterior {
+            ExteriorState::Followed { follower, .. } => {
+                follower.batches.commit(model, memory, &mut self.state);
+            }
+            ExteriorState::Linear { lag, .. } => *lag += dt,
+        }
+    }
+}

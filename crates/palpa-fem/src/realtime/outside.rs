@@ -1,0 +1,314 @@
+//! The exterior: the body outside the zone, whose stiffness is that of an earlier state.
+
+use palpa_mesh::Vec3;
+use palpa_sparse::fronts::{
+    Exterior, FactorScratch, Half, SolveScratch, back_substitute_to, fronts_above, substitute,
+};
+use palpa_sparse::{Block, ColumnPattern};
+use pulp::{Simd, WithSimd};
+
+use super::batch::Batches;
+use super::plan::{Plan, Trouble};
+use crate::model::Model;
+use crate::state::Memory;
+
+/// The rest of the body, linear about a state in the past.
+#[derive(Debug, Clone)]
+pub(super) struct Outside {
+    /// Counts factors.
+    pub(super) id: u64,
+    /// The zone that it is the exterior of.
+    pub(super) plan: u64,
+    pub(super) factor: Exterior<f32>,
+    /// The right side that is left of the exterior's own unknowns after elimination, and what it
+    /// pushes the ring with.
+    right: Vec<f32>,
+    /// Displacements of all nodes about which it is linear, m.
+    pub(super) at: Vec<Vec3>,
+}
+
+impl Outside {
+    pub(super) fn new(model: &Model, plan: &Plan) -> Self {
+        Self {
+            id: 0,
+            plan: plan.id,
+            factor: Exterior::new(&plan.tree),
+            right: vec![0.0; model.structure.n_dofs()],
+            at: vec![Vec3::zeros(); model.n_nodes()],
+        }
+    }
+
+    /// Adds the exterior's force on the ring, at these displacements, to a right side. Cost: the square
+    /// of the ring.
+    pub(super) fn push(
+        &self,
+        plan: &Plan,
+        displacements: &[Vec3],
+        x: &mut [f32],
+        moves: &mut [f32],
+    ) {
+        let n = 3 * plan.ring.len();
+        let first = x.len() - n;
+        let moves = &mut moves[..n];
+        let mut has_moved = false;
+        for &[node, dof] in &plan.ring {
+            let change = displacements[node as usize] - self.at[node as usize];
+            has_moved |= change != Vec3::zeros();
+            for c in 0..3 {
+                moves[dof as usize - first + c] = change[c] as f32;
+            }
+        }
+        let ring = &mut x[first..];
+        for (x, right) in ring.iter_mut().zip(&self.right[first..]) {
+            *x += right;
+        }
+        if has_moved {
+            subtract_symmetric(self.factor.schur(), n, moves, ring);
+        }
+    }
+
+    /// Displacements of the exterior that go with those of the ring: brings `displacements` up to
+    /// date. Cost: a substitution through the exterior; of some columns only, through the fronts
+    /// above them.
+    pub(super) fn settle(
+        &self,
+        model: &Model,
+        plan: &Plan,
+        only: Option<&[u32]>,
+        displacements: &mut [Vec3],
+        x: &mut [f32],
+        scratch: &mut SolveScratch<f32>,
+    ) {
+        if plan.exterior.is_empty() {
+            return;
+        }
+        let wanted =
+            only.map(|columns| fronts_above(&plan.tree, Half::Exterior, columns.iter().copied()));
+        let n = plan.tree.first_zone_dof();
+        x[..n].copy_from_slice(&self.right[..n]);
+        x[n..].fill(0.0);
+        for &[node, dof] in &plan.ring {
+            let change = displacements[node as usize] - self.at[node as usize];
+            for c in 0..3 {
+                x[dof as usize + c] = change[c] as f32;
+            }
+        }
+        let (tree, wanted) = (&plan.tree, wanted.as_deref());
+        back_substitute_to(tree, Half::Exterior, wanted, &self.factor, x, scratch);
+        let mut put = |node: usize, dof: usize| {
+            let change = Vec3::from_fn(|c, _| f64::from(x[dof + c]));
+            let change = model.supports[node].free_part(&change);
+            displacements[node] = self.at[node] + change;
+        };
+        match only {
+            Some(columns) => columns.iter().for_each(|&v| {
+                let first = tree.first_dof(v as usize);
+                (0..model.structure.n_free_levels)
+                    .for_each(|l| put(model.body.node(v as usize, l), first + 3 * l));
+            }),
+            None => (plan.exterior.iter()).for_each(|&[n, dof]| put(n as usize, dof as usize)),
+        }
+    }
+
+    /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a model, its zone and two rooms to work in"
+    )]
+    pub(super) fn refactor(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        follower: &mut Follower,
+        workshop: &mut Workshop,
+        displacements: &[Vec3],
+    ) -> Result<(), Trouble> {
+        if !plan.exterior.is_empty() {
+            workshop.blocks.fill([0.0; 9]);
+            follower
+                .batches
+                .add_stiffness(model, memory, displacements, &mut workshop.blocks)?;
+            plan.support(model, pattern, false, &mut workshop.blocks);
+            self.factor
+                .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
+        }
+        // The stiffness is the true one: nothing can have turned.
+        follower.forces.fill(Vec3::zeros());
+        follower.share = 1.0;
+        self.follow(model, memory, plan, follower, displacements)?;
+        Ok(())
+    }
+
+    /// Is linear about other displacements, with the stiffness that it has. Cost: forces of the
+    /// exterior's prisms and a substitution. Returns the exterior's own forces out of balance, N.
+    pub(super) fn follow(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        plan: &Plan,
+        follower: &mut Follower,
+        displacements: &[Vec3],
+    ) -> Result<f64, Trouble> {
+        if plan.exterior.is_empty() {
+            return Ok(0.0);
+        }
+        std::mem::swap(&mut follower.forces, &mut follower.before);
+        follower.forces.fill(Vec3::zeros());
+        follower
+            .batches
+            .add_forces(model, memory, displacements, &mut follower.forces)?;
+        self.at.copy_from_slice(displacements);
+        self.right[plan.tree.first_zone_dof()..].fill(0.0);
+        let mut put = |node: u32, dof: u32| {
+            let force = model.supports[node as usize].free_part(&follower.forces[node as usize]);
+            for c in 0..3 {
+                self.right[dof as usize + c] = -force[c] as f32;
+            }
+            force
+        };
+        let (mut square, mut turned) = (0.0, 0.0);
+        for &[node, dof] in &plan.exterior {
+            let force = put(node, dof);
+            square += force.norm_squared();
+            turned += force.dot(&follower.before[node as usize]);
+        }
+        for &[node, dof] in &plan.ring {
+            put(node, dof);
+        }
+        follower.relax(turned);
+        if follower.share < 1.0 {
+            let share = follower.share as f32;
+            let n = plan.tree.first_zone_dof();
+            self.right[..n].iter_mut().for_each(|x| *x *= share);
+        }
+        let right = &mut self.right;
+        substitute(
+            &plan.tree,
+            Half::Exterior,
+            &self.factor,
+            right,
+            &mut follower.solve,
+        );
+        Ok(square.sqrt())
+    }
+}
+
+/// The exterior's prisms and scratch.
+#[derive(Debug)]
+pub(super) struct Follower {
+    pub(super) batches: Batches,
+    forces: Vec<Vec3>,
+    before: Vec<Vec3>,
+    /// Share of its forces out of balance that is taken back at once.
+    share: f64,
+    pub(super) solve: SolveScratch<f32>,
+}
+
+impl Follower {
+    pub(super) fn new(
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        with_tangent: bool,
+    ) -> Self {
+        Self {
+            batches: Batches::new(
+                model,
+                memory,
+                pattern,
+                &|group| !plan.holds(group),
+                with_tangent,
+            ),
+            forces: vec![Vec3::zeros(); model.n_nodes()],
+            before: vec![Vec3::zeros(); model.n_nodes()],
+            share: 1.0,
+            solve: SolveScratch::new(&plan.tree),
+        }
+    }
+
+    /// Where forces turn back on themselves from step to step (`turned` is the product of two) the
+    /// old stiffness is less than half the true one somewhere, and to take them back whole would
+    /// raise them.
+    fn relax(&mut self, turned: f64) {
+        /// The least share, and its growth where they do not turn.
+        const LEAST: f64 = 0.2;
+        const GROWTH: f64 = 1.1;
+        self.share = if turned < 0.0 {
+            (0.5 * self.share).max(LEAST)
+        } else {
+            (GROWTH * self.share).min(1.0)
+        };
+    }
+}
+
+/// Where exteriors are factored.
+#[derive(Debug)]
+pub(super) struct Workshop {
+    blocks: Vec<Block<f32>>,
+    scratch: FactorScratch<f32>,
+    pub(super) x: Vec<f32>,
+}
+
+impl Workshop {
+    pub(super) fn new(model: &Model, pattern: &ColumnPattern, plan: &Plan) -> Self {
+        Self {
+            blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
+            scratch: FactorScratch::new(&plan.tree, Half::Exterior),
+            x: vec![0.0; model.structure.n_dofs()],
+        }
+    }
+}
+
+/// `y −= A x` of a symmetric matrix whose lower triangle is given, column by column.
+fn subtract_symmetric(a: &[f32], n: usize, x: &[f32], y: &mut [f32]) {
+    pulp::Arch::new().dispatch(SubtractSymmetric { a, n, x, y });
+}
+
+// A struct, so that it is compiled for the machine's vectors: a closure is not always inlined where
+// it is called.
+struct SubtractSymmetric<'a> {
+    a: &'a [f32],
+    n: usize,
+    x: &'a [f32],
+    y: &'a mut [f32],
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
+)]
+impl WithSimd for SubtractSymmetric<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { a, n, x, y } = self;
+        for j in 0..n {
+            let column = &a[j * n + j + 1..(j + 1) * n];
+            let factor = x[j];
+            let (_, below) = y.split_at_mut(j + 1);
+            let mut lanes = [0.0_f32; 16];
+            let chunks = column.len() / 16 * 16;
+            for (k, (a, x)) in column[..chunks]
+                .chunks_exact(16)
+                .zip(x[j + 1..].chunks_exact(16))
+                .enumerate()
+            {
+                let y = &mut below[16 * k..16 * k + 16];
+                for i in 0..16 {
+                    y[i] -= a[i] * factor;
+                    lanes[i] += a[i] * x[i];
+                }
+            }
+            let mut sum: f32 = lanes.iter().sum();
+            for k in chunks..column.len() {
+                below[k] -= column[k] * factor;
+                sum += column[k] * x[j + 1 + k];
+            }
+            y[j] -= a[j * n + j] * factor + sum;
+        }
+    }
+}

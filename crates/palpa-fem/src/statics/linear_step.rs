@@ -1,0 +1,97 @@
+//! The step of a Newton iteration: the solution of the linear system, with friction and with kept
+//! factors.
+
+use palpa_mesh::Vec3;
+
+use super::newton::Newton;
+use super::workspace::Workspace;
+use crate::gmres::gmres;
+use crate::system::Hold;
+
+/// Residual of a linear system with friction, relative to its right side.
+const GMRES_TOLERANCE: f64 = 1e-6;
+/// Longest basis for it.
+const GMRES_VECTORS: usize = 40;
+/// The same with the factor of an earlier iteration: a smaller residual would save no iteration,
+/// and beyond that many vectors a new factor is cheaper.
+const STALE_TOLERANCE: f64 = 1e-3;
+const STALE_VECTORS: usize = 16;
+
+impl Newton<'_> {
+    /// Finds the step `δ`: the demand in held directions, and the balance of the linearised forces
+    /// in free ones. Returns whether they are in balance, which an old factor may not achieve.
+    ///
+    /// Friction at a sliding vertex grows with its pressure, which makes the stiffness unsymmetric,
+    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good guess for
+    /// GMRES, as is that of a stiffness which has changed little, under constraints of which few
+    /// have changed.
+    pub(super) fn solve(&self, ws: &mut Workspace, is_stale: bool) -> bool {
+        let structure = &self.model.structure;
+        let Workspace {
+            system,
+            contact_forces,
+            right_side,
+            demand,
+            delta,
+            predicted,
+            holds,
+            contacts,
+            added,
+            ..
+        } = ws;
+        predicted.fill(Vec3::zeros());
+        let mut carried = vec![Vec3::zeros(); right_side.len()];
+        structure.multiply(&system.blocks, demand, &mut carried);
+        let sliding = contacts.sliding(contact_forces);
+        couple(&sliding, &mut carried);
+        for ((force, carried), hold) in right_side.iter().zip(&mut carried).zip(holds.iter()) {
+            *carried = hold.free_part(&-(*force + *carried));
+        }
+        let mut is_solved = true;
+        if sliding.is_empty() && !is_stale {
+            system.solve(structure, &carried, delta);
+        } else {
+            let (tolerance, most) = if is_stale {
+                (STALE_TOLERANCE, STALE_VECTORS)
+            } else {
+                (GMRES_TOLERANCE, GMRES_VECTORS)
+            };
+            let solution = gmres(&carried, tolerance, most, |x, out| {
+                system.solve(structure, x, delta);
+                keep_free(holds, delta);
+                out.clear();
+                out.resize(x.len(), Vec3::zeros());
+                structure.multiply(&system.blocks, delta, out);
+                couple(&sliding, out);
+                keep_free(holds, out);
+            });
+            is_solved = solution.residual <= tolerance;
+            system.solve(structure, &solution.vector, delta);
+            keep_free(holds, delta);
+        }
+        for (delta, demand) in delta.iter_mut().zip(demand.iter()) {
+            *delta += demand;
+        }
+        structure.multiply(&system.blocks, delta, predicted);
+        // The stiffness that contact has added is not the body's.
+        for (contact, (_, stiffness)) in contacts.active.iter().zip(added.iter()) {
+            predicted[contact.node] -= stiffness * delta[contact.node];
+        }
+        is_solved
+    }
+}
+
+/// Gives sliding vertices the friction of the pressure in `forces`: `f −= μ d (n · f)`.
+fn couple(sliding: &[(usize, Vec3, Vec3)], forces: &mut [Vec3]) {
+    for (node, friction, normal) in sliding {
+        let pressure = normal.dot(&forces[*node]);
+        forces[*node] -= friction * pressure;
+    }
+}
+
+/// Takes from every vector its part in held directions.
+fn keep_free(holds: &[Hold], vectors: &mut [Vec3]) {
+    for (vector, hold) in vectors.iter_mut().zip(holds) {
+        *vector = hold.free_part(vector);
+    }
+}
