@@ -141,7 +141,7 @@ impl Rebuild {
             let x = &mut shop.workshop.x;
             old.settle(&model, plan, None, &mut self.displacements, x, &mut scratch);
         }
-        let past = Past {
+        let past = ExteriorMemory {
             memory: &mut self.memory,
             displacements: &self.displacements,
             is_linear: self.old.is_some(),
@@ -191,7 +191,7 @@ impl Rebuild {
 }
 
 /// The memory of the exterior's prisms, which may be behind.
-struct Past<'a> {
+struct ExteriorMemory<'a> {
     memory: &'a mut Memory,
     displacements: &'a [Vec3],
     /// Whether the exterior answers linearly, so that only shops move its memory on.
@@ -200,7 +200,7 @@ struct Past<'a> {
     lag: f64,
 }
 
-impl Past<'_> {
+impl ExteriorMemory<'_> {
     /// Brings the memory in a shop up to date. `history` has that of the prisms which no shop has;
     /// that of `other`, the shop of another zone, is added to it.
     fn bring_up(

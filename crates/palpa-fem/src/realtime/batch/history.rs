@@ -1,0 +1,103 @@
+//! Memory of viscous pairs on its way from batch to batch.
+
+use super::super::kernel::N_POINTS;
+use super::Batches;
+use crate::Material;
+use crate::law::Prony;
+use crate::model::Model;
+
+/// Memory of all pairs of a body, on its way from zone to zone.
+#[derive(Debug, Clone)]
+pub(in super::super) struct History {
+    n_rows: usize,
+    /// `[pair][row][six stresses at six points, pressure]`, Pa
+    numbers: Vec<f64>,
+    /// Whether a pair's memory is here. `[pair]`
+    is_known: Vec<bool>,
+}
+
+/// How many numbers a row of a pair has.
+const ROW: usize = 6 * N_POINTS + 1;
+
+impl History {
+    pub(in super::super) fn new(model: &Model) -> Self {
+        let rows = |m: &Material| m.prony.as_ref().map_or(0, Prony::n_rows);
+        let n_rows = model.materials.iter().map(rows).max().unwrap_or(0);
+        let n_pairs = if model.has_memory {
+            model.geometries.len()
+        } else {
+            0
+        };
+        Self {
+            n_rows,
+            numbers: vec![0.0; n_pairs * n_rows * ROW],
+            is_known: vec![false; n_pairs],
+        }
+    }
+
+    /// Takes over the memory of the pairs of another body in which this pair's two wedges are;
+    /// `old` has for each wedge the pair, and which of its two wedges.
+    pub(in super::super) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
+        if !old.iter().all(|&(old, _)| from.is_known[old]) {
+            return;
+        }
+        self.is_known[pair] = true;
+        for row in 0..self.n_rows {
+            let into = self.row(pair, row);
+            let into = &mut self.numbers[into];
+            let [a, b] = old.map(|(old, _)| &from.numbers[from.row(old, row)]);
+            let mean = |i: usize| 0.5 * (a[i] + b[i]);
+            // The means of a pair at its two depths, and its pressure.
+            (0..12).chain([ROW - 1]).for_each(|i| into[i] = mean(i));
+            for ((k, (_, half)), old) in old.into_iter().enumerate().zip([a, b]) {
+                into[12 * (k + 1)..12 * (k + 2)]
+                    .copy_from_slice(&old[12 * (half + 1)..12 * (half + 2)]);
+            }
+        }
+    }
+
+    fn row(&self, pair: usize, row: usize) -> std::ops::Range<usize> {
+        let first = (pair * self.n_rows + row) * ROW;
+        first..first + ROW
+    }
+}
+
+impl Batches {
+    /// Puts the memory of these pairs into a history.
+    pub(in super::super) fn store(&self, history: &mut History) {
+        for batch in &self.full {
+            let Some(past) = &batch.past else { continue };
+            for (lane, &pair) in batch.pairs.iter().enumerate().take(batch.n) {
+                history.is_known[pair as usize] = true;
+                for (r, row) in past.rows.iter().enumerate() {
+                    let range = history.row(pair as usize, r);
+                    let numbers = row.stress.iter().flatten().chain([&row.pressure]);
+                    for (into, from) in history.numbers[range].iter_mut().zip(numbers) {
+                        *into = from[lane];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes the memory of these pairs from a history, as far as it has it.
+    pub(in super::super) fn load(&mut self, history: &History) {
+        for batch in &mut self.full {
+            let Some(past) = &mut batch.past else {
+                continue;
+            };
+            for (lane, &pair) in batch.pairs.iter().enumerate() {
+                if !history.is_known[pair as usize] {
+                    continue;
+                }
+                for (r, row) in past.rows.iter_mut().enumerate() {
+                    let range = history.row(pair as usize, r);
+                    let numbers = row.stress.iter_mut().flatten().chain([&mut row.pressure]);
+                    for (into, from) in numbers.zip(&history.numbers[range]) {
+                        into[lane] = *from;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Pairs of prisms in batches of sixteen, of one interval and one kind of law, as the kernel takes
+//! them.
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | `mod` | [`Batches`]: the prisms of a part of a body, their forces and stiffness |
+//! | `lane_batch` | one batch of sixteen pairs, and how it is filled |
+//! | `passes` | forces, stiffness and memory of all batches, in the machine's vectors |
+//! | `single_pair` | a pair whose law is not one of the kernel's |
+//! | `places` | where nodes and blocks are |
+//! | `history` | memory on its way from zone to zone |
+
+mod history;
+mod lane_batch;
+mod passes;
+mod places;
+mod single_pair;
+
+use palpa_mesh::Vec3;
+use palpa_sparse::{Block, ColumnPattern};
+use pulp::Arch;
+
+use super::kernel::{Local, N_POINTS, WIDTH};
+use crate::assembly::{Inverted, phases_at};
+use crate::columns::SurfaceGroup;
+use crate::element::{GroupResponse, PhaseAt};
+use crate::law::Hardening;
+use crate::model::Model;
+use crate::state::{Memory, State};
+use lane_batch::LaneBatch;
+use passes::{Forces, Remember, Tangents};
+use places::{kernel_columns, places};
+use single_pair::{SinglePair, group_nodes, inverted};
+
+pub(super) use history::History;
+
+/// Set in the place of a block that is to be added turned.
+const TURNED: u32 = 1 << 31;
+
+/// The prisms of some part of a body.
+#[derive(Debug)]
+pub(super) struct Batches {
+    full: Vec<Box<LaneBatch>>,
+    others: Vec<SinglePair>,
+    local_double: Box<Local<f64>>,
+    local_single: Box<Local<f32>>,
+    response: GroupResponse,
+}
+
+/// Half the shear modulus of a group at rest at each point, Pa, its bulk modulus times its volume,
+/// J, and how it hardens; none if its law is not one of the kernel's.
+fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f64, Hardening)> {
+    if has_memory && phases.len() > 1 {
+        return None;
+    }
+    let mut slopes = [0.0; N_POINTS];
+    let mut bulk = 0.0;
+    let mut common = None;
+    for at in phases {
+        let (slope, hardening, k) = at.law.hardening()?;
+        if *common.get_or_insert(hardening) != hardening {
+            return None;
+        }
+        for (sum, share) in slopes.iter_mut().zip(at.phase.points) {
+            *sum += slope * share;
+        }
+        bulk += k * at.phase.volume;
+    }
+    common.map(|hardening| (slopes, bulk, hardening))
+}
+
+impl Batches {
+    /// The prisms under the groups that `keep` names. With tangents they can be assembled into
+    /// blocks of the pattern.
+    pub(super) fn new(
+        model: &Model,
+        memory: &Memory,
+        pattern: &ColumnPattern,
+        keep: &dyn Fn(&SurfaceGroup) -> bool,
+        with_tangent: bool,
+    ) -> Self {
+        let mut batches: Vec<Box<LaneBatch>> = Vec::new();
+        let mut others = Vec::new();
+        let mut phases = Vec::new();
+        let n_groups = model.n_groups();
+        for i in 0..model.body.n_levels - 1 {
+            // Batches of this interval that have room.
+            let mut open: Vec<usize> = Vec::new();
+            for (g, group) in model.structure.groups.iter().enumerate() {
+                if !keep(group) {
+                    continue;
+                }
+                let pair = i * n_groups + g;
+                phases_at(model, memory, pair, &mut phases);
+                let columns = kernel_columns(group);
+                let Some((slopes, bulk, hardening)) = lane(&phases, model.has_memory) else {
+                    others.push(SinglePair {
+                        pair: pair as u32,
+                        blocks: places(model, pattern, group, i, [0, 1, 2, 3]),
+                    });
+                    continue;
+                };
+                let past = model.has_memory.then(|| phases[0].phase.material as usize);
+                let with_room = open.iter().find(|&&b| {
+                    let batch = &batches[b];
+                    batch.hardening == hardening && batch.past.as_ref().map(|p| p.material) == past
+                });
+                let index = with_room.copied().unwrap_or(batches.len());
+                if index == batches.len() {
+                    let batch = LaneBatch::empty(model, hardening, with_tangent, past);
+                    batches.push(Box::new(batch));
+                    open.push(index);
+                }
+                batches[index].push(model, pattern, g, i, columns);
+                batches[index].stiffen(slopes, bulk);
+                if batches[index].n == WIDTH {
+                    open.retain(|&b| b != index);
+                }
+            }
+        }
+        for batch in &mut batches {
+            batch.fill();
+        }
+        Self {
+            full: batches,
+            others,
+            local_double: Box::new(Local::new()),
+            local_single: Box::new(Local::new()),
+            response: GroupResponse::new(),
+        }
+    }
+
+    /// Begins a step: takes over stiffness and constant stresses of materials that remember.
+    /// `memory` has begun with the step's duration.
+    pub(super) fn begin(&mut self, model: &Model, memory: &mut Memory, state: &State) {
+        if !model.has_memory {
+            return;
+        }
+        self.begin_others(model, memory, state);
+        self.begin_lanes(memory);
+    }
+
+    /// The same for the pairs that are not in lanes.
+    pub(super) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
+        for other in &self.others {
+            memory.begin_group(model, state, other.pair as usize);
+        }
+    }
+
+    /// The same for the pairs in lanes.
+    pub(super) fn begin_lanes(&mut self, memory: &Memory) {
+        for batch in &mut self.full {
+            batch.begin(memory);
+        }
+    }
+
+    /// Ends a step: every point remembers.
+    pub(super) fn commit(&mut self, model: &Model, memory: &Memory, state: &mut State) {
+        if !model.has_memory {
+            return;
+        }
+        self.commit_others(model, memory, state);
+        self.commit_lanes(memory, &state.displacements);
+    }
+
+    /// The same for the pairs that are not in lanes.
+    pub(super) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
+        for other in &self.others {
+            memory.commit_group(model, state, other.pair as usize);
+        }
+    }
+
+    /// The same for those that are.
+    pub(super) fn commit_lanes(&mut self, memory: &Memory, displacements: &[Vec3]) {
+        Arch::new().dispatch(Remember {
+            full: &mut self.full,
+            local: &mut self.local_double,
+            displacements,
+            memory,
+        });
+    }
+
+    /// Adds `∂W/∂u` of these prisms, N.
+    pub(super) fn add_forces(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        forces: &mut [Vec3],
+    ) -> Result<(), Inverted> {
+        let pass = Forces {
+            full: &self.full,
+            local: &mut self.local_double,
+            displacements,
+            into: forces,
+        };
+        Arch::new()
+            .dispatch(pass)
+            .map_err(|pair| inverted(model, pair))?;
+        let mut phases = Vec::new();
+        for other in &self.others {
+            let response = &mut self.response;
+            other.evaluate(model, memory, displacements, &mut phases, response, false)?;
+            let (group, nodes) = group_nodes(model, other.pair as usize);
+            for (n, &node) in nodes.iter().enumerate().take(group.n_nodes()) {
+                forces[node] += self.response.forces[n];
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the stiffness of these prisms to the blocks of the pattern, N/m. One block past the
+    /// pattern's end takes the blocks of nodes that cannot move.
+    pub(super) fn add_stiffness(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        blocks: &mut [Block<f32>],
+    ) -> Result<(), Inverted> {
+        let pass = Tangents {
+            full: &self.full,
+            local: &mut self.local_single,
+            displacements,
+            blocks,
+        };
+        Arch::new()
+            .dispatch(pass)
+            .map_err(|pair| inverted(model, pair))?;
+        let mut phases = Vec::new();
+        for other in &self.others {
+            let response = &mut self.response;
+            other.evaluate(model, memory, displacements, &mut phases, response, true)?;
+            other.add_blocks(response, blocks);
+        }
+        Ok(())
+    }
+}

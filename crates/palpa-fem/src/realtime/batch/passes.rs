@@ -1,0 +1,195 @@
+//! Passes over all batches in the machine's vectors: forces, stiffness, memory.
+
+#![expect(
+    clippy::inline_always,
+    reason = "compiled in its caller with the machine's instructions"
+)]
+
+use palpa_mesh::Vec3;
+use palpa_sparse::Block;
+use palpa_sparse::fronts::Number;
+use pulp::{Simd, WithSimd};
+
+use super::super::kernel::{Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, WIDTH};
+use super::super::lanes::{Doubles, Lanes, Singles};
+use super::TURNED;
+use super::lane_batch::{LaneBatch, Numbers};
+use crate::law::Hardening;
+use crate::state::Memory;
+
+/// Moves the memories of all batches on.
+pub(super) struct Remember<'a> {
+    pub(super) full: &'a mut [Box<LaneBatch>],
+    pub(super) local: &'a mut Local<f64>,
+    pub(super) displacements: &'a [Vec3],
+    pub(super) memory: &'a Memory,
+}
+
+impl WithSimd for Remember<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let zero = [0.0; WIDTH];
+        let mut new = Constant {
+            stress: [[zero; 6]; N_POINTS],
+            pressure: zero,
+        };
+        for batch in self.full {
+            let Some(past) = &mut batch.past else {
+                continue;
+            };
+            let Some(step) = self.memory.step_of(past.material) else {
+                continue;
+            };
+            self.local.gather(&batch.nodes, self.displacements);
+            for at in (0..WIDTH).step_by(Doubles::<S>::N) {
+                LaneGroup::<Doubles<S>>::new(
+                    simd,
+                    at,
+                    &batch.double.geometry,
+                    &past.rest,
+                    None,
+                    batch.hardening,
+                )
+                .elastic(self.local, &mut new);
+            }
+            let (decay, gain) = step.factors();
+            let Some((last, rows)) = past.rows.split_first_mut() else {
+                continue;
+            };
+            for (row, (decay, gain)) in rows.iter_mut().zip(decay.iter().zip(&gain)) {
+                let into = row.stress.iter_mut().flatten().chain([&mut row.pressure]);
+                let old = last.stress.iter().flatten().chain([&last.pressure]);
+                let now = new.stress.iter().flatten().chain([&new.pressure]);
+                for ((into, old), now) in into.zip(old).zip(now) {
+                    for lane in 0..WIDTH {
+                        into[lane] = decay * into[lane] + gain * (now[lane] - old[lane]);
+                    }
+                }
+            }
+            last.clone_from(&new);
+        }
+    }
+}
+
+impl<E: Number> Local<E> {
+    pub(super) fn new() -> Self {
+        let zero = [E::default(); WIDTH];
+        Self {
+            displacements: [[zero; 3]; N_NODES],
+            forces: [[zero; 3]; N_NODES],
+            stiffness: [[zero; 9]; N_BLOCKS],
+        }
+    }
+
+    #[inline(always)]
+    fn gather(&mut self, nodes: &[[u32; WIDTH]; N_NODES], displacements: &[Vec3]) {
+        for (rows, nodes) in self.displacements.iter_mut().zip(nodes) {
+            for (lane, &node) in nodes.iter().enumerate() {
+                let u = &displacements[node as usize];
+                for c in 0..3 {
+                    rows[c][lane] = E::nearest(u[c]);
+                }
+            }
+        }
+    }
+}
+
+/// A batch in one precision; returns whether all its points are the right way out.
+#[inline(always)]
+fn run<R: Lanes, const TANGENT: bool>(
+    token: R::Token,
+    numbers: &Numbers<R::Element>,
+    hardening: Hardening,
+    local: &mut Local<R::Element>,
+) -> bool {
+    let mut least = [R::Element::nearest(1.0); WIDTH];
+    for at in (0..WIDTH).step_by(R::N) {
+        let constant = numbers.constant.as_ref();
+        LaneGroup::<R>::new(
+            token,
+            at,
+            &numbers.geometry,
+            &numbers.stiffness,
+            constant,
+            hardening,
+        )
+        .evaluate::<TANGENT>(local)
+        .store(&mut least[at..]);
+    }
+    least.iter().all(|&j| j > R::Element::default())
+}
+
+/// Adds the forces of all batches, N; the error is a pair of the batch with a prism inside out.
+pub(super) struct Forces<'a> {
+    pub(super) full: &'a [Box<LaneBatch>],
+    pub(super) local: &'a mut Local<f64>,
+    pub(super) displacements: &'a [Vec3],
+    pub(super) into: &'a mut [Vec3],
+}
+
+impl WithSimd for Forces<'_> {
+    type Output = Result<(), u32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        for batch in self.full {
+            self.local.gather(&batch.nodes, self.displacements);
+            if !run::<Doubles<S>, false>(simd, &batch.double, batch.hardening, self.local) {
+                return Err(batch.pairs[0]);
+            }
+            for (rows, nodes) in self.local.forces.iter().zip(&batch.nodes) {
+                for (lane, &node) in nodes.iter().enumerate().take(batch.n) {
+                    let force = &mut self.into[node as usize];
+                    for c in 0..3 {
+                        force[c] += rows[c][lane];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds the stiffness of all batches, N/m; the error is as of [`Forces`].
+pub(super) struct Tangents<'a> {
+    pub(super) full: &'a [Box<LaneBatch>],
+    pub(super) local: &'a mut Local<f32>,
+    pub(super) displacements: &'a [Vec3],
+    pub(super) blocks: &'a mut [Block<f32>],
+}
+
+impl WithSimd for Tangents<'_> {
+    type Output = Result<(), u32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        for batch in self.full {
+            let Some((single, places)) = &batch.tangent else {
+                continue;
+            };
+            self.local.gather(&batch.nodes, self.displacements);
+            if !run::<Singles<S>, true>(simd, single, batch.hardening, self.local) {
+                return Err(batch.pairs[0]);
+            }
+            for (rows, places) in self.local.stiffness.iter().zip(places) {
+                for (lane, &place) in places.iter().enumerate().take(batch.n) {
+                    let into = &mut self.blocks[(place & !TURNED) as usize];
+                    // Rows hold entry (r, c) at 3 r + c, blocks at r + 3 c.
+                    for r in 0..3 {
+                        for c in 0..3 {
+                            let at = if place & TURNED == 0 {
+                                r + 3 * c
+                            } else {
+                                c + 3 * r
+                            };
+                            into[at] += rows[3 * r + c][lane];
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! Deformation of the wedges of a pair, and of its units: the two wedges and their mean.
+
+#![expect(
+    clippy::inline_always,
+    clippy::needless_range_loop,
+    reason = "one piece of arithmetic on several arrays, compiled in its caller with the machine's instructions"
+)]
+
+use super::algebra::{M3, V3, axpy, cofactor, dot};
+use super::{LaneGroup, Lanes, Local, N_NODES};
+
+/// Deformation and change of volume of the two wedges at their points.
+pub(super) struct Wedges<R> {
+    /// Deformation gradients. `[wedge][point]`
+    pub(super) f: [[M3<R>; 2]; 2],
+    /// m³. `[wedge][point]`
+    pub(super) volumes: [[R; 2]; 2],
+    /// `Σ V (J − 1)`, m³.
+    pub(super) change: R,
+    /// `Σ V`, m³.
+    pub(super) total: R,
+    /// Least volume ratio of a point, at most 1.
+    pub(super) least: R,
+}
+
+/// Nodes, gradients and deformation of a unit: N nodes, two depth points.
+pub(super) struct Unit<R, const N: usize> {
+    /// Gradients of the shape functions, 1/m. `[point][node]`
+    pub(super) gradients: [[V3<R>; N]; 2],
+    /// Deformation gradients. `[point]`
+    pub(super) f: [M3<R>; 2],
+    /// m³. `[point]`
+    pub(super) volumes: [R; 2],
+    /// Weight of its deviator, 0 to 1.
+    pub(super) weight: R,
+    /// First of its points.
+    pub(super) point: usize,
+    /// First of its nodes.
+    pub(super) node: usize,
+}
+
+impl<R: Lanes> Wedges<R> {
+    #[inline(always)]
+    pub(super) fn new(group: &LaneGroup<'_, R>, local: &Local<R::Element>) -> Self {
+        let (zero, one) = (group.splat(0.0), group.splat(1.0));
+        let geometry = group.geometry;
+        let mut wedges = Self {
+            f: [[[[zero; 3]; 3]; 2]; 2],
+            volumes: [[zero; 2]; 2],
+            change: zero,
+            total: zero,
+            least: one,
+        };
+        for w in 0..2 {
+            for q in 0..2 {
+                let mut h = [[zero; 3]; 3];
+                for n in 0..6 {
+                    let g = group.load3(&geometry.gradients[w][q][n]);
+                    let u = group.load3(&local.displacements[2 * w + n]);
+                    for r in 0..3 {
+                        h[r] = axpy(u[r], &g, &h[r]);
+                    }
+                }
+                for r in 0..3 {
+                    h[r][r] = h[r][r] + one;
+                }
+                let volume = group.load(&geometry.volumes[w][q]);
+                let j = dot(&h[0], &cofactor(&h)[0]);
+                wedges.f[w][q] = h;
+                wedges.volumes[w][q] = volume;
+                wedges.least = wedges.least.min(j);
+                wedges.change = volume.mul_add(j - one, wedges.change);
+                wedges.total = wedges.total + volume;
+            }
+        }
+        wedges
+    }
+
+    /// One of the wedges as a unit.
+    #[inline(always)]
+    pub(super) fn wedge(&self, group: &LaneGroup<'_, R>, w: usize, weight: R) -> Unit<R, 6> {
+        let mut gradients = [[[group.splat(0.0); 3]; 6]; 2];
+        for q in 0..2 {
+            for n in 0..6 {
+                gradients[q][n] = group.load3(&group.geometry.gradients[w][q][n]);
+            }
+        }
+        Unit {
+            gradients,
+            f: self.f[w],
+            volumes: self.volumes[w],
+            weight,
+            point: 2 + 2 * w,
+            node: 2 * w,
+        }
+    }
+
+    /// The mean of both wedges as a unit.
+    #[inline(always)]
+    pub(super) fn mean(&self, group: &LaneGroup<'_, R>, weight: R) -> Unit<R, N_NODES> {
+        let zero = group.splat(0.0);
+        let (volumes, shares) = self.shares(group.splat(1.0));
+        let mut gradients = [[[zero; 3]; N_NODES]; 2];
+        for q in 0..2 {
+            for w in 0..2 {
+                for n in 0..6 {
+                    let g = group.load3(&group.geometry.gradients[w][q][n]);
+                    gradients[q][2 * w + n] = axpy(shares[w][q], &g, &gradients[q][2 * w + n]);
+                }
+            }
+        }
+        Unit {
+            gradients,
+            f: self.mean_deformation(zero, &shares),
+            volumes,
+            weight,
+            point: 0,
+            node: 0,
+        }
+    }
+
+    /// Volumes of both wedges together at the two depths, m³, and each wedge's share of them.
+    /// `[point]`, `[wedge][point]`
+    #[inline(always)]
+    pub(super) fn shares(&self, one: R) -> ([R; 2], [[R; 2]; 2]) {
+        let volumes = &self.volumes;
+        let (mut sums, mut shares) = ([one; 2], [[one; 2]; 2]);
+        for q in 0..2 {
+            sums[q] = volumes[0][q] + volumes[1][q];
+            let inverse = one.divided_by(sums[q]);
+            for w in 0..2 {
+                shares[w][q] = volumes[w][q] * inverse;
+            }
+        }
+        (sums, shares)
+    }
+
+    /// Mean deformation gradients at the two depths.
+    #[inline(always)]
+    pub(super) fn mean_deformation(&self, zero: R, shares: &[[R; 2]; 2]) -> [M3<R>; 2] {
+        let mut mean = [[[zero; 3]; 3]; 2];
+        for q in 0..2 {
+            for w in 0..2 {
+                for r in 0..3 {
+                    mean[q][r] = axpy(shares[w][q], &self.f[w][q][r], &mean[q][r]);
+                }
+            }
+        }
+        mean
+    }
+}
