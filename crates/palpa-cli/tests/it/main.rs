@@ -1,4 +1,4 @@
-//! Integration tests of the command and of what it writes.
+//! Integration tests of the command and its files.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,3 +11,10 @@ mod press;
 mod press_tissue;
 mod verify;
 mod view;
+
+use palpa_testkit::Bench;
+
+/// The command in an empty folder of its own.
+fn palpa() -> Bench {
+    Bench::new(env!("CARGO_BIN_EXE_palpa"))
+}
