@@ -1,4 +1,4 @@
-//! Integration tests of the command and its files.
+//! Integration tests of the command and its files, and of force while the mesh moves.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,6 +7,7 @@ mod check;
 mod cli;
 mod export;
 mod live;
+mod mesh_moves;
 mod press;
 mod press_tissue;
 mod verify;

@@ -144,6 +144,7 @@ fn the_list_names_every_case() {
     let bench = palpa();
     let (code, stdout, _) = bench.run(&["verify", "--list"]);
     assert_eq!(code, 0);
+    assert!(!palpa_lab::verify::cases().is_empty());
     for case in palpa_lab::verify::cases() {
         let name = case.name.replace(' ', "-");
         assert!(stdout.contains(&name) && stdout.contains(case.title));

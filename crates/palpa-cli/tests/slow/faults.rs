@@ -51,23 +51,26 @@ impl Run {
         self.until("ticks go on", |tick| tick.tick.tick >= begin + n);
     }
 
-    /// Waits until the log has one more event with a text than before `act`.
-    fn until_said(&mut self, text: &str, act: impl FnOnce(&FaultHooks)) {
+    /// Waits until the log has so many more events with a text than before `act`.
+    fn until_said(&mut self, text: &str, n: usize, act: impl FnOnce(&FaultHooks)) {
         let count = |engine: &Engine| {
             let events = engine.report().events;
             events.iter().filter(|e| e.text.contains(text)).count()
         };
         let before = count(&self.engine);
         act(self.engine.faults());
-        wait_for(text, || (count(&self.engine) > before).then_some(()));
+        wait_for(text, || (count(&self.engine) >= before + n).then_some(()));
     }
 
-    /// Waits until the force was steady and without a fault for a while, and returns that moment, s.
+    /// Waits until the force was there, whole, steady and without a fault for a while, and returns that
+    /// moment, s. How large it must be, the log is asked afterwards.
     fn settle(&mut self) -> f64 {
         let (mut since, mut last) = (self.engine.now(), f64::NAN);
         self.until("the force is steady", |tick| {
             let force = tick.devices[0].force[2];
-            let is_steady = tick.devices[0].faults == 0 && (force - last).abs() < 1e-3;
+            let is_whole =
+                tick.tick.faults == 0 && tick.devices[0].faults == 0 && tick.tick.gain >= 1.0;
+            let is_steady = is_whole && force > 0.1 && (force - last).abs() < 1e-3;
             last = force;
             if !is_steady {
                 since = tick.tick.now;
@@ -200,11 +203,11 @@ fn faults_while_real_tissue_is_pressed() {
     run.ticks(200);
     run.engine.faults().pause_tissue(false);
     settled.push(("a tissue that paused", run.settle()));
-    run.until_said("patch is late", |faults| faults.delay_tissue(0.1));
+    run.until_said("patch is late", 1, |faults| faults.delay_tissue(0.1));
     settled.push(("a late patch", run.settle()));
-    run.until_said("a patch with NaN", |faults| faults.spoil_patches(20));
+    run.until_said("a patch with NaN", 20, |faults| faults.spoil_patches(20));
     settled.push(("spoilt patches", run.settle()));
-    run.until_said("wakes up late", |faults| faults.delay_loop(0.05));
+    run.until_said("wakes up late", 1, |faults| faults.delay_loop(0.05));
     settled.push(("a loop that slept", run.settle()));
     // The hand's own: out and in at 1 m/s.
     hand.set(above);

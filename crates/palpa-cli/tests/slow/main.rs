@@ -5,7 +5,6 @@
 mod bench;
 mod faults;
 mod lump_stroke;
-mod mesh_moves;
 mod moving;
 mod stable;
 mod verify;

@@ -68,7 +68,8 @@ fn worst(rows: &[TraceRow], past_mm: f64) -> (TraceRow, f64) {
         .unwrap();
     let end = rows.last().unwrap().time_s - 0.1;
     let still = rows.iter().filter(|r| r.time_s > end);
-    (*worst, still.map(TraceRow::share).fold(0.0, f64::max))
+    let held = still.map(TraceRow::share).max_by(f64::total_cmp).unwrap();
+    (*worst, held)
 }
 
 /// The promise: within 5 % or 0.03 N past 2 mm (4 mm at 100 mm/s), 2 % held still.

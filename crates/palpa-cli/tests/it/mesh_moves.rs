@@ -1,11 +1,11 @@
 //! A fine mesh that moves with the tool over a forearm with a lump, against a mesh that is fine along
 //! the whole way, in simulated time.
 
-use palpa::live::{RehearsalParams, RehearsalTick, rehearse};
-use palpa_device::Path as Way;
-use palpa_device::{DeviceModel, Scripted, Vec3};
+use std::path::Path;
 
-use crate::live;
+use palpa::live::{LiveScene, RehearsalParams, RehearsalTick, rehearse};
+use palpa_device::{DeviceModel, Path as Way, Scripted, Vec3};
+use palpa_scene::Scene;
 
 const FOREARM: &str = include_str!("../../scenes/forearm_lump.toml");
 /// The way: from above the skin down, along the limb over the lump, then still. m, m/s
@@ -24,7 +24,8 @@ fn stroke(moves: bool) -> (Vec<RehearsalTick>, u64) {
         .as_table_mut()
         .unwrap()
         .insert("moves".to_owned(), moves.into());
-    let live = live(&scene);
+    let scene = Scene::parse(&scene.to_string(), Path::new("")).unwrap();
+    let live = LiveScene::build(&scene).unwrap();
     let [from, to] = [-HALF, HALF].map(|x| Vec3::x() * x);
     let down = -Vec3::z() * (ABOVE + DEPTH);
     let way = Way::from(from).hold(START).to(from + down, SPEED).hold(0.2);
@@ -49,6 +50,7 @@ fn a_mesh_that_moves_feels_as_one_that_is_fine_everywhere() {
     let (moving, n_meshes) = stroke(true);
     assert!(n_meshes > 3, "{n_meshes} meshes");
     assert_eq!(moving.len(), along.len());
+    assert!(moving.len() > 1000, "{} ticks", moving.len());
     let pairs = moving.iter().zip(&along);
     let errors = pairs.map(|(a, b)| ((a.force - b.force).norm(), b.force.norm()));
     let (mut worst, mut at) = (0.0_f64, 0.0);
