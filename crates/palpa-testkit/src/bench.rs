@@ -41,8 +41,8 @@ impl Bench {
     ///
     /// # Panics
     /// When it cannot be written.
-    pub fn file<'a>(&self, name: &'a str, content: impl ToString) -> &'a str {
-        fs::write(self.path(name), content.to_string()).expect(name);
+    pub fn file<'a>(&self, name: &'a str, content: impl Into<String>) -> &'a str {
+        fs::write(self.path(name), content.into()).expect(name);
         name
     }
 

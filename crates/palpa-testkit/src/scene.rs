@@ -199,6 +199,18 @@ impl fmt::Display for Scene {
     }
 }
 
+impl From<&Scene> for String {
+    fn from(scene: &Scene) -> Self {
+        scene.to_string()
+    }
+}
+
+impl From<Scene> for String {
+    fn from(scene: Scene) -> Self {
+        scene.to_string()
+    }
+}
+
 impl Layer {
     /// Nearly incompressible neo-Hookean: Young's modulus with its unit, Poisson's ratio 0.45.
     pub fn elastic(name: &str, young: &str) -> Self {

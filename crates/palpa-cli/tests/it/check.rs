@@ -14,7 +14,7 @@ impl Check {
     fn new(files: &[(&str, &str)]) -> Self {
         let bench = crate::palpa();
         for (name, content) in files {
-            bench.file(name, content);
+            bench.file(name, *content);
         }
         Self(bench)
     }

@@ -105,7 +105,7 @@ fn wrong_patch() -> Value {
 #[test]
 fn a_figure_out_of_tolerance_is_exit_code_1() {
     let bench = palpa();
-    bench.file("V_wedge_patch_test.json", wrong_patch());
+    bench.file("V_wedge_patch_test.json", wrong_patch().to_string());
     let (code, stdout, stderr) = bench.run(&["verify", "v-patch", "--reference", "."]);
     assert_eq!((code, stderr.as_str()), (1, ""), "{stdout}");
     // Two against the stresses given; the others need none.
