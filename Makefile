@@ -1,6 +1,7 @@
 # make run        the viewer: a forearm to be touched, in a browser
 # make test       all tests that need nothing but this tree and a browser, which is installed where there is none
 # make dist       one binary with the page inside, packed for others
+# make test-slow  tests of minutes, with optimisation: forces while moving, faults, verification by formula
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make hunt       property tests with fresh seeds and fuzz targets, for HUNT_MINUTES=20
 # make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
@@ -22,7 +23,7 @@ BOOK_TOOLS ?= $(abspath $(TARGET))/tools
 MDBOOK  := $(or $(shell command -v mdbook 2>/dev/null),$(BOOK_TOOLS)/bin/mdbook)
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 
-.PHONY: run test hunt test-page test-data shared lint docs cross bench loop dist
+.PHONY: run test hunt test-page test-slow test-data shared lint docs cross bench loop dist
 
 run: $(PAGE)
 	cargo run --release --package palpa-cli -- view
@@ -52,9 +53,17 @@ dist: $(PAGE)
 	cargo build --release --package palpa-cli
 	tools/dist.sh "$(TARGET)" "$(VERSION)"
 
+# The slow tests, and the quick ones of the command once more as it is shipped.
+test-slow:
+	@if command -v cargo-nextest >/dev/null; then cargo nextest run --release --package palpa-cli --features slow-tests; \
+	else cargo test --release --package palpa-cli --features slow-tests --tests; fi
+
 test-data: shared $(VENV)/ready
 	rm -rf "$(RESULTS)"
-	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa-cli --package palpa-plot --tests
+	@command -v ccx >/dev/null || echo "test-data: CalculiX (ccx) is not installed, its tests are left out"
+	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa-cli --features data-tests --test data \
+	  -- $$(command -v ccx >/dev/null || echo "--skip ccx::")
+	cargo test --release --package palpa-plot --tests
 	cargo run --release --package palpa-cli -- press --out "$(RESULTS)/press"
 	"$(VENV)/bin/python" tools/check_vtu.py "$(RESULTS)"
 

@@ -1,8 +1,9 @@
-//! Exported decks, run by the real CalculiX where it is installed (Debian: `calculix-ccx`).
+//! Exported decks, run by the real CalculiX (Debian: `calculix-ccx`). `make test-data` leaves these tests
+//! out where it is not installed.
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use nalgebra::{Rotation3, Vector3};
 use palpa::continuum::{self, material};
@@ -15,53 +16,38 @@ use palpa_mesh::generate::patch::{centre_vertex, patch};
 use palpa_mesh::generate::{GradedBlock, GradedLayer, LevelStack, Outline, graded_block};
 use palpa_mesh::{LayeredBody, Vec3};
 use palpa_scene::{CutFaces, Scene};
+use palpa_testkit::{Bench, Layer, Scene as SceneText};
 use tempfile::TempDir;
-
-/// Whether CalculiX is there; says so if not.
-fn is_installed() -> bool {
-    let answer = Command::new("ccx").arg("-v").stdout(Stdio::null()).status();
-    if answer.is_err() {
-        println!("skipped: `ccx` is not installed (Debian: calculix-ccx)");
-    }
-    answer.is_ok()
-}
 
 /// Runs `body.inp` in a folder.
 fn solve(folder: &Path) -> Vec<PatchForce> {
     let run = Command::new("ccx").arg("body").current_dir(folder).output();
-    let said = String::from_utf8_lossy(&run.unwrap().stdout).into_owned();
+    let run = run.expect("`ccx` runs (Debian: calculix-ccx)");
+    let said = String::from_utf8_lossy(&run.stdout).into_owned();
     assert!(!said.contains("*ERROR"), "{said}");
     let forces = patch_forces(&fs::read_to_string(folder.join("body.dat")).unwrap());
     assert!(forces.last().is_some_and(|f| f.share > 0.999), "{said}");
     forces
 }
 
-/// A column held by planes of symmetry on all sides and pressed over its whole top: every layer is strained evenly, so the
-/// force is that of the laws alone.
-const COLUMN: &str = r#"
-[body]
-generator = { kind = "block", size = ["20 mm", "20 mm", "24 mm"], spacing = "10 mm" }
-cut_faces = "symmetric"
-[[layer]]
-tissue = { name = "upper", young = "10 kPa", poisson = 0.4 }
-thickness = "8 mm"
-levels = 1
-[[layer]]
-tissue = { name = "lower", TISSUE }
-levels = 2
-[tool]
-shape = "disc"
-radius = "30 mm"
-[press]
-depth = "4 mm"
-step = "2 mm"
-"#;
+/// A column held by planes of symmetry on all sides and pressed over its whole top: every layer is
+/// strained evenly, so the force follows from the laws alone.
+fn column(lower: &str) -> SceneText {
+    SceneText::block([20.0, 20.0, 24.0], 10.0)
+        .set("body", "cut_faces", "symmetric")
+        .layer(
+            Layer::of(r#"name = "upper", young = "10 kPa", poisson = 0.4"#)
+                .thick(8.0)
+                .levels(1),
+        )
+        .layer(Layer::of(&format!(r#"name = "lower", {lower}"#)).levels(2))
+        .disc(30.0)
+        .set("press", "depth", "4 mm")
+        .set("press", "step", "2 mm")
+}
 
 #[test]
 fn confined_columns_have_the_exact_force_of_every_law() {
-    if !is_installed() {
-        return;
-    }
     for tissue in [
         r#"young = "30 kPa", poisson = 0.45"#,
         r#"law = "st-venant-kirchhoff", young = "30 kPa", poisson = 0.3"#,
@@ -70,18 +56,14 @@ fn confined_columns_have_the_exact_force_of_every_law() {
         r#"law = "ogden", terms = [{ mu = "5 kPa", alpha = 4 }], poisson = 0.45"#,
         r#"law = "ogden", terms = [{ mu = "5 kPa", alpha = 4 }, { mu = "2 kPa", alpha = -3 }, { mu = "1 kPa", alpha = 6 }], poisson = 0.45"#,
     ] {
-        let text = COLUMN.replace("TISSUE", tissue);
+        let text = column(tissue).to_string();
         let scene = Scene::parse(&text, "".as_ref()).unwrap();
-        let folder = TempDir::new().unwrap();
-        fs::write(folder.path().join("scene.toml"), &text).unwrap();
-        let palpa = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .current_dir(folder.path())
-            .args(["export", "scene.toml", "--out", "."])
-            .output()
-            .unwrap();
-        assert!(palpa.status.success(), "{palpa:?}");
+        let bench = Bench::new(env!("CARGO_BIN_EXE_palpa"));
+        let file = bench.file("scene.toml", &text);
+        let (code, _, stderr) = bench.run(&["export", file, "--out", "."]);
+        assert_eq!(code, 0, "{stderr}");
         let laws = [0, 1].map(|i| material(&scene.layers[i].tissue, 0.0).unwrap().law);
-        let forces = solve(folder.path());
+        let forces = solve(bench.folder());
         assert_eq!(forces.len(), 2);
         for found in forces {
             let exact = column_force(&laws, [8e-3, 16e-3], 4e-3 * found.share, 20e-3 * 20e-3);
@@ -174,9 +156,6 @@ impl Turned {
 /// Planes of symmetry across the axes are held in frames of their own, corners in two planes at once.
 #[test]
 fn a_turned_body_has_the_turned_force() {
-    if !is_installed() {
-        return;
-    }
     let [straight, turned] = [Vec3::zeros(), Vec3::new(0.5, -0.8, 0.3)].map(Turned::new);
     let mut forces = Vec::new();
     for cut_faces in [CutFaces::Free, CutFaces::Symmetric, CutFaces::Fixed] {
@@ -197,9 +176,6 @@ fn a_turned_body_has_the_turned_force() {
 
 #[test]
 fn a_hard_lump_is_felt_in_the_deck() {
-    if !is_installed() {
-        return;
-    }
     let block = Turned::new(Vec3::zeros());
     let lump = |radius| {
         let shape = LumpShape::Sphere(Sphere::new(radius).unwrap());
@@ -214,15 +190,8 @@ fn a_hard_lump_is_felt_in_the_deck() {
 
 /// Skin over fat over muscle under a bonded disc of 10 mm, computed by others with other elements of CalculiX.
 #[test]
-fn slow_the_layered_block_of_the_reference_has_its_force() {
-    let Some(table) =
-        crate::data().map(|data| data.join("../reference/B2_layered_block_nu045.csv"))
-    else {
-        return;
-    };
-    if !is_installed() {
-        return;
-    }
+fn the_layered_block_of_the_reference_has_its_force() {
+    let table = crate::reference().join("B2_layered_block_nu045.csv");
     let block = GradedBlock {
         outline: Outline::Square,
         half_width: 50e-3,

@@ -1,33 +1,13 @@
-//! `palpa bench` as a process. How fast it is, no test says.
-
-use std::fs;
-use std::process::Command;
+//! `palpa bench` as a process. No test asserts how fast it is.
 
 use palpa_lab::bench::{BenchRow, Mode};
-use serde_json::Value;
-use tempfile::TempDir;
 
-fn bench(folder: &TempDir, args: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .arg("bench")
-        .args(args)
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(output.stdout),
-        text(output.stderr),
-    )
-}
+use crate::palpa;
 
 #[test]
 fn a_quick_look_has_all_the_figures() {
-    let folder = TempDir::new().unwrap();
-    let (code, stdout, stderr) = bench(&folder, &["--quick", "--json", "--out", "out"]);
-    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
-    let report: Value = serde_json::from_str(&stdout).unwrap();
+    let bench = palpa();
+    let report = bench.report(&["bench", "--quick", "--json", "--out", "out"]);
     assert_eq!(report["is_complete"], true);
     let rows: Vec<BenchRow> = serde_json::from_value(report["rows"].clone()).unwrap();
     let modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
@@ -67,16 +47,14 @@ fn a_quick_look_has_all_the_figures() {
             .count()
     };
     assert_eq!((against("dense inverse"), against("faer")), (2, 2));
-    let written = |name: &str| fs::read_to_string(folder.path().join("out").join(name)).unwrap();
-    assert_eq!(written("bench.csv").lines().count(), 3);
-    assert!(written("bench.svg").contains("steps per second"));
-    assert!(folder.path().join("out/bench.png").is_file());
+    assert_eq!(bench.read("out/bench.csv").lines().count(), 3);
+    assert!(bench.read("out/bench.svg").contains("steps per second"));
+    assert!(bench.path("out/bench.png").is_file());
 }
 
 #[test]
 fn an_unknown_case_names_the_known() {
-    let folder = TempDir::new().unwrap();
-    let (code, stdout, stderr) = bench(&folder, &["--case", "5k"]);
+    let (code, stdout, stderr) = palpa().run(&["bench", "--case", "5k"]);
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert!(
         stderr.contains("no case \"5k\"") && stderr.contains("4k-prony"),

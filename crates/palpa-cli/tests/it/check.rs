@@ -1,40 +1,33 @@
 //! `palpa check` as a process.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+
+use palpa_testkit::Bench;
 
 /// A tetrahedron of 10 cm.
 const GOOD: &str = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 
-/// Runs in `folder`, so that no path of this machine gets into what is printed.
-fn check(folder: &Path, args: &[&str]) -> (i32, String, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .arg("check")
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (status.code().unwrap(), text(stdout), text(stderr))
-}
+/// `palpa check` in a folder with files.
+struct Check(Bench);
 
-fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, content) in files {
-        fs::write(folder.path().join(name), content).unwrap();
+impl Check {
+    fn new(files: &[(&str, &str)]) -> Self {
+        let bench = crate::palpa();
+        for (name, content) in files {
+            bench.file(name, *content);
+        }
+        Self(bench)
     }
-    folder
+
+    fn run(&self, args: &[&str]) -> (i32, String, String) {
+        self.0.run(&[&["check"], args].concat())
+    }
 }
 
 #[test]
 fn a_good_surface() {
-    let folder = folder_with(&[("good.obj", GOOD)]);
-    let (code, stdout, stderr) = check(folder.path(), &["good.obj"]);
+    let check = Check::new(&[("good.obj", GOOD)]);
+    let (code, stdout, stderr) = check.run(&["good.obj"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     insta::assert_snapshot!(stdout, @r"
     good.obj: good
@@ -46,8 +39,8 @@ fn a_good_surface() {
 #[test]
 fn a_repairable_surface_and_its_copy() {
     let damaged = GOOD.replace("f 1 2 4", "f 1 4 2") + "f 3 1 4\nv 9 9 9\n";
-    let folder = folder_with(&[("skin.obj", &damaged)]);
-    let (code, stdout, stderr) = check(folder.path(), &["skin.obj", "--repaired", "mended.off"]);
+    let check = Check::new(&[("skin.obj", &damaged)]);
+    let (code, stdout, stderr) = check.run(&["skin.obj", "--repaired", "mended.off"]);
     assert_eq!((code, stderr.as_str()), (1, ""));
     insta::assert_snapshot!(stdout, @r"
     skin.obj: has defects that repair removes
@@ -66,41 +59,38 @@ fn a_repairable_surface_and_its_copy() {
       after repair: good
       repaired copy, in metres: mended.off
     ");
-    let (code, stdout, _) = check(folder.path(), &["mended.off"]);
+    let (code, stdout, _) = check.run(&["mended.off"]);
     assert_eq!(code, 0, "{stdout}");
 
-    let (_, stdout, _) = check(folder.path(), &["skin.obj", "--json", "--out", "made"]);
+    let (_, stdout, _) = check.run(&["skin.obj", "--json", "--out", "made"]);
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(report[0]["verdict"], "repairable");
     assert_eq!(
         report[0]["surfaces"][0]["written"],
         "made/skin_repaired.obj"
     );
-    assert!(folder.path().join("made/skin_repaired.obj").exists());
+    assert!(check.0.path("made/skin_repaired.obj").exists());
 }
 
 #[test]
 fn what_cannot_be_read_is_exit_code_2_and_the_rest_is_reported() {
-    let folder = folder_with(&[
+    let check = Check::new(&[
         ("good.obj", GOOD),
         ("bad.obj", "v 0 0 0\nf 1 2 3\n"),
         ("points.ply", "ply\n"),
     ]);
-    let (code, stdout, stderr) = check(folder.path(), &["bad.obj"]);
+    let (code, stdout, stderr) = check.run(&["bad.obj"]);
     assert_eq!(code, 2);
     insta::assert_snapshot!(stdout, @"bad.obj: cannot be read");
     insta::assert_snapshot!(stderr, @"error: bad.obj: OBJ, line 2: a face uses vertex 2, but the vertices are 1 to 1");
 
-    let (code, stdout, stderr) = check(
-        folder.path(),
-        &[
-            "bad.obj",
-            "good.obj",
-            "points.ply",
-            "not_there.stl",
-            "--json",
-        ],
-    );
+    let (code, stdout, stderr) = check.run(&[
+        "bad.obj",
+        "good.obj",
+        "points.ply",
+        "not_there.stl",
+        "--json",
+    ]);
     assert_eq!(code, 2);
     insta::assert_snapshot!(stderr, @"error: 3 of 4 files cannot be read, the first: bad.obj: OBJ, line 2: a face uses vertex 2, but the vertices are 1 to 1");
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
@@ -112,10 +102,7 @@ fn what_cannot_be_read_is_exit_code_2_and_the_rest_is_reported() {
             .starts_with("cannot read not_there.stl: ")
     );
 
-    let (code, _, stderr) = check(
-        folder.path(),
-        &["good.obj", "bad.obj", "--repaired", "x.obj"],
-    );
+    let (code, _, stderr) = check.run(&["good.obj", "bad.obj", "--repaired", "x.obj"]);
     assert_eq!(code, 2);
     insta::assert_snapshot!(stderr, @"error: --repaired names one file, but 2 are checked; give --out DIR instead");
 }
@@ -124,19 +111,19 @@ fn what_cannot_be_read_is_exit_code_2_and_the_rest_is_reported() {
 fn a_scene_is_checked_with_its_surfaces_in_its_unit() {
     let scene = "[body]\nsurface = \"skin.obj\"\nunit = \"mm\"\n[[layer]]\ntissue = \"fat\"\nthickness = \"20 mm\"\n";
     let skin = GOOD.replace(".1", "100");
-    let folder = folder_with(&[
+    let check = Check::new(&[
         ("limb.toml", scene),
         ("skin.obj", &skin),
         ("typo.toml", &scene.replace("tissue", "tisue")),
     ]);
-    let (code, stdout, stderr) = check(folder.path(), &["limb.toml"]);
+    let (code, stdout, stderr) = check.run(&["limb.toml"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     assert!(stdout.contains("0.1000 × 0.1000 × 0.1000 m"), "{stdout}");
-    let (code, _, stderr) = check(folder.path(), &["typo.toml"]);
+    let (code, _, stderr) = check.run(&["typo.toml"]);
     assert_eq!(code, 2);
     assert!(stderr.contains("typo.toml:5:1"), "{stderr}");
-    fs::remove_file(folder.path().join("skin.obj")).unwrap();
-    let (code, _, stderr) = check(folder.path(), &["limb.toml"]);
+    fs::remove_file(check.0.path("skin.obj")).unwrap();
+    let (code, _, stderr) = check.run(&["limb.toml"]);
     assert_eq!(code, 2);
     assert!(
         stderr.contains("limb.toml") && stderr.contains("skin.obj"),
@@ -146,15 +133,12 @@ fn a_scene_is_checked_with_its_surfaces_in_its_unit() {
 
 #[test]
 fn the_unit_of_a_surface_is_that_of_the_option() {
-    let folder = folder_with(&[("skin.obj", &GOOD.replace(".1", "100"))]);
-    let (code, stdout, _) = check(folder.path(), &["skin.obj"]);
+    let check = Check::new(&[("skin.obj", &GOOD.replace(".1", "100"))]);
+    let (code, stdout, _) = check.run(&["skin.obj"]);
     assert!(code == 0 && stdout.contains("`--unit mm`"), "{stdout}");
-    let (code, stdout, _) = check(folder.path(), &["skin.obj", "--unit", "mm"]);
+    let (code, stdout, _) = check.run(&["skin.obj", "--unit", "mm"]);
     assert!(code == 0 && !stdout.contains("note"), "{stdout}");
-    assert_eq!(
-        check(folder.path(), &["skin.obj", "--unit", "furlong"]).0,
-        2
-    );
+    assert_eq!(check.run(&["skin.obj", "--unit", "furlong"]).0, 2);
 }
 
 #[test]
@@ -162,18 +146,18 @@ fn a_scene_whose_parts_do_not_fit_is_not_good() {
     use palpa_mesh::generate::cylinder;
     use palpa_mesh::{Vec3, write_surface};
     let scene = "[body]\nsurface = \"skin.ply\"\nbones = [\"bone.ply\"]\n[[layer]]\ntissue = \"fat\"\nthickness = \"5 mm\"\n[[layer]]\ntissue = \"muscle\"\n[press]\ndepth = \"2 mm\"\n";
-    let folder = folder_with(&[("limb.toml", scene)]);
+    let check = Check::new(&[("limb.toml", scene)]);
     let (skin, mut bone) = cylinder(0.12, 0.04, 0.01, 8e-3);
-    write_surface(&folder.path().join("skin.ply"), &skin).unwrap();
-    write_surface(&folder.path().join("bone.ply"), &bone).unwrap();
-    let (code, stdout, _) = check(folder.path(), &["limb.toml"]);
+    write_surface(&check.0.path("skin.ply"), &skin).unwrap();
+    write_surface(&check.0.path("bone.ply"), &bone).unwrap();
+    let (code, stdout, _) = check.run(&["limb.toml"]);
     assert_eq!(code, 0, "{stdout}");
     assert!(stdout.contains("prisms, all valid"), "{stdout}");
     bone.points
         .iter_mut()
         .for_each(|p| *p += Vec3::new(2.0, 0.0, 0.0));
-    write_surface(&folder.path().join("bone.ply"), &bone).unwrap();
-    let (code, stdout, _) = check(folder.path(), &["limb.toml"]);
+    write_surface(&check.0.path("bone.ply"), &bone).unwrap();
+    let (code, stdout, _) = check.run(&["limb.toml"]);
     assert_eq!(code, 1, "{stdout}");
     assert!(
         stdout.contains("bone.ply: bone 0 is nowhere inside the skin"),

@@ -1,28 +1,12 @@
 //! The command as a process: exit codes, errors, help.
 
-use std::fs;
-use std::process::{Command, Output, Stdio};
+use std::process::{Output, Stdio};
 
-fn palpa(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_palpa"));
-    command.args(args).stdin(Stdio::null());
-    command
-}
-
-/// Exit code and what people see, on standard output and standard error.
-fn seen(command: &mut Command) -> (i32, String, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = command.output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (status.code().unwrap(), text(stdout), text(stderr))
-}
+use crate::palpa;
 
 #[test]
 fn a_word_that_is_no_command_is_bad_input() {
-    let (code, stdout, stderr) = seen(&mut palpa(&["chek"]));
+    let (code, stdout, stderr) = palpa().run(&["chek"]);
     assert_eq!(code, 2);
     assert_eq!(stdout, "");
     insta::assert_snapshot!(stderr.lines().next().unwrap(), @"error: unrecognized subcommand 'chek'");
@@ -35,7 +19,7 @@ fn the_schema_is_json_with_and_without_the_flag() {
         &["schema", "--json"],
         &["--json", "schema"],
     ] {
-        let (code, stdout, stderr) = seen(&mut palpa(args));
+        let (code, stdout, stderr) = palpa().run(args);
         assert_eq!((code, stderr.as_str()), (0, ""), "{args:?}");
         let schema: serde_json::Value = serde_json::from_str(&stdout).unwrap();
         assert!(schema["title"].is_string(), "{args:?}");
@@ -47,10 +31,10 @@ const DOUBLED: &str = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\nf 1 2 3\nf 1 
 
 #[test]
 fn an_output_folder_that_cannot_be_made_is_one_clear_error() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("skin.obj"), DOUBLED).unwrap();
-    let mut command = palpa(&["check", "skin.obj", "--json", "--out", "skin.obj/out"]);
-    let (code, stdout, stderr) = seen(command.current_dir(folder.path()));
+    let bench = palpa();
+    bench.file("skin.obj", DOUBLED);
+    let args = ["check", "skin.obj", "--json", "--out", "skin.obj/out"];
+    let (code, stdout, stderr) = bench.run(&args);
     assert_eq!((code, stdout.as_str()), (2, ""));
     insta::assert_snapshot!(
         stderr.trim_end(),
@@ -60,18 +44,17 @@ fn an_output_folder_that_cannot_be_made_is_one_clear_error() {
 
 #[test]
 fn with_json_standard_output_is_json_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("skin.obj"), DOUBLED).unwrap();
-    let mut command = palpa(&["check", "skin.obj", "--json", "--out", "new/folder"]);
-    let (code, stdout, stderr) = seen(command.current_dir(folder.path()));
+    let bench = palpa();
+    bench.file("skin.obj", DOUBLED);
+    let (code, stdout, stderr) = bench.run(&["check", "skin.obj", "--json", "--out", "new/folder"]);
     assert_eq!((code, stderr.as_str()), (1, ""));
     serde_json::from_str::<serde_json::Value>(&stdout).unwrap();
-    assert!(folder.path().join("new/folder/skin_repaired.obj").is_file());
+    assert!(bench.path("new/folder/skin_repaired.obj").is_file());
 }
 
 #[test]
 fn no_colour_where_nobody_sees_it() {
-    let (code, _, stderr) = seen(&mut palpa(&["check", "no such file.obj"]));
+    let (code, _, stderr) = palpa().run(&["check", "no such file.obj"]);
     assert_eq!(code, 2);
     assert!(
         stderr.starts_with("error: ") && !stderr.contains('\u{1b}'),
@@ -83,7 +66,9 @@ fn no_colour_where_nobody_sees_it() {
 #[cfg(unix)]
 #[test]
 fn a_reader_that_leaves_early_is_no_error() {
-    let mut child = palpa(&["schema"])
+    let bench = palpa();
+    let mut child = bench
+        .command(&["schema"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -1,4 +1,4 @@
-//! `palpa export`: the deck says what the scene says.
+//! `palpa export`: the deck has the body, the laws and the supports of the scene.
 
 #![expect(
     clippy::float_cmp,
@@ -6,84 +6,64 @@
 )]
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::process::{Command, Output};
 
 use palpa_mesh::Vec3;
+use palpa_testkit::{Bench, Layer, Lump, Scene};
 use serde_json::Value;
-use tempfile::TempDir;
+
+use crate::palpa;
 
 /// A block of 5 × 5 vertices on 3 levels, held by planes of symmetry, pressed in the middle.
-const BLOCK: &str = r#"
-[body]
-generator = { kind = "block", size = ["40 mm", "40 mm", "30 mm"], spacing = "10 mm" }
-cut_faces = "symmetric"
-[[layer]]
-tissue = { name = "soft fat", young = "10 kPa", poisson = 0.45 }
-thickness = "10 mm"
-levels = 1
-[[layer]]
-tissue = { name = "other", TISSUE }
-levels = 1
-[tool]
-shape = "disc"
-radius = "12 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "3 mm"
-step = "1 mm"
-[mesh]
-refine = false
-"#;
-
-struct Bench {
-    folder: TempDir,
+fn block(soft: &str, other: &str) -> Scene {
+    Scene::block([40.0, 40.0, 30.0], 10.0)
+        .set("body", "cut_faces", "symmetric")
+        .layer(
+            Layer::of(&format!(r#"name = "soft fat", {soft}"#))
+                .thick(10.0)
+                .levels(1),
+        )
+        .layer(Layer::of(&format!(r#"name = "other", {other}"#)).levels(1))
+        .disc(12.0)
+        .press(3.0)
+        .set("press", "step", "1 mm")
+        .set("mesh", "refine", false)
 }
 
-impl Bench {
-    /// A folder with the block, whose second layer has this law.
+/// `palpa export` of a scene.
+struct Export(Bench);
+
+impl Export {
+    /// Of the block whose second layer has this law.
     fn new(tissue: &str) -> Self {
-        Self::with(&BLOCK.replace("TISSUE", tissue))
+        Self::with(&block(SOFT, tissue))
     }
 
-    fn with(scene: &str) -> Self {
-        let folder = TempDir::new().unwrap();
-        fs::write(folder.path().join("scene.toml"), scene).unwrap();
-        Self { folder }
-    }
-
-    fn export(&self, args: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .current_dir(self.folder.path())
-            .args(["export", "scene.toml"])
-            .args(args)
-            .output()
-            .unwrap()
+    fn with(scene: &Scene) -> Self {
+        let bench = palpa();
+        bench.file("scene.toml", scene);
+        Self(bench)
     }
 
     fn report(&self, args: &[&str]) -> Value {
-        let output = self.export(&[args, &["--json"]].concat());
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{errors}");
-        serde_json::from_slice(&output.stdout).unwrap()
+        let command = ["export", "scene.toml", "--json"];
+        self.0.report(&[&command, args].concat())
     }
 
     fn deck(&self, args: &[&str]) -> Inp {
         self.report(args);
-        let path = self.folder.path().join("out/export/body.inp");
-        Inp::read(&fs::read_to_string(path).unwrap())
+        Inp::read(&self.0.read("out/export/body.inp"))
     }
 
     fn refusal(&self, args: &[&str]) -> String {
-        let output = self.export(args);
-        let text = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{text}");
+        let (code, _, text) = self.0.run(&[&["export", "scene.toml"], args].concat());
+        assert_eq!(code, 2, "{text}");
         assert_eq!(text.trim_end().lines().count(), 1, "one paragraph: {text}");
-        assert!(!self.folder.path().join("out/export/body.inp").exists());
+        assert!(!self.0.path("out/export/body.inp").exists());
         text
     }
 }
 
+const SOFT: &str = r#"young = "10 kPa", poisson = 0.45"#;
 const ELASTIC: &str = r#"young = "40 kPa", poisson = 0.45"#;
 
 /// A deck taken apart again: blocks of a keyword line and its data lines.
@@ -174,7 +154,7 @@ impl Inp {
 #[test]
 fn elements_are_whole_and_turned_as_calculix_wants() {
     for (element, n_corners, n_nodes) in [("c3d15", 15, 0), ("c3d6", 6, 75)] {
-        let inp = Bench::new(ELASTIC).deck(&["--element", element]);
+        let inp = Export::new(ELASTIC).deck(&["--element", element]);
         let (nodes, elements) = (inp.nodes(), inp.elements());
         assert_eq!(elements.len(), 32 * 2);
         if n_nodes > 0 {
@@ -217,7 +197,7 @@ fn elements_are_whole_and_turned_as_calculix_wants() {
 
 #[test]
 fn the_patch_moves_the_base_stays_and_the_sides_slide() {
-    let inp = Bench::new(ELASTIC).deck(&[]);
+    let inp = Export::new(ELASTIC).deck(&[]);
     let nodes = inp.nodes();
     let all = |is_in: &dyn Fn(&Vec3) -> bool| -> BTreeSet<usize> {
         let those = nodes.iter().filter(|(_, p)| is_in(p));
@@ -312,7 +292,7 @@ fn each_law_is_written_in_its_own_words() {
             vec![0.6 * c10, d1],
         ),
     ] {
-        let inp = Bench::new(tissue).deck(&[]);
+        let inp = Export::new(tissue).deck(&[]);
         let (found, values) = inp.law(1);
         assert_eq!(found, keyword);
         assert_eq!(values.len(), numbers.len(), "{tissue}");
@@ -329,13 +309,14 @@ fn each_law_is_written_in_its_own_words() {
 
 #[test]
 fn a_linear_body_is_one_of_small_strain() {
-    let linear = BLOCK
-        .replace("young", r#"law = "linear", young"#)
-        .replace("TISSUE", r#"law = "linear", young = "40 kPa""#);
-    let inp = Bench::with(&linear).deck(&[]);
+    let linear = block(
+        r#"law = "linear", young = "10 kPa", poisson = 0.45"#,
+        r#"law = "linear", young = "40 kPa""#,
+    );
+    let inp = Export::with(&linear).deck(&[]);
     assert!(!inp.blocks("*STEP")[0].0.contains("NLGEOM"));
     assert_eq!(inp.law(0).0, "*ELASTIC");
-    let mixed = Bench::new(r#"law = "linear", young = "40 kPa""#).refusal(&[]);
+    let mixed = Export::new(r#"law = "linear", young = "40 kPa""#).refusal(&[]);
     assert!(
         mixed.contains("\"other\" is linear and tissue \"soft fat\" is not"),
         "{mixed}"
@@ -356,13 +337,13 @@ fn what_calculix_cannot_say_is_refused_or_noted() {
             "NEO HOOKE",
         ),
     ] {
-        let bench = Bench::new(tissue);
-        let text = bench.refusal(&[]);
+        let export = Export::new(tissue);
+        let text = export.refusal(&[]);
         assert!(
             text.contains(says) && text.contains("--approximate"),
             "{text}"
         );
-        let inp = bench.deck(&["--approximate"]);
+        let inp = export.deck(&["--approximate"]);
         assert!(
             inp.comments.contains("note: tissue \"other\""),
             "{}",
@@ -370,39 +351,31 @@ fn what_calculix_cannot_say_is_refused_or_noted() {
         );
         assert!(inp.law(1).0.contains(keyword));
     }
-    let tense = BLOCK.replace(
-        "levels = 1\n[tool]",
-        "levels = 1\nprestress = \"5 kPa\"\n[tool]",
-    );
-    let bench = Bench::with(&tense.replace("TISSUE", ELASTIC));
-    assert!(bench.refusal(&[]).contains("tension at rest"));
+    let tense = block(SOFT, ELASTIC).with_layer(1, |other| other.set("prestress", "5 kPa"));
+    let tense = Export::with(&tense).refusal(&[]);
+    assert!(tense.contains("tension at rest"), "{tense}");
     let terms = r#"{ mu = "1 kPa", alpha = 2 }, "#.repeat(4);
-    let many = Bench::new(&format!(r#"law = "ogden", terms = [{terms}]"#));
+    let many = Export::new(&format!(r#"law = "ogden", terms = [{terms}]"#));
     assert!(
         many.refusal(&["--approximate"])
             .contains("4 terms of Ogden's")
     );
-    let springs = Bench::new(r#"spring = "90 dyn/cm""#).refusal(&["--approximate"]);
+    let springs = Export::new(r#"spring = "90 dyn/cm""#).refusal(&["--approximate"]);
     assert!(springs.contains("stiffness of springs"), "{springs}");
-    let ball = BLOCK
-        .replace("\"disc\"", "\"sphere\"")
-        .replace("TISSUE", ELASTIC);
-    let ball = Bench::with(&ball).refusal(&[]);
+    let ball = Export::with(&block(SOFT, ELASTIC).sphere(12.0)).refusal(&[]);
     assert!(ball.contains("presses by contact"), "{ball}");
 }
 
 #[test]
 fn a_lump_has_the_prisms_whose_middle_it_holds() {
-    let lump = |radius: &str| {
-        let lump = format!(
-            "[[lump]]\nname = \"knot\"\nradius = \"{radius}\"\ndepth = \"10 mm\"\ntissue = {{ name = \"hard\", young = \"300 kPa\" }}\n[tool]"
-        );
-        Bench::with(&BLOCK.replace("[tool]", &lump).replace("TISSUE", ELASTIC))
+    let lump = |radius: f64| {
+        let knot = Lump::sphere(radius, "hard", "300 kPa").set("name", "knot");
+        Export::with(&block(SOFT, ELASTIC).lump(knot.set("depth", "10 mm")))
     };
-    let report = lump("15 mm").report(&[]);
+    let report = lump(15.0).report(&[]);
     let materials = report["materials"].as_array().unwrap();
     assert_eq!(materials[2]["name"], "M3_HARD");
-    let inp = lump("15 mm").deck(&[]);
+    let inp = lump(15.0).deck(&[]);
     let (nodes, centre) = (inp.nodes(), Vec3::new(0.0, 0.0, -10.0));
     let elements = inp.elements();
     let is_in = |element: &Vec<usize>| {
@@ -418,7 +391,7 @@ fn a_lump_has_the_prisms_whose_middle_it_holds() {
         .find(|(line, _)| line.ends_with("M3_HARD"));
     assert_eq!(hard.unwrap().1.len(), n_inside);
     // One that falls between is said to be missing.
-    let report = lump("1 mm").report(&[]);
+    let report = lump(1.0).report(&[]);
     let notes = report["notes"].as_array().unwrap();
     let is_said = |note: &Value| {
         note.as_str()
@@ -430,25 +403,23 @@ fn a_lump_has_the_prisms_whose_middle_it_holds() {
 
 #[test]
 fn the_deck_has_the_mesh_and_the_patch_of_the_press() {
-    let refined = BLOCK
-        .replace("refine = false", "near_tool = \"4 mm\"")
-        .replace("TISSUE", ELASTIC);
-    let bench = Bench::with(&refined);
-    let report = bench.report(&["--element", "c3d6"]);
-    let press = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .current_dir(bench.folder.path())
-        .args([
-            "press",
-            "scene.toml",
-            "--json",
-            "--frames",
-            "0",
-            "--no-retract",
-        ])
-        .args(["--depth", "0.1 mm", "--step", "0.1 mm"])
-        .output()
-        .unwrap();
-    let press: Value = serde_json::from_slice(&press.stdout).unwrap();
+    let refined = block(SOFT, ELASTIC)
+        .without("mesh", "refine")
+        .near_tool(4.0);
+    let export = Export::with(&refined);
+    let report = export.report(&["--element", "c3d6"]);
+    let press = export.0.report(&[
+        "press",
+        "scene.toml",
+        "--json",
+        "--frames",
+        "0",
+        "--no-retract",
+        "--depth",
+        "0.1 mm",
+        "--step",
+        "0.1 mm",
+    ]);
     let press = &press["press"];
     assert_eq!(report["n_nodes"], press["n_nodes"]);
     assert_eq!(report["n_elements"], press["n_prisms"]);

@@ -1,93 +1,58 @@
-//! `palpa loop-report` and `palpa replay` as processes. How punctual a machine is, no test says: `loop-report` may end with 1.
+//! `palpa loop-report` and `palpa replay` as processes. No test asserts how punctual a machine is:
+//! `loop-report` may end with 1.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Stdio;
 
+use palpa_testkit::{Bench, Layer, Scene, interrupt, wait_for};
 use serde_json::Value;
-use tempfile::TempDir;
 
-const SCENE: &str = r#"
-[body]
-generator = { kind = "block", size = ["60 mm", "60 mm", "15 mm"], spacing = "8 mm" }
-[[layer]]
-tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
-levels = 2
-[tool]
-shape = "sphere"
-radius = "8 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "3 mm"
-[mesh]
-near_tool = "4 mm"
-[device]
-preset = "falcon"
-grip = "medium"
-[motion]
-kind = "tap"
-depth = "3 mm"
-speed = "30 mm/s"
-"#;
+use crate::palpa;
 
-fn palpa(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_palpa"));
-    command.args(args).current_dir(folder).stdin(Stdio::null());
-    command
+/// A gel that a simulated hand taps.
+fn gel() -> Scene {
+    Scene::block([60.0, 60.0, 15.0], 8.0)
+        .layer(Layer::elastic("gel", "10 kPa").levels(2))
+        .sphere(8.0)
+        .press(3.0)
+        .near_tool(4.0)
+        .set("device", "preset", "falcon")
+        .set("device", "grip", "medium")
+        .motion("tap", 3.0)
+        .set("motion", "speed", "30 mm/s")
 }
 
-fn seen(command: &mut Command) -> (i32, Value, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = command.output().unwrap();
-    let stderr = String::from_utf8(stderr).unwrap();
-    let json = serde_json::from_slice(&stdout).unwrap_or(Value::Null);
-    (status.code().unwrap(), json, stderr)
+/// Runs a scene in real time; the report.
+fn loop_report(bench: &Bench, scene: &Scene, seconds: &str) -> Value {
+    bench.file("gel.toml", scene);
+    let (code, report) = bench.json(&[
+        "loop-report",
+        "gel.toml",
+        "--seconds",
+        seconds,
+        "--json",
+        "--out",
+        "live",
+    ]);
+    assert!(code == 0 || code == 1, "{code}: {report}");
+    let most = report["devices"][0]["max_force_n"].as_f64().unwrap();
+    assert!(most > 0.02, "{report}");
+    report
 }
 
-fn bench() -> TempDir {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("gel.toml"), SCENE).unwrap();
-    folder
-}
-
-/// Replays the log, to the bit.
-fn same_again(folder: &TempDir) -> Value {
-    let (code, found, stderr) = seen(&mut palpa(
-        folder.path(),
-        &["replay", "live/log.mcap", "--json"],
-    ));
-    assert_eq!(
-        (code, &found["verdict"]),
-        (0, &Value::from("same")),
-        "{found} {stderr}"
-    );
+/// Replays the log bit for bit; the replay's report.
+fn same_again(bench: &Bench) -> Value {
+    let found = bench.report(&["replay", "live/log.mcap", "--json"]);
+    assert_eq!(found["verdict"], "same", "{found}");
     found
 }
 
 #[test]
 fn a_run_is_reported_logged_exported_and_the_same_again() {
-    let folder = bench();
-    let args = [
-        "loop-report",
-        "gel.toml",
-        "--seconds",
-        "5",
-        "--json",
-        "--out",
-        "live",
-    ];
-    let (code, report, stderr) = seen(&mut palpa(folder.path(), &args));
-    assert!(code == 0 || code == 1, "{code}: {stderr}");
+    let bench = palpa();
+    let report = loop_report(&bench, &gel(), "5");
     let ticks = report["ticks"].as_u64().unwrap();
     assert!(ticks > 100, "{ticks}");
-    assert!(
-        report["devices"][0]["max_force_n"].as_f64().unwrap() > 0.02,
-        "{report}"
-    );
     assert_eq!(report["lost_ticks"], 0);
     for file in [
         "loop.json",
@@ -96,9 +61,9 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
         "force_time.png",
         "force_depth.png",
     ] {
-        assert!(folder.path().join("live").join(file).is_file(), "{file}");
+        assert!(bench.path("live").join(file).is_file(), "{file}");
     }
-    let found = same_again(&folder);
+    let found = same_again(&bench);
     // The log has the ramp down at the end, too.
     assert!(found["ticks"].as_u64().unwrap() >= ticks);
     assert!(found["steps"].as_u64().unwrap() > 10);
@@ -110,18 +75,14 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
         "--out",
         "tables",
     ];
-    assert_eq!(seen(&mut palpa(folder.path(), &export)).0, 0);
-    let table = fs::read_to_string(folder.path().join("tables/ticks.csv")).unwrap();
-    assert_eq!(
-        table.lines().count() as u64,
-        found["ticks"].as_u64().unwrap() + 1
-    );
+    assert_eq!(bench.run(&export).0, 0);
+    let n_rows = bench.read("tables/ticks.csv").lines().count() as u64;
+    assert_eq!(n_rows, found["ticks"].as_u64().unwrap() + 1);
 
-    // Another body gives other forces, and that is told.
-    let other = SCENE.replace("10 kPa", "12 kPa");
-    fs::write(folder.path().join("other.toml"), other).unwrap();
-    let args = ["replay", "live/log.mcap", "--scene", "other.toml", "--json"];
-    let (code, found, _) = seen(&mut palpa(folder.path(), &args));
+    // Another body gives other forces, and the command says so.
+    let stiffer = gel().with_layer(0, |_| Layer::elastic("gel", "12 kPa").levels(2));
+    bench.file("other.toml", stiffer);
+    let (code, found) = bench.json(&["replay", "live/log.mcap", "--scene", "other.toml", "--json"]);
     assert_eq!(
         (code, &found["verdict"]),
         (1, &Value::from("different")),
@@ -130,103 +91,74 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
     assert!(found["max_force_difference_n"].as_f64().unwrap() > 1e-3);
 }
 
-/// The fine part of the mesh follows the tool: meshes come from the background, and a replay goes through the same.
+/// The fine part of the mesh follows the tool: meshes come from the background, and a replay goes
+/// through the same meshes.
 #[test]
 fn a_mesh_that_moves_is_the_same_again() {
-    let folder = bench();
-    let scene = SCENE
-        .replace("spacing = \"8 mm\"", "spacing = \"10 mm\"")
-        .replace("size = [\"60 mm\"", "size = [\"140 mm\"")
-        .replace("near_tool = \"4 mm\"", "near_tool = \"4 mm\"\nmoves = true")
-        .replace(
-            "kind = \"tap\"",
-            "kind = \"drag\"\nlength = \"80 mm\"\ntimes = 2",
-        );
-    fs::write(folder.path().join("gel.toml"), scene).unwrap();
-    let args = [
-        "loop-report",
-        "gel.toml",
-        "--seconds",
-        "8",
-        "--json",
-        "--out",
-        "live",
-    ];
-    let (code, report, stderr) = seen(&mut palpa(folder.path(), &args));
-    assert!(code == 0 || code == 1, "{code}: {stderr}");
+    let bench = palpa();
+    let scene = gel()
+        .sized([140.0, 60.0, 15.0], 10.0)
+        .set("mesh", "moves", true)
+        .motion("drag", 3.0)
+        .set("motion", "length", "80 mm")
+        .set("motion", "times", palpa_testkit::Value::raw("2"));
+    let report = loop_report(&bench, &scene, "8");
     assert!(report["tissue"]["meshes"].as_u64().unwrap() > 1, "{report}");
-    assert!(
-        report["devices"][0]["max_force_n"].as_f64().unwrap() > 0.02,
-        "{report}"
-    );
-    same_again(&folder);
+    same_again(&bench);
 }
 
 #[test]
-fn what_cannot_be_felt_in_time_is_told() {
-    let folder = bench();
-    let args = |scene: &'static str| ["loop-report", scene, "--seconds", "5", "--out", "live"];
-    // Deeper than the gel, and far off it.
-    fs::write(
-        folder.path().join("deep.toml"),
-        SCENE.replace("depth = \"3 mm\"\nspeed", "depth = \"30 mm\"\nspeed"),
-    )
-    .unwrap();
-    let (code, _, stderr) = seen(&mut palpa(folder.path(), &args("deep.toml")));
+fn scenes_that_cannot_be_felt_in_time_are_refused_or_reported() {
+    let bench = palpa();
+    let run = |scene: Scene| {
+        bench.file("scene.toml", scene);
+        bench.run(&[
+            "loop-report",
+            "scene.toml",
+            "--seconds",
+            "5",
+            "--out",
+            "live",
+        ])
+    };
+    // Deeper than the gel.
+    let (code, _, stderr) = run(gel().motion("tap", 30.0));
     assert!(
         code == 2 && stderr.contains("[motion] depth"),
         "{code} {stderr}"
     );
     // So fine that no step would be in time: refused before it is grown.
-    fs::write(
-        folder.path().join("fine.toml"),
-        SCENE
-            .replace("spacing = \"8 mm\"", "spacing = \"0.5 mm\"")
-            .replace("levels = 2", "levels = 8"),
-    )
-    .unwrap();
-    let (code, _, stderr) = seen(&mut palpa(folder.path(), &args("fine.toml")));
+    let fine = gel()
+        .sized([60.0, 60.0, 15.0], 0.5)
+        .with_layer(0, |gel| gel.levels(8));
+    let (code, _, stderr) = run(fine);
     assert!(
         code == 2 && stderr.contains("nodes, more than the 80000"),
         "{code} {stderr}"
     );
     // So slow that it never touches.
-    fs::write(
-        folder.path().join("slow.toml"),
-        SCENE.replace("30 mm/s", "0.2 mm/s"),
-    )
-    .unwrap();
-    let output = palpa(folder.path(), &args("slow.toml")).output().unwrap();
-    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{stdout}");
+    let (code, stdout, _) = run(gel().set("motion", "speed", "0.2 mm/s"));
+    assert_eq!(code, 1, "{stdout}");
     assert!(stdout.contains("NOT GOOD: nothing was felt"), "{stdout}");
 }
 
 #[test]
 fn a_scene_is_printed_to_be_changed() {
-    let folder = bench();
-    let output = palpa(folder.path(), &["loop-report", "--print-scene"])
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(0));
-    let scene = String::from_utf8(output.stdout).unwrap();
+    let bench = palpa();
+    let (code, scene, _) = bench.run(&["loop-report", "--print-scene"]);
+    assert_eq!(code, 0);
     assert!(
         scene.contains("[motion]") && scene.contains("[device]"),
         "{scene}"
     );
-    fs::write(folder.path().join("printed.toml"), scene).unwrap();
-    assert_eq!(
-        seen(&mut palpa(folder.path(), &["check", "printed.toml"])).0,
-        0
-    );
+    bench.file("printed.toml", scene);
+    assert_eq!(bench.run(&["check", "printed.toml"]).0, 0);
 }
 
 #[test]
 fn a_stable_range_is_found() {
-    let folder = bench();
-    let args = ["z-width", "--device", "ideal", "--grip", "soft", "--json"];
-    let (code, found, stderr) = seen(&mut palpa(folder.path(), &args));
-    assert_eq!(code, 0, "{stderr}");
+    let bench = palpa();
+    let found = bench.report(&["z-width", "--device", "ideal", "--grip", "soft", "--json"]);
     assert_eq!(found["is_complete"], true);
     let stable = |observer: bool| -> Vec<f64> {
         let rows = found["rows"].as_array().unwrap().iter();
@@ -243,15 +175,15 @@ fn a_stable_range_is_found() {
     );
     // Too much damping rattles as too much stiffness does.
     assert!(without[8] < without[1], "{found}");
-    assert!(folder.path().join("out/z-width/z_width.png").is_file());
+    assert!(bench.path("out/z-width/z_width.png").is_file());
 }
 
 #[test]
-fn a_log_that_is_cut_off_or_none_is_told() {
-    let folder = bench();
-    fs::write(folder.path().join("none.mcap"), "no log").unwrap();
+fn a_file_that_is_no_log_is_refused() {
+    let bench = palpa();
+    bench.file("none.mcap", "no log");
     for file in ["none.mcap", "missing.mcap"] {
-        let (code, _, stderr) = seen(&mut palpa(folder.path(), &["replay", file]));
+        let (code, _, stderr) = bench.run(&["replay", file]);
         assert_eq!(code, 2, "{stderr}");
         assert!(
             stderr.starts_with("error: ") && stderr.contains(file),
@@ -263,40 +195,32 @@ fn a_log_that_is_cut_off_or_none_is_told() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_a_run_and_keeps_its_log() {
-    let folder = bench();
-    let mut child = palpa(
-        folder.path(),
-        &[
-            "loop-report",
-            "gel.toml",
-            "--seconds",
-            "600",
-            "--out",
-            "live",
-        ],
-    )
-    .stdout(Stdio::null())
-    .stderr(Stdio::null())
-    .spawn()
-    .unwrap();
-    let log = folder.path().join("live/log.mcap");
-    let start = Instant::now();
-    while fs::metadata(&log).map_or(0, |m| m.len()) < 10_000 {
+    let bench = palpa();
+    bench.file("gel.toml", gel());
+    let args = [
+        "loop-report",
+        "gel.toml",
+        "--seconds",
+        "600",
+        "--out",
+        "live",
+    ];
+    let mut child = bench
+        .command(&args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let log = bench.path("live/log.mcap");
+    wait_for("something is logged", || {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it ended before it was interrupted"
         );
-        assert!(
-            start.elapsed() < Duration::from_mins(2),
-            "nothing is logged"
-        );
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(kill.success());
+        let size = fs::metadata(&log).map_or(0, |m| m.len());
+        (size > 10_000).then_some(())
+    });
+    interrupt(&child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    same_again(&folder);
+    same_again(&bench);
 }

@@ -1,4 +1,4 @@
-//! Integration tests of the command and of what it writes.
+//! Integration tests of the command and its files, and of force while the mesh moves.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,7 +7,15 @@ mod check;
 mod cli;
 mod export;
 mod live;
+mod mesh_moves;
 mod press;
 mod press_tissue;
 mod verify;
 mod view;
+
+use palpa_testkit::Bench;
+
+/// The command in an empty folder of its own.
+fn palpa() -> Bench {
+    Bench::new(env!("CARGO_BIN_EXE_palpa"))
+}

@@ -2,92 +2,71 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Stdio;
 
+use palpa_testkit::{Bench, Layer, Scene, Value as Toml, interrupt, wait_for};
 use serde_json::Value;
-use tempfile::TempDir;
+
+use crate::palpa;
 
 /// A block of 9 × 9 vertices: a fraction of a second.
-const BLOCK: &str = r#"
-[body]
-generator = { kind = "block", size = ["80 mm", "80 mm", "30 mm"], spacing = "10 mm" }
-[[layer]]
-tissue = { name = "soft", young = "10 kPa", poisson = 0.45 }
-thickness = "10 mm"
-levels = 2
-[[layer]]
-tissue = { name = "stiff", young = "40 kPa", poisson = 0.45 }
-levels = 2
-[tool]
-shape = "disc"
-radius = "15 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "3 mm"
-step = "0.5 mm"
-hold = "0.2 s"
-"#;
+fn block() -> Scene {
+    Scene::soft_over_stiff([80.0, 80.0, 30.0], 10.0, 10.0, 15.0)
+        .press(3.0)
+        .set("press", "step", "0.5 mm")
+        .set("press", "hold", "0.2 s")
+}
 
-pub(crate) struct Bench {
-    pub(crate) folder: TempDir,
+/// `palpa press` with one of the two models.
+pub(crate) struct Press {
+    pub(crate) bench: Bench,
     model: &'static str,
 }
 
-impl Bench {
-    fn new() -> Self {
-        Self::of("reference")
-    }
-
-    pub(crate) fn of(model: &'static str) -> Self {
+impl Press {
+    pub(crate) fn with(model: &'static str) -> Self {
         Self {
-            folder: TempDir::new().unwrap(),
+            bench: palpa(),
             model,
         }
     }
 
-    pub(crate) fn file(&self, name: &str, text: &str) -> String {
-        fs::write(self.folder.path().join(name), text).unwrap();
-        name.to_owned()
+    pub(crate) fn run(&self, args: &[&str]) -> (i32, String, String) {
+        let command = ["press", "--model", self.model];
+        self.bench.run(&[&command, args].concat())
     }
 
-    pub(crate) fn press(&self, args: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .current_dir(self.folder.path())
-            .args(["press", "--model", self.model])
-            .args(args)
-            .output()
-            .unwrap()
+    /// The report of a press of a scene that succeeds.
+    pub(crate) fn report(&self, scene: &Scene, args: &[&str]) -> Value {
+        self.bench.file("scene.toml", scene);
+        self.report_of("scene.toml", args)
     }
 
-    pub(crate) fn report(&self, args: &[&str]) -> Value {
-        let output = self.press(args);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// A refusal where an earlier run has left its files.
-    fn refusal_of_part(&self, args: &[&str]) -> String {
-        let output = self.press(args);
-        assert_eq!(output.status.code(), Some(2), "{args:?}");
-        String::from_utf8(output.stderr).unwrap()
+    /// The same of a scene file that is there.
+    fn report_of(&self, file: &str, args: &[&str]) -> Value {
+        let command = ["press", "--model", self.model, file, "--json"];
+        self.bench.report(&[&command, args].concat())
     }
 
     pub(crate) fn refusal(&self, args: &[&str]) -> String {
-        let output = self.press(args);
-        let text = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
-        assert!(
-            output.stdout.is_empty(),
-            "{args:?}: nothing is printed as a result"
+        let (code, stdout, stderr) = self.run(args);
+        assert_eq!(code, 2, "{args:?}: {stderr}");
+        assert_eq!(stdout, "", "{args:?}: nothing is printed as a result");
+        assert_eq!(
+            stderr.trim_end().lines().count(),
+            1,
+            "one paragraph: {stderr}"
         );
-        assert_eq!(text.trim_end().lines().count(), 1, "one paragraph: {text}");
-        assert!(!self.folder.path().join("out/press/press.csv").exists());
-        text
+        assert!(!self.bench.path("out/press/press.csv").exists());
+        stderr
     }
+}
+
+/// Neither frames nor the way back: all that a force needs.
+const FORCE: [&str; 3] = ["--frames", "0", "--no-retract"];
+
+fn last_force(report: &Value) -> f64 {
+    *forces(report, "load").last().unwrap()
 }
 
 fn forces(report: &Value, phase: &str) -> Vec<f64> {
@@ -100,9 +79,8 @@ fn forces(report: &Value, phase: &str) -> Vec<f64> {
 
 #[test]
 fn a_block_is_pressed_and_every_file_is_there() {
-    let bench = Bench::new();
-    bench.file("block.toml", BLOCK);
-    let report = bench.report(&["block.toml", "--json", "--frames", "3"]);
+    let press = Press::with("reference");
+    let report = press.report(&block(), &["--frames", "3"]);
     let loading = forces(&report, "load");
     assert_eq!(loading.len(), 7);
     assert!(loading.windows(2).all(|f| f[1] > f[0]), "{loading:?}");
@@ -127,7 +105,7 @@ fn a_block_is_pressed_and_every_file_is_there() {
             .contains("given by the scene")
     );
 
-    let out = bench.folder.path().join("out/press");
+    let out = press.bench.path("out/press");
     for name in [
         "press.json",
         "press.pvd",
@@ -157,29 +135,21 @@ fn a_block_is_pressed_and_every_file_is_there() {
 
 #[test]
 fn solvers_agree_and_stiffness_scales_the_force() {
-    let bench = Bench::new();
-    let small = BLOCK
-        .replace("80 mm\", \"80 mm", "40 mm\", \"40 mm")
-        .replace("radius = \"15 mm\"", "radius = \"8 mm\"");
-    bench.file("sparse.toml", &small);
-    bench.file(
-        "dense.toml",
-        &format!("{small}\n[reference]\nsolver = \"dense-inverse\"\n"),
-    );
-    bench.file(
-        "stiffer.toml",
-        &small
-            .replace("10 kPa", "20 kPa")
-            .replace("40 kPa", "80 kPa"),
-    );
-    let [sparse, dense, stiffer] = ["sparse.toml", "dense.toml", "stiffer.toml"].map(|scene| {
-        *forces(
-            &bench.report(&[scene, "--json", "--frames", "0", "--no-retract"]),
-            "load",
-        )
-        .last()
-        .unwrap()
-    });
+    let press = Press::with("reference");
+    let small = |soft: &str, stiff: &str| {
+        Scene::block([40.0, 40.0, 30.0], 10.0)
+            .layer(Layer::elastic("soft", soft).thick(10.0).levels(2))
+            .layer(Layer::elastic("stiff", stiff).levels(2))
+            .disc(8.0)
+            .press(3.0)
+            .set("press", "step", "0.5 mm")
+            .set("press", "hold", "0.2 s")
+    };
+    let sparse = small("10 kPa", "40 kPa");
+    let dense = sparse.clone().set("reference", "solver", "dense-inverse");
+    let stiffer = small("20 kPa", "80 kPa");
+    let [sparse, dense, stiffer] =
+        [sparse, dense, stiffer].map(|scene| last_force(&press.report(&scene, &FORCE)));
     assert!((sparse / dense - 1.0).abs() < 1e-8, "{sparse} and {dense}");
     assert!(
         (stiffer / sparse - 2.0).abs() < 1e-8,
@@ -189,18 +159,10 @@ fn solvers_agree_and_stiffness_scales_the_force() {
 
 #[test]
 fn cut_faces_can_be_free_fixed_or_symmetric() {
-    let bench = Bench::new();
+    let press = Press::with("reference");
     let force = |cut: &str| {
-        let scene = bench.file(
-            "scene.toml",
-            &BLOCK.replace("[body]", &format!("[body]\ncut_faces = \"{cut}\"")),
-        );
-        *forces(
-            &bench.report(&[&scene, "--json", "--frames", "0", "--no-retract"]),
-            "load",
-        )
-        .last()
-        .unwrap()
+        let scene = block().set("body", "cut_faces", cut);
+        last_force(&press.report(&scene, &FORCE))
     };
     let (free, symmetric, fixed) = (force("free"), force("symmetric"), force("fixed"));
     assert!(
@@ -213,7 +175,7 @@ fn cut_faces_can_be_free_fixed_or_symmetric() {
 fn a_vertex_counts_in_the_file_whatever_is_mended_or_cut_away() {
     use palpa_mesh::Vec3;
     use palpa_mesh::generate::tube::{Ends, tube};
-    let bench = Bench::new();
+    let press = Press::with("reference");
     let mut limb = tube(20, 24, Ends::Closed, |s, a| {
         Vec3::new(0.12 * s, 0.04 * a.cos(), 0.04 * a.sin())
     });
@@ -221,15 +183,15 @@ fn a_vertex_counts_in_the_file_whatever_is_mended_or_cut_away() {
     limb.triangles.reverse();
     limb.points.insert(0, Vec3::new(9.0, 9.0, 9.0));
     limb.triangles.iter_mut().flatten().for_each(|v| *v += 1);
-    palpa_mesh::write_surface(&bench.folder.path().join("limb.obj"), &limb).unwrap();
+    palpa_mesh::write_surface(&press.bench.path("limb.obj"), &limb).unwrap();
     let layer = "[[layer]]\ntissue = \"fat\"\nthickness = \"10 mm\"\nlevels = 2\n";
-    let press = "[press]\nvertex = 250\ndepth = \"1 mm\"\nstep = \"1 mm\"\n";
+    let place = "[press]\nvertex = 250\ndepth = \"1 mm\"\nstep = \"1 mm\"\n";
     for cutout in ["", "cutout_radius = \"40 mm\"\n"] {
-        bench.file(
+        press.bench.file(
             "limb.toml",
-            &format!("[body]\nsurface = \"limb.obj\"\n{cutout}{layer}{press}"),
+            format!("[body]\nsurface = \"limb.obj\"\n{cutout}{layer}{place}"),
         );
-        let report = bench.report(&["limb.toml", "--json", "--frames", "0", "--no-retract"]);
+        let report = press.report_of("limb.toml", &FORCE);
         let at: Vec<f64> = serde_json::from_value(report["press"]["at_m"].clone()).unwrap();
         assert!(
             (Vec3::from_column_slice(&at) - limb.points[250]).norm() < 1e-9,
@@ -238,25 +200,17 @@ fn a_vertex_counts_in_the_file_whatever_is_mended_or_cut_away() {
     }
     // The hub of a cap is cut away with it.
     let hub = limb.points.len() - 1;
-    let message = bench.refusal_of_part(&["limb.toml", &format!("--vertex={hub}")]);
+    let (code, _, message) = press.run(&["limb.toml", &format!("--vertex={hub}")]);
+    assert_eq!(code, 2, "{message}");
     assert!(message.contains("not part of the grown skin"), "{message}");
 }
 
 #[test]
 fn the_force_depends_little_on_the_step() {
-    let bench = Bench::new();
-    bench.file("block.toml", BLOCK);
+    let press = Press::with("reference");
     let force = |step: &str| {
-        let args = [
-            "block.toml",
-            "--json",
-            "--frames",
-            "0",
-            "--no-retract",
-            "--step",
-            step,
-        ];
-        *forces(&bench.report(&args), "load").last().unwrap()
+        let scene = block().set("press", "step", step);
+        last_force(&press.report(&scene, &FORCE))
     };
     let (coarse, fine) = (force("1.5 mm"), force("0.1 mm"));
     assert!((coarse / fine - 1.0).abs() < 0.05, "{coarse} and {fine}");
@@ -264,53 +218,61 @@ fn the_force_depends_little_on_the_step() {
 
 #[test]
 fn bad_input_is_refused_in_one_paragraph() {
-    let bench = Bench::new();
-    let write = |name: &str, from: &str, to: &str| {
-        assert!(BLOCK.contains(from), "{from}");
-        bench.file(name, &BLOCK.replace(from, to))
+    let press = Press::with("reference");
+    let file = |name, content: &str| press.bench.file(name, content);
+    let write = |name, scene: Scene| press.bench.file(name, scene);
+    // The layers and the press of the block on a surface of a file.
+    let surface = |name, path: &str| {
+        let text = block().with_layer(1, |stiff| stiff.thick(5.0)).to_string();
+        let layers = &text[text.find("[[layer]]").unwrap()..];
+        file(name, &format!("[body]\nsurface = \"{path}\"\n{layers}"))
     };
-    let surface = |name: &str, file: &str| {
-        let start = BLOCK.find("[[layer]]").unwrap();
-        let layers = BLOCK[start..].replace("levels = 2\n[tool]", "thickness = \"5 mm\"\n[tool]");
-        bench.file(name, &format!("[body]\nsurface = \"{file}\"\n{layers}"))
-    };
-    bench.file("not_a_mesh.ply", "this is no mesh");
-    bench.file("lies.ply", "ply\nformat ascii 1.0\nelement vertex 1000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1000000000\nproperty list uchar int vertex_indices\nend_header\n");
-    bench.file("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    bench.file("no_faces.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
-    bench.file("a_file", "");
-    write("block.toml", "10 kPa", "10 kPa");
+    let soft = |tissue: &str| block().with_layer(0, |_| Layer::of(tissue).thick(10.0).levels(2));
+    file("not_a_mesh.ply", "this is no mesh");
+    file(
+        "lies.ply",
+        "ply\nformat ascii 1.0\nelement vertex 1000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1000000000\nproperty list uchar int vertex_indices\nend_header\n",
+    );
+    file("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    file("no_faces.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    file("flat.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nf 1 2 3\n");
+    file("a_file", "");
+    write("block.toml", block());
+    let thickness = Toml::raw(r#"{ axis = "x", table = [["-40 mm", "5 mm"], ["40 mm", "8 mm"]] }"#);
     let scenes = [
-        write("zero.toml", "10 kPa", "0 kPa"),
-        write("negative.toml", "10 kPa", "-3 kPa"),
-        write("deep.toml", "depth = \"3 mm\"", "depth = \"31 mm\""),
         write(
-            "thick.toml",
-            "thickness = \"10 mm\"",
-            "thickness = \"35 mm\"",
+            "zero.toml",
+            soft(r#"name = "soft", young = "0 kPa", poisson = 0.45"#),
         ),
-        write("key.toml", "radius =", "radiu ="),
+        write(
+            "negative.toml",
+            soft(r#"name = "soft", young = "-3 kPa", poisson = 0.45"#),
+        ),
+        write("deep.toml", block().press(31.0)),
+        write("thick.toml", block().with_layer(0, |soft| soft.thick(35.0))),
+        file(
+            "key.toml",
+            &block().to_string().replace("radius =", "radiu ="),
+        ),
         write(
             "far.toml",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
-            "at = [\"0 mm\", \"9 m\", \"0 mm\"]",
+            block().set("press", "at", Toml::lengths([0.0, 9000.0, 0.0])),
         ),
         write(
             "varying.toml",
-            "thickness = \"10 mm\"",
-            "thickness = { axis = \"x\", table = [[\"-40 mm\", \"5 mm\"], [\"40 mm\", \"8 mm\"]] }",
+            block().with_layer(0, |soft| soft.set("thickness", thickness)),
         ),
-        {
-            let fine = BLOCK.replace("spacing = \"10 mm\"", "spacing = \"4 mm\"");
-            bench.file(
-                "dense.toml",
-                &format!("{fine}\n[reference]\nsolver = \"dense-inverse\"\n"),
-            )
-        },
+        write(
+            "dense.toml",
+            block()
+                .sized([80.0, 80.0, 30.0], 4.0)
+                .set("reference", "solver", "dense-inverse"),
+        ),
         write(
             "vertex.toml",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
-            "vertex = 812",
+            block()
+                .without("press", "at")
+                .set("press", "vertex", Toml::raw("812")),
         ),
         surface("missing.toml", "nowhere.ply"),
         surface("format.toml", "not_a_mesh.ply"),
@@ -319,22 +281,17 @@ fn bad_input_is_refused_in_one_paragraph() {
         surface("empty.toml", "no_faces.obj"),
         write(
             "outward.toml",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]\ndirection = [0, 0.2, 1]",
+            block().set("press", "direction", Toml::raw("[0, 0.2, 1]")),
         ),
-        "no_faces.obj".to_owned(),
-        {
-            bench.file("flat.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nf 1 2 3\n");
-            let body = "[body]\nsurface = \"flat.obj\"\ncutout_radius = \"50 mm\"\n";
-            let layer = "[[layer]]\ntissue = \"fat\"\nthickness = \"5 mm\"\n";
-            bench.file(
-                "flat.toml",
-                &format!("{body}{layer}[press]\nvertex = 0\ndepth = \"1 mm\"\n"),
-            )
-        },
-        "nowhere.toml".to_owned(),
+        "no_faces.obj",
+        file(
+            "flat.toml",
+            "[body]\nsurface = \"flat.obj\"\ncutout_radius = \"50 mm\"\n[[layer]]\ntissue = \"fat\"\n\
+             thickness = \"5 mm\"\n[press]\nvertex = 0\ndepth = \"1 mm\"\n",
+        ),
+        "nowhere.toml",
     ];
-    let mut messages: Vec<String> = scenes.iter().map(|scene| bench.refusal(&[scene])).collect();
+    let mut messages: Vec<String> = scenes.iter().map(|scene| press.refusal(&[scene])).collect();
     for args in [
         ["block.toml", "--vertex=5000"],
         ["block.toml", "--at=0 mm,0 mm"],
@@ -344,7 +301,7 @@ fn bad_input_is_refused_in_one_paragraph() {
         ["block.toml", "--speed=1e-30 m/s"],
         ["block.toml", "--out=a_file/results"],
     ] {
-        messages.push(bench.refusal(&args));
+        messages.push(press.refusal(&args));
     }
     insta::assert_snapshot!(messages.join("\n"));
 }
@@ -352,11 +309,11 @@ fn bad_input_is_refused_in_one_paragraph() {
 #[test]
 fn the_shipped_scenes_can_be_read_and_those_without_files_pressed() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let mut n = 0;
+    let (mut n_read, mut n_refused, mut n_pressed) = (0, 0, 0);
     for entry in fs::read_dir(scenes).unwrap() {
         let path = entry.unwrap().path();
         let scene = palpa_scene::Scene::load(&path).unwrap();
-        n += 1;
+        n_read += 1;
         if matches!(scene.body.skin, palpa_scene::Skin::Generated(_)) {
             let built = palpa::build::build(&scene).unwrap();
             let indentation = palpa::press::reference::BarIndentation::build(&scene, &built);
@@ -364,78 +321,77 @@ fn the_shipped_scenes_can_be_read_and_those_without_files_pressed() {
                 // Bars neither touch nor hold a lump.
                 let refusal = indentation.unwrap_err().to_string();
                 assert!(refusal.contains("the reference method"), "{refusal}");
+                n_refused += 1;
                 continue;
             }
             let indentation = indentation.unwrap();
             let mut run = indentation.start(&built.growth.body);
             let force = (0..2).filter_map(|_| run.advance()).last().unwrap().force_n;
             assert!(force > 0.0, "{}: {force}", path.display());
+            n_pressed += 1;
         }
     }
-    assert!(n >= 3);
+    assert!(
+        n_read >= 5 && n_refused >= 1 && n_pressed >= 1,
+        "{n_read}, {n_refused}, {n_pressed}"
+    );
 }
 
 #[test]
 fn a_reader_that_leaves_does_not_keep_the_work_from_being_done() {
-    let bench = Bench::new();
-    bench.file("block.toml", BLOCK);
-    let mut child = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .current_dir(bench.folder.path())
-        .args([
-            "press",
-            "--model",
-            "reference",
-            "block.toml",
-            "--frames",
-            "0",
-        ])
-        .stdout(std::process::Stdio::piped())
+    let press = Press::with("reference");
+    press.bench.file("block.toml", block());
+    let args = [
+        "press",
+        "--model",
+        "reference",
+        "block.toml",
+        "--frames",
+        "0",
+    ];
+    let mut child = press
+        .bench
+        .command(&args)
+        .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     drop(child.stdout.take());
     assert!(child.wait().unwrap().success());
-    let table = fs::read_to_string(bench.folder.path().join("out/press/press.csv")).unwrap();
+    let table = press.bench.read("out/press/press.csv");
     assert_eq!(table.lines().count(), 19);
 }
 
 #[cfg(unix)]
 #[test]
 fn ctrl_c_leaves_a_valid_table_of_what_was_done() {
-    interrupt("reference", "4 mm");
-    interrupt("tissue", "10 mm");
+    ctrl_c_during_a_press("reference", 4.0);
+    ctrl_c_during_a_press("tissue", 10.0);
 }
 
 #[cfg(unix)]
-fn interrupt(model: &str, spacing: &str) {
-    let bench = Bench::new();
+fn ctrl_c_during_a_press(model: &'static str, spacing: f64) {
+    let bench = palpa();
     // Hundreds of steps, of which a few are done when the interrupt comes.
-    let scene = bench.file(
-        "long.toml",
-        &BLOCK
-            .replace("10 mm\" }", &format!("{spacing}\" }}"))
-            .replace("step = \"0.5 mm\"", "step = \"0.005 mm\""),
-    );
-    let mut child = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .current_dir(bench.folder.path())
-        .args(["press", "--model", model, &scene, "--frames", "200"])
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::piped())
+    let scene = block()
+        .sized([80.0, 80.0, 30.0], spacing)
+        .set("press", "step", "0.005 mm");
+    bench.file("long.toml", scene);
+    let args = ["press", "--model", model, "long.toml", "--frames", "200"];
+    let mut child = bench
+        .command(&args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let out = bench.folder.path().join("out/press");
-    // Not a wait for time but for what it does: the second frame of the series is there.
-    while !out.join("series/body_001.vtu").exists() {
+    let out = bench.path("out/press");
+    wait_for("the second frame of the series", || {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it ended before it was interrupted"
         );
-        std::thread::yield_now();
-    }
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(kill.success());
+        out.join("series/body_001.vtu").exists().then_some(())
+    });
+    interrupt(&child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(
         output.status.code(),

@@ -1,4 +1,5 @@
-//! `palpa press` with the continuum model: physics that any body must show, and everything that is written.
+//! `palpa press` with the continuum model: physics that any body must show, and every file that is
+//! written.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,45 +7,36 @@ use std::fs;
 use palpa::press::tissue::Indentation;
 use palpa::{Note, Prepared};
 use palpa_scene::{Scene, Skin};
+use palpa_testkit::{Layer, Lump, Scene as SceneText, Value as Toml};
 use serde_json::Value;
 use vtkio::Vtk;
 use vtkio::model::{Attribute, DataSet, Piece};
 
-use crate::press::Bench;
+use crate::press::Press;
+
+const SIZE: [f64; 3] = [60.0, 60.0, 24.0];
 
 /// A small block, a fraction of a second a step.
-const BLOCK: &str = r#"
-[body]
-generator = { kind = "block", size = ["60 mm", "60 mm", "24 mm"], spacing = "8 mm" }
-[[layer]]
-tissue = { name = "soft", young = "10 kPa", poisson = 0.45 }
-thickness = "8 mm"
-levels = 2
-[[layer]]
-tissue = { name = "stiff", young = "40 kPa", poisson = 0.45 }
-levels = 2
-[tool]
-shape = "disc"
-radius = "10 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "2 mm"
-step = "0.5 mm"
-speed = "10 mm/s"
-hold = "0 s"
-[mesh]
-near_tool = "5 mm"
-"#;
-
-const PRONY: &str = "poisson = 0.45, prony = { terms = [{ g = 0.4, tau = \"0.2 s\" }] }";
-
-fn tissue_bench() -> Bench {
-    Bench::of("tissue")
+fn block() -> SceneText {
+    SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
+        .press(2.0)
+        .set("press", "step", "0.5 mm")
+        .set("press", "speed", "10 mm/s")
+        .set("press", "hold", "0 s")
+        .near_tool(5.0)
 }
 
-fn report(bench: &Bench, scene: &str) -> Value {
-    bench.file("scene.toml", scene);
-    bench.report(&["scene.toml", "--json", "--frames", "0"])
+/// The block with 3 kPa of tension in its soft layer.
+fn tense() -> SceneText {
+    block().with_layer(0, |soft| soft.set("prestress", "3 kPa"))
+}
+
+fn tissue() -> Press {
+    Press::with("tissue")
+}
+
+fn report(press: &Press, scene: &SceneText) -> Value {
+    press.report(scene, &["--frames", "0"])
 }
 
 fn number(value: &Value) -> f64 {
@@ -64,9 +56,8 @@ fn peak(report: &Value) -> f64 {
 
 #[test]
 fn an_elastic_block_comes_back_and_every_file_is_there() {
-    let bench = tissue_bench();
-    bench.file("block.toml", BLOCK);
-    let report = bench.report(&["block.toml", "--json", "--frames", "3"]);
+    let press = tissue();
+    let report = press.report(&block(), &["--frames", "3"]);
     assert_eq!(report["model"], "tissue");
     assert_eq!(report["result"]["outcome"], "converged");
     assert_eq!(report["result"]["is_complete"], true);
@@ -109,7 +100,7 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
         "{soft:?} {stiff:?}"
     );
 
-    let out = bench.folder.path().join("out/press");
+    let out = press.bench.path("out/press");
     for stem in ["force_depth", "force_time", "layers", "section", "stress"] {
         for end in ["svg", "png"] {
             assert!(out.join(format!("{stem}.{end}")).is_file(), "{stem}.{end}");
@@ -248,19 +239,21 @@ fn check_series(folder: &std::path::Path) {
 
 #[test]
 fn a_viscous_block_loses_work_relaxes_and_is_stiffer_when_it_is_pressed_fast() {
-    let bench = tissue_bench();
-    let viscous = BLOCK.replace("poisson = 0.45", PRONY).replace(
-        "speed = \"10 mm/s\"\nhold = \"0 s\"",
-        "speeds = [\"2 mm/s\", \"50 mm/s\"]\nhold = \"1 s\"\ncycles = 2",
-    );
-    let elastic = report(
-        &bench,
-        &BLOCK.replace("step = \"0.5 mm\"", "step = \"1 mm\""),
-    );
-    let viscous = report(
-        &bench,
-        &viscous.replace("step = \"0.5 mm\"", "step = \"1 mm\""),
-    );
+    let press = tissue();
+    let prony = r#"poisson = 0.45, prony = { terms = [{ g = 0.4, tau = "0.2 s" }] }"#;
+    let layer = |name, young| {
+        Layer::of(&format!(r#"name = "{name}", young = "{young}", {prony}"#)).levels(2)
+    };
+    let steps = block().set("press", "step", "1 mm");
+    let elastic = report(&press, &steps);
+    let viscous = steps
+        .with_layer(0, |_| layer("soft", "10 kPa").thick(8.0))
+        .with_layer(1, |_| layer("stiff", "40 kPa"))
+        .without("press", "speed")
+        .set("press", "speeds", Toml::raw(r#"["2 mm/s", "50 mm/s"]"#))
+        .set("press", "hold", "1 s")
+        .set("press", "cycles", Toml::raw("2"));
+    let viscous = report(&press, &viscous);
     let runs = viscous["result"]["runs"].as_array().unwrap();
     assert_eq!(runs.len(), 2);
     let of = |run: usize, name: &str| number(&runs[run][name]);
@@ -296,34 +289,28 @@ fn a_viscous_block_loses_work_relaxes_and_is_stiffer_when_it_is_pressed_fast() {
     let time = column(&viscous, "time_s");
     assert!((time.iter().copied().fold(0.0, f64::max) - 2.0 * (2.0 + 1.0)).abs() < 1e-9);
     assert_eq!(time.iter().filter(|t| **t == 0.0).count(), 2);
-    assert!(
-        bench
-            .folder
-            .path()
-            .join("out/press/relaxation.png")
-            .is_file()
-    );
+    assert!(press.bench.path("out/press/relaxation.png").is_file());
 }
 
 #[test]
 fn a_lump_is_felt_and_a_coarse_mesh_feels_it_as_a_fine_one_does() {
-    let bench = tissue_bench();
+    let press = tissue();
     // Its own stiffness against that of the layer it lies in, on the same mesh.
-    let felt = |near_lumps: &str| {
+    let felt = |near_lumps: f64| {
         let force = |young: &str| {
-            let lump = format!(
-                "[[lump]]\nshape = \"sphere\"\nradius = \"5 mm\"\nbelow = [\"0 mm\", \"0 mm\", \"0 mm\"]\n\
-                 depth = \"14 mm\"\ntissue = {{ name = \"lump\", young = \"{young}\", poisson = 0.45 }}\n\
-                 [mesh]\ngrowth = 0.3\nnear_lumps = \"{near_lumps}\""
-            );
-            let once = BLOCK.replace("step = \"0.5 mm\"", "step = \"2 mm\"\nretract = false");
-            let report = report(&bench, &once.replace("[mesh]", &lump));
+            let scene = block()
+                .set("press", "step", "2 mm")
+                .set("press", "retract", false)
+                .lump(Lump::sphere(5.0, "lump", young).below(14.0))
+                .growth(0.3)
+                .set("mesh", "near_lumps", Toml::length(near_lumps));
+            let report = report(&press, &scene);
             (peak(&report), number(&report["press"]["n_nodes"]))
         };
         let ((soft, n), (hard, _)) = (force("40 kPa"), force("400 kPa"));
         (hard / soft - 1.0, n)
     };
-    let ((coarse, n_coarse), (fine, n_fine)) = (felt("12 mm"), felt("3 mm"));
+    let ((coarse, n_coarse), (fine, n_fine)) = (felt(12.0), felt(3.0));
     assert!(n_fine > 1.5 * n_coarse, "{n_coarse} and {n_fine} nodes");
     assert!(fine > 0.02, "{fine}");
     assert!((coarse / fine - 1.0).abs() < 0.2, "{coarse} and {fine}");
@@ -331,13 +318,13 @@ fn a_lump_is_felt_and_a_coarse_mesh_feels_it_as_a_fine_one_does() {
 
 #[test]
 fn tools_touch_push_and_never_pull() {
-    let bench = tissue_bench();
-    for tool in [
-        "shape = \"sphere\"\nradius = \"12 mm\"",
-        "shape = \"flat-punch\"\nradius = \"8 mm\"\nedge_radius = \"2 mm\"\nfriction = 0.3",
-    ] {
-        let scene = BLOCK.replace("shape = \"disc\"\nradius = \"10 mm\"", tool);
-        let report = report(&bench, &scene);
+    let press = tissue();
+    let punch = block()
+        .tool("flat-punch", 8.0)
+        .set("tool", "edge_radius", "2 mm")
+        .set("tool", "friction", 0.3);
+    for (tool, scene) in [("sphere", block().sphere(12.0)), ("punch", punch)] {
+        let report = report(&press, &scene);
         assert_eq!(report["result"]["outcome"], "converged", "{tool}");
         let force = column(&report, "force_n");
         let top = peak(&report);
@@ -361,20 +348,16 @@ fn tools_touch_push_and_never_pull() {
             "{tool}"
         );
         let area = column(&report, "contact_area_mm2");
-        assert!(area[4] > area[1] || tool.contains("punch"), "{area:?}");
+        assert!(area[4] > area[1] || tool == "punch", "{area:?}");
         assert_eq!(report["press"]["effective_radius_mm"], Value::Null);
     }
 }
 
 #[test]
 fn tension_of_the_skin_carries_part_of_the_force() {
-    let bench = tissue_bench();
-    let fixed = BLOCK.replace("[body]", "[body]\ncut_faces = \"fixed\"");
-    let tense = fixed.replace(
-        "levels = 2\n[[layer]]",
-        "levels = 2\nprestress = \"3 kPa\"\n[[layer]]",
-    );
-    let [slack, tense] = [&fixed, &tense].map(|scene| report(&bench, scene));
+    let press = tissue();
+    let [slack, tense] =
+        [block(), tense()].map(|scene| report(&press, &scene.set("body", "cut_faces", "fixed")));
     assert!(
         peak(&tense) > 1.03 * peak(&slack),
         "{} and {}",
@@ -387,12 +370,16 @@ fn tension_of_the_skin_carries_part_of_the_force() {
 
 #[test]
 fn inertia_counts_when_it_is_asked_for() {
-    let bench = tissue_bench();
-    let fast = BLOCK.replace("speed = \"10 mm/s\"", "speed = \"1 m/s\"\nretract = false");
-    let dynamic = format!(
-        "{fast}[model]\ndynamics = \"implicit\"\ndamping = {{ mass = \"20 1/s\", stiffness = \"1 ms\" }}\n"
-    );
-    let [still, moving] = [&fast, &dynamic].map(|scene| report(&bench, scene));
+    let press = tissue();
+    let fast = block()
+        .set("press", "speed", "1 m/s")
+        .set("press", "retract", false);
+    let damping = Toml::raw(r#"{ mass = "20 1/s", stiffness = "1 ms" }"#);
+    let dynamic = fast
+        .clone()
+        .set("model", "dynamics", "implicit")
+        .set("model", "damping", damping);
+    let [still, moving] = [fast, dynamic].map(|scene| report(&press, &scene));
     assert_eq!(moving["press"]["is_dynamic"], true);
     assert!(
         peak(&moving) > 1.1 * peak(&still),
@@ -404,19 +391,16 @@ fn inertia_counts_when_it_is_asked_for() {
 
 #[test]
 fn a_step_that_fails_is_told_and_what_was_done_is_kept() {
-    let bench = tissue_bench();
+    let press = tissue();
     // The whole block under a disc, pressed flat.
-    let deep = BLOCK
-        .replace(
-            "\"60 mm\", \"60 mm\", \"24 mm\"",
-            "\"30 mm\", \"30 mm\", \"24 mm\"",
-        )
-        .replace("depth = \"2 mm\"", "depth = \"23.5 mm\"")
-        .replace("step = \"0.5 mm\"", "step = \"5 mm\"");
-    bench.file("deep.toml", &deep);
-    let output = bench.press(&["deep.toml", "--json", "--frames", "0"]);
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", report["result"]);
+    let deep = block()
+        .sized([30.0, 30.0, 24.0], 8.0)
+        .press(23.5)
+        .set("press", "step", "5 mm");
+    press.bench.file("deep.toml", deep);
+    let (code, stdout, stderr) = press.run(&["deep.toml", "--json", "--frames", "0"]);
+    assert_eq!(code, 1, "{stderr}");
+    let report: Value = serde_json::from_str(&stdout).unwrap();
     let samples = report["samples"].as_array().unwrap();
     assert!(samples.len() > 1);
     let (last, before) = (&samples[samples.len() - 1], &samples[samples.len() - 2]);
@@ -434,38 +418,32 @@ fn a_step_that_fails_is_told_and_what_was_done_is_kept() {
 
 #[test]
 fn what_a_continuum_cannot_be_is_refused() {
-    let bench = tissue_bench();
-    let with = |name: &str, from: &str, to: &str| {
-        assert!(BLOCK.contains(from), "{from}");
-        bench.file(name, &BLOCK.replace(from, to))
-    };
+    let press = tissue();
+    let soft = |tissue: &str| block().with_layer(0, |_| Layer::of(tissue).thick(8.0).levels(2));
     let messages: Vec<String> = [
-        with(
+        (
             "spring.toml",
-            "young = \"10 kPa\", poisson = 0.45",
-            "spring = \"90 dyn/cm\"",
+            soft(r#"name = "soft", spring = "90 dyn/cm""#),
         ),
-        with(
+        (
             "mixed.toml",
-            "young = \"10 kPa\"",
-            "law = \"linear\", young = \"10 kPa\"",
+            soft(r#"name = "soft", law = "linear", young = "10 kPa", poisson = 0.45"#),
         ),
-        with("deep.toml", "depth = \"2 mm\"", "depth = \"25 mm\""),
-        with(
+        ("deep.toml", block().press(25.0)),
+        (
             "outward.toml",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]",
-            "at = [\"0 mm\", \"0 mm\", \"0 mm\"]\ndirection = [0, 0, 1]",
+            block().set("press", "direction", Toml::raw("[0, 0, 1]")),
         ),
     ]
-    .iter()
-    .map(|scene| bench.refusal(&[scene]))
+    .into_iter()
+    .map(|(name, scene)| press.refusal(&[press.bench.file(name, scene)]))
     .collect();
     insta::assert_snapshot!(messages.join("\n"));
 }
 
 /// The notes of an indentation that is set up, or why it is not.
-fn set_up(scene: &str) -> Result<String, String> {
-    let scene = Scene::parse(scene, std::path::Path::new(".")).unwrap();
+fn set_up(scene: &SceneText) -> Result<String, String> {
+    let scene = Scene::parse(&scene.to_string(), std::path::Path::new(".")).unwrap();
     let prepared = Prepared::build(&scene).map_err(|error| format!("{error:#}"))?;
     let indentation = Indentation::build(prepared.into()).map_err(|error| format!("{error:#}"))?;
     let notes: Vec<String> = indentation.notes.iter().map(Note::to_string).collect();
@@ -474,58 +452,55 @@ fn set_up(scene: &str) -> Result<String, String> {
 
 #[test]
 fn a_lump_outside_the_tissue_is_refused_and_one_across_the_skin_noted() {
-    let with_lump = |z: &str| {
-        let lump = format!(
-            "[[lump]]\nname = \"stone\"\nshape = \"sphere\"\nradius = \"4 mm\"\nat = [\"0 mm\", \"0 mm\", \"{z}\"]\n\
-             tissue = {{ name = \"hard\", young = \"100 kPa\", poisson = 0.45 }}\n[mesh]\nnear_lumps = \"8 mm\""
-        );
-        set_up(&BLOCK.replace("[mesh]", &lump))
+    let with_lump = |z: f64| {
+        let stone = Lump::sphere(4.0, "hard", "100 kPa").at([0.0, 0.0, z]);
+        let scene = block()
+            .lump(stone.set("name", "stone"))
+            .set("mesh", "near_lumps", "8 mm");
+        set_up(&scene)
     };
-    let refusal = with_lump("500 mm").unwrap_err();
+    let refusal = with_lump(500.0).unwrap_err();
     for part in ["\"stone\"", "(0.0, 0.0, 500.0) mm", "outside the tissue"] {
         assert!(refusal.contains(part), "{refusal}");
     }
-    let half = with_lump("0 mm").unwrap();
+    let half = with_lump(0.0).unwrap();
     assert!(half.contains("% of the lump \"stone\" at"), "{half}");
-    let inside = with_lump("-12 mm").unwrap();
+    let inside = with_lump(-12.0).unwrap();
     assert!(!inside.contains("stone"), "{inside}");
 }
 
 #[test]
 fn free_cut_faces_under_tension_are_noted() {
-    let tense = BLOCK.replace(
-        "levels = 2\n[[layer]]",
-        "levels = 2\nprestress = \"3 kPa\"\n[[layer]]",
-    );
-    let says_so = |scene: &str| set_up(scene).unwrap().contains("cut faces are free");
-    assert!(says_so(&tense) && !says_so(BLOCK));
-    assert!(!says_so(
-        &tense.replace("[body]", "[body]\ncut_faces = \"fixed\"")
-    ));
+    let says_so = |scene: &SceneText| set_up(scene).unwrap().contains("cut faces are free");
+    assert!(says_so(&tense()) && !says_so(&block()));
+    assert!(!says_so(&tense().set("body", "cut_faces", "fixed")));
 }
 
 #[test]
 fn steps_too_long_for_friction_are_noted() {
-    let pressed = |friction: &str, step: &str| {
-        let tool = format!("shape = \"sphere\"\nradius = \"12 mm\"\nfriction = {friction}");
-        let scene = BLOCK.replace("shape = \"disc\"\nradius = \"10 mm\"", &tool);
-        set_up(&scene.replace("step = \"0.5 mm\"", &format!("step = \"{step}\""))).unwrap()
+    let pressed = |friction: f64, step: &str| {
+        let scene = block()
+            .sphere(12.0)
+            .set("tool", "friction", friction)
+            .set("press", "step", step);
+        set_up(&scene).unwrap()
     };
     // A twentieth of 12 mm/√2 is 0.424 mm.
-    let note = pressed("0.4", "0.5 mm");
+    let note = pressed(0.4, "0.5 mm");
     assert!(note.contains("--step \"0.42 mm\""), "{note}");
-    assert!(!pressed("0.4", "0.4 mm").contains("friction"));
-    assert!(!pressed("0", "0.5 mm").contains("friction"));
+    assert!(!pressed(0.4, "0.4 mm").contains("friction"));
+    assert!(!pressed(0.0, "0.5 mm").contains("friction"));
 }
 
 #[test]
 fn prisms_turned_inside_out_at_a_corner_are_noted() {
-    let bench = tissue_bench();
-    let deep = BLOCK
-        .replace("\"10 mm\"\n[press]", "\"8 mm\"\n[press]")
-        .replace("depth = \"2 mm\"", "depth = \"9 mm\"\nretract = false")
-        .replace("near_tool = \"5 mm\"", "near_tool = \"2 mm\"");
-    let [deep, shallow] = [&deep, BLOCK].map(|scene| report(&bench, scene));
+    let press = tissue();
+    let deep = block()
+        .disc(8.0)
+        .press(9.0)
+        .set("press", "retract", false)
+        .near_tool(2.0);
+    let [deep, shallow] = [deep, block()].map(|scene| report(&press, &scene));
     let turned = |report: &Value| {
         let is_noted = report["notes"].to_string().contains("inside out");
         (number(&report["result"]["n_turned_prisms"]), is_noted)

@@ -1,64 +1,44 @@
 //! `palpa verify` as a process.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
-fn verify(folder: &Path, args: &[&str]) -> (i32, String, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(env!("CARGO_BIN_EXE_palpa"))
-        .arg("verify")
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (status.code().unwrap(), text(stdout), text(stderr))
-}
+use crate::palpa;
 
 #[test]
 fn figures_within_tolerance_are_printed_and_written() {
-    let folder = TempDir::new().unwrap();
-    let (code, stdout, stderr) = verify(folder.path(), &["patch", "LAME", "--out", "out"]);
+    let bench = palpa();
+    let (code, stdout, stderr) = bench.run(&["verify", "patch", "LAME", "--out", "out"]);
     assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
     assert!(stdout.starts_with("patch: uniform strain"), "{stdout}");
     assert!(stdout.contains("\nlame: thick cylinder"), "{stdout}");
     let last = stdout.lines().last().unwrap();
-    let n_rows = fs::read_to_string(folder.path().join("out/verify.csv"))
-        .unwrap()
-        .lines()
-        .count()
-        - 1;
+    let n_rows = bench.read("out/verify.csv").lines().count() - 1;
     assert_eq!(last, format!("{n_rows} of {n_rows} within tolerance"));
-    let json = fs::read_to_string(folder.path().join("out/verify.json")).unwrap();
+    let json = bench.read("out/verify.json");
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json.as_array().unwrap().len(), n_rows);
-    let svg = fs::read_to_string(folder.path().join("out/convergence.svg")).unwrap();
+    let svg = bench.read("out/convergence.svg");
     assert!(svg.contains("thick cylinder") && svg.contains("tolerance"));
-    assert!(folder.path().join("out/convergence.png").is_file());
-    let study = fs::read_to_string(folder.path().join("out/convergence.csv")).unwrap();
+    assert!(bench.path("out/convergence.png").is_file());
+    let study = bench.read("out/convergence.csv");
     assert!(
         study.starts_with("case,series,h,nodes,error\nlame,"),
         "{study}"
     );
 
     // A later run without a study leaves no picture of an older one.
-    let (code, stdout, _) = verify(folder.path(), &["patch", "--out", "out"]);
+    let (code, stdout, _) = bench.run(&["verify", "patch", "--out", "out"]);
     assert_eq!(code, 0);
     assert!(!stdout.contains("convergence"), "{stdout}");
-    assert!(!folder.path().join("out/convergence.png").exists());
+    assert!(!bench.path("out/convergence.png").exists());
 }
 
 #[test]
 fn the_json_is_a_list_of_figures() {
-    let folder = TempDir::new().unwrap();
-    let (code, stdout, stderr) = verify(folder.path(), &["prony", "--json"]);
+    let bench = palpa();
+    let (code, stdout, stderr) = bench.run(&["verify", "prony", "--json"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     let rows: Vec<serde_json::Map<String, Value>> = serde_json::from_str(&stdout).unwrap();
     assert!(rows.len() > 10);
@@ -124,10 +104,9 @@ fn wrong_patch() -> Value {
 
 #[test]
 fn a_figure_out_of_tolerance_is_exit_code_1() {
-    let folder = TempDir::new().unwrap();
-    let table = folder.path().join("V_wedge_patch_test.json");
-    fs::write(table, wrong_patch().to_string()).unwrap();
-    let (code, stdout, stderr) = verify(folder.path(), &["v-patch", "--reference", "."]);
+    let bench = palpa();
+    bench.file("V_wedge_patch_test.json", wrong_patch().to_string());
+    let (code, stdout, stderr) = bench.run(&["verify", "v-patch", "--reference", "."]);
     assert_eq!((code, stderr.as_str()), (1, ""), "{stdout}");
     // Two against the stresses given; the others need none.
     assert_eq!(stdout.matches("FAIL").count(), 2, "{stdout}");
@@ -136,8 +115,8 @@ fn a_figure_out_of_tolerance_is_exit_code_1() {
 
 #[test]
 fn bad_input_is_refused_in_one_line() {
-    let folder = TempDir::new().unwrap();
-    fs::create_dir(folder.path().join("empty")).unwrap();
+    let bench = palpa();
+    fs::create_dir(bench.path("empty")).unwrap();
     for (args, said) in [
         (
             &["pach"][..],
@@ -153,7 +132,7 @@ fn bad_input_is_refused_in_one_line() {
             "empty/B1_homogeneous_block.csv",
         ),
     ] {
-        let (code, stdout, stderr) = verify(folder.path(), args);
+        let (code, stdout, stderr) = bench.run(&[&["verify"], args].concat());
         assert_eq!((code, stdout.as_str()), (2, ""), "{args:?}");
         assert!(stderr.contains(said), "{args:?}: {stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
@@ -162,17 +141,18 @@ fn bad_input_is_refused_in_one_line() {
 
 #[test]
 fn the_list_names_every_case() {
-    let folder = TempDir::new().unwrap();
-    let (code, stdout, _) = verify(folder.path(), &["--list"]);
+    let bench = palpa();
+    let (code, stdout, _) = bench.run(&["verify", "--list"]);
     assert_eq!(code, 0);
+    assert!(!palpa_lab::verify::cases().is_empty());
     for case in palpa_lab::verify::cases() {
         let name = case.name.replace(' ', "-");
         assert!(stdout.contains(&name) && stdout.contains(case.title));
     }
-    let (_, stdout, _) = verify(folder.path(), &["--list", "--json", "B2"]);
+    let (_, stdout, _) = bench.run(&["verify", "--list", "--json", "B2"]);
     let listed: Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(listed.as_array().unwrap().len(), 1);
     assert_eq!(listed[0]["name"], "B2");
     assert_eq!(listed[0]["needs_reference"], true);
-    assert!(!folder.path().join("out").exists());
+    assert!(!bench.path("out").exists());
 }

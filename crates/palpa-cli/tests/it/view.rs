@@ -1,51 +1,44 @@
-//! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested in `web/e2e`.
+//! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested in
+//! `web/e2e`.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::process::{Child, ExitStatus, Stdio};
+use std::time::Duration;
 
+use palpa_testkit::{Bench, Layer, Scene, interrupt, wait_for};
 use serde_json::{Value, json};
-use tempfile::TempDir;
+use vtkio::Vtk;
+use vtkio::model::{Attribute, DataSet, Piece};
 
-/// How long a slow machine may take for anything.
-const PATIENCE: Duration = Duration::from_mins(1);
+use crate::palpa;
 
-const GEL: &str = r#"
-[body]
-generator = { kind = "block", size = ["60 mm", "60 mm", "20 mm"], spacing = "10 mm" }
-[[layer]]
-tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
-levels = 2
-[tool]
-shape = "sphere"
-radius = "10 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "3 mm"
-[mesh]
-near_tool = "5 mm"
-growth = 1.0
-[motion]
-depth = "4 mm"
-"#;
+/// Time after which a request without an answer counts as a hang.
+const HANG: Duration = Duration::from_mins(3);
+
+fn gel() -> Scene {
+    Scene::block([60.0, 60.0, 20.0], 10.0)
+        .layer(Layer::elastic("gel", "10 kPa").levels(2))
+        .sphere(10.0)
+        .press(3.0)
+        .near_tool(5.0)
+        .growth(1.0)
+        .set("motion", "depth", "4 mm")
+}
 
 struct Viewer {
     process: Child,
     url: String,
-    folder: TempDir,
+    bench: Bench,
 }
 
 impl Viewer {
     fn start(more: &[&str]) -> Self {
-        let folder = TempDir::new().unwrap();
-        fs::write(folder.path().join("gel.toml"), GEL).unwrap();
-        let mut process = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .args(["view", "--no-open", "--port", "0", "--json", "gel.toml"])
-            .args(more)
-            .current_dir(folder.path())
-            .stdin(Stdio::null())
+        let bench = palpa();
+        bench.file("gel.toml", gel());
+        let args = ["view", "--no-open", "--port", "0", "--json", "gel.toml"];
+        let mut process = bench
+            .command(&[&args, more].concat())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -62,7 +55,7 @@ impl Viewer {
         let viewer = Self {
             process,
             url,
-            folder,
+            bench,
         };
         viewer.wait_until(|state| state["phase"] == "running");
         viewer
@@ -109,62 +102,87 @@ impl Viewer {
     }
 
     fn wait_until(&self, is_so: impl Fn(&Value) -> bool) -> Value {
-        let began = Instant::now();
-        loop {
+        let mut last = Value::Null;
+        wait_for("a state of the session", || {
             let state = self.json("api/state");
-            if is_so(&state) {
-                return state;
+            let told = [&state["phase"], &state["problem"]].map(Clone::clone);
+            if last != json!(told) {
+                last = json!(told);
+                println!("{last}");
             }
-            let told = [&state["phase"], &state["problem"], &state["scene"]];
-            assert!(began.elapsed() < PATIENCE, "{told:#?}");
-            sleep(Duration::from_millis(50));
-        }
+            is_so(&state).then_some(state)
+        })
     }
 
-    fn press(&self, depth: f64, seconds: f64) {
+    /// Asks for the hand at the place of the scene. It is to be repeated: a hand that nobody moves lifts.
+    fn hold(&self, depth: f64) {
         let home = self.json("api/state")["home"].clone();
-        let began = Instant::now();
-        while began.elapsed().as_secs_f64() < seconds {
-            let hand = json!({ "type": "hand", "point": home["point"], "normal": home["normal"], "depth": depth });
-            self.ask(&hand);
-            sleep(Duration::from_millis(100));
-        }
+        let hand = json!({ "type": "hand", "point": home["point"], "normal": home["normal"], "depth": depth });
+        self.ask(&hand);
     }
 
+    /// The largest displacement of the body as it is pressed now, m.
+    fn displacement(&self) -> f64 {
+        let (status, bytes) = self.get("api/body.vtu");
+        assert_eq!(status, 200, "{}", String::from_utf8_lossy(&bytes));
+        let vtk = Vtk::parse_xml(&bytes[..]).unwrap();
+        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
+            panic!("no unstructured grid");
+        };
+        let Some(Piece::Inline(piece)) = pieces.into_iter().next() else {
+            panic!("no piece");
+        };
+        let found = piece.data.point.iter().find_map(|a| match a {
+            Attribute::DataArray(array) if array.name == "displacement" => Some(array),
+            _ => None,
+        });
+        let displacements: Vec<f64> = found.unwrap().data.cast_into().unwrap();
+        let size = |u: &[f64]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
+        displacements.chunks(3).map(size).fold(0.0, f64::max)
+    }
+
+    /// Presses until the body has come to rest, pressed in by most of a depth that a hand on a spring
+    /// reaches. Returns the largest displacement, m.
+    fn press(&self, depth: f64) -> f64 {
+        let mut before = [0.0; 3];
+        wait_for("the press is at rest", || {
+            self.hold(depth);
+            let now = self.displacement();
+            let is_still = before.iter().all(|u| (u - now).abs() < 0.01 * now);
+            before = [before[1], before[2], now];
+            (is_still && now > 0.2 * depth).then_some(now)
+        })
+    }
+
+    /// Lifts the hand, until the body is back at rest but for a hundredth of its displacement before.
+    fn lift(&self, pressed: f64) {
+        self.ask(&json!({ "type": "lift" }));
+        wait_for("the body is let go", || {
+            (self.displacement() < 0.01 * pressed).then_some(())
+        });
+    }
+
+    /// Records a press and its release: the table of its ticks.
     fn record(&self, depth: f64) -> Vec<[f64; 4]> {
         self.ask(&json!({ "type": "start_recording" }));
-        self.press(depth, 3.0);
-        self.ask(&json!({ "type": "lift" }));
-        sleep(Duration::from_millis(800));
+        let pressed = self.press(depth);
+        self.lift(pressed);
         self.ask(&json!({ "type": "stop_recording" }));
         let (status, table) = self.get("api/recording.csv");
         assert_eq!(status, 200);
         rows(&table)
     }
 
-    /// Runs the recording again with `palpa replay`, to the bit.
+    /// Replays the recording bit for bit with `palpa replay`.
     fn run_again(&self) {
-        let log = self.folder.path().join("recording.mcap");
+        let log = self.bench.path("recording.mcap");
         fs::write(&log, self.get("api/recording.mcap").1).unwrap();
-        let replay = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .args(["replay", "recording.mcap", "--json"])
-            .current_dir(self.folder.path())
-            .output()
-            .unwrap();
-        let found: Value = serde_json::from_slice(&replay.stdout).unwrap();
-        assert!(replay.status.success(), "{found:#}");
+        let found = self.bench.report(&["replay", "recording.mcap", "--json"]);
         assert_eq!(found["verdict"], "same");
     }
 
     fn stop(mut self) -> ExitStatus {
-        let pid = self.process.id().to_string();
-        assert!(
-            Command::new("kill")
-                .args(["-INT", &pid])
-                .status()
-                .unwrap()
-                .success()
-        );
+        interrupt(&self.process);
         self.process.wait().unwrap()
     }
 }
@@ -180,12 +198,12 @@ impl Drop for Viewer {
 fn agent() -> ureq::Agent {
     ureq::Agent::config_builder()
         .http_status_as_error(false)
-        .timeout_global(Some(PATIENCE))
+        .timeout_global(Some(HANG))
         .build()
         .into()
 }
 
-/// Time and force of every tick.
+/// Time (s) and force (N) of every tick.
 fn rows(table: &[u8]) -> Vec<[f64; 4]> {
     let text = std::str::from_utf8(table).unwrap();
     let mut lines = text.lines();
@@ -209,15 +227,19 @@ fn largest(rows: &[[f64; 4]]) -> f64 {
 fn a_press_is_felt_is_released_and_its_recording_runs_again_to_the_bit() {
     let viewer = Viewer::start(&[]);
     let rows = viewer.record(4e-3);
-    assert!(rows.len() > 1000, "{} ticks", rows.len());
     let most = largest(&rows);
     assert!((0.05..8.0).contains(&most), "{most} N");
     assert!(largest(&rows[rows.len() - 20..]) < 1e-6, "let go");
     viewer.run_again();
     viewer.ask(&json!({ "type": "open_replay" }));
-    viewer.ask(&json!({ "type": "seek", "time": 1.5 }));
     let state = viewer.wait_until(|state| state["recording"]["is_replaying"] == true);
-    assert!(state["recording"]["duration"].as_f64().unwrap() > 2.0);
+    let duration = state["recording"]["duration"].as_f64().unwrap();
+    let ticked = rows[rows.len() - 1][0] - rows[0][0];
+    assert!(
+        duration > 0.0 && duration <= ticked,
+        "{duration} of {ticked} s"
+    );
+    viewer.ask(&json!({ "type": "seek", "time": 0.5 * duration }));
     assert_eq!(viewer.stop().code(), Some(0));
 }
 
@@ -280,7 +302,12 @@ fn hidden_lumps_stay_hidden_until_the_truth_is_asked_for() {
     );
     let (code, words) = viewer.post(r#"{"type":"start_recording"}"#);
     assert!(code == 409 && words.contains("hidden lumps"), "{words}");
-    viewer.press(4e-3, 2.0);
+    // The body is not shown while lumps are hidden; the energy that the hand gave is.
+    wait_for("the hand has pressed", || {
+        viewer.hold(4e-3);
+        let energy = viewer.json("api/engine")["energy_in"].as_f64();
+        (energy > Some(2e-4)).then_some(())
+    });
     viewer.ask(&json!({ "type": "mark", "point": [0.01, 0.0, 0.0] }));
     viewer.ask(&json!({ "type": "reveal" }));
     let state = viewer.wait_until(|state| state["game"]["result"].is_object());
@@ -341,30 +368,23 @@ fn what_is_wrong_is_said_and_the_body_goes_on() {
     );
     let (status, words) = viewer.get("healthz");
     assert_eq!(status, 200, "{}", String::from_utf8_lossy(&words));
-    viewer.press(3e-3, 0.3);
+    viewer.press(3e-3);
 }
 
 #[test]
 fn a_fault_of_the_tissue_is_told_and_the_engine_starts_anew() {
     let viewer = Viewer::start(&["--allow-faults"]);
     // So old that the figures of an engine that has just begun are younger.
-    let mut before = Value::Null;
-    while before["seconds"].as_f64() < Some(3.0) {
-        before = viewer.json("api/engine");
-        sleep(Duration::from_millis(100));
-    }
+    let before = wait_for("the engine is 3 s old", || {
+        let seconds = viewer.json("api/engine")["seconds"].as_f64();
+        seconds.filter(|s| *s >= 3.0)
+    });
     viewer.ask(&json!({ "type": "inject", "fault": "tissue_panic" }));
-    let began = Instant::now();
-    loop {
+    wait_for("the engine starts anew", || {
         let now = viewer.json("api/engine");
-        if now["seconds"].as_f64() < before["seconds"].as_f64()
-            && now["tissue_rate"].as_f64() > Some(0.0)
-        {
-            break;
-        }
-        assert!(began.elapsed() < PATIENCE, "{now:#}");
-        sleep(Duration::from_millis(100));
-    }
+        let is_new = now["seconds"].as_f64() < Some(before);
+        (is_new && now["tissue_rate"].as_f64() > Some(0.0)).then_some(())
+    });
     assert!(largest(&viewer.record(4e-3)) > 0.05);
 }
 
@@ -426,22 +446,15 @@ fn nonsense_neither_stops_nor_fills_it() {
     let (status, words) = viewer.get("healthz");
     assert_eq!(status, 200, "{}", String::from_utf8_lossy(&words));
     viewer.wait_until(|state| state["phase"] == "running");
-    viewer.press(3e-3, 0.3);
+    viewer.press(3e-3);
 }
 
 #[test]
 fn where_it_may_not_listen_it_says_so() {
     let says = |args: &[&str]| {
-        let out = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .args(["view", "--no-open", "--out"])
-            .arg(TempDir::new().unwrap().path())
-            .args(args)
-            .output()
-            .unwrap();
-        (
-            out.status.code().unwrap(),
-            String::from_utf8(out.stderr).unwrap(),
-        )
+        let args = [&["view", "--no-open", "--out", "out"], args].concat();
+        let (code, _, stderr) = palpa().run(&args);
+        (code, stderr)
     };
     let (code, words) = says(&["--bind", "0.0.0.0"]);
     assert!(code == 2 && words.contains("--token"), "{words}");

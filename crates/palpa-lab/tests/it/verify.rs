@@ -1,8 +1,8 @@
-//! The cases by formula pass, and the table of tolerances is the one that was promised.
+//! The cases by formula pass, and the tolerances are no looser than promised.
 
 use palpa_lab::verify::{Case, Options, VerifyError, cases, tolerance};
 
-/// Cases that take long without optimisation; `make test-data` runs all.
+/// Cases that take long without optimisation; `make test-slow` runs all.
 const SLOW: [&str; 2] = ["contact", "small lump"];
 
 #[test]
@@ -11,7 +11,9 @@ fn cases_by_formula_pass() {
         assert!(cases().iter().any(|case| case.name == slow), "{slow}");
     }
     let is_quick = |case: &&Case| !case.needs_reference && !SLOW.contains(&case.name);
+    let mut n_cases = 0;
     for case in cases().iter().filter(is_quick) {
+        n_cases += 1;
         let findings = case.run(&Options::default()).unwrap();
         assert!(!findings.rows.is_empty(), "{}", case.name);
         for row in &findings.rows {
@@ -23,6 +25,7 @@ fn cases_by_formula_pass() {
             );
         }
     }
+    assert_eq!(n_cases, 5);
 }
 
 /// On each curve the error on the finest mesh is the smallest, and much smaller than on the coarsest.
@@ -49,7 +52,9 @@ fn errors_fall_as_the_mesh_becomes_finer() {
 
 #[test]
 fn without_its_tables_a_case_says_what_it_needs() {
+    let mut n_cases = 0;
     for case in cases().iter().filter(|case| case.needs_reference) {
+        n_cases += 1;
         let error = case.run(&Options::default()).unwrap_err();
         assert!(matches!(error, VerifyError::NoReference), "{error}");
         let empty = Options {
@@ -58,6 +63,7 @@ fn without_its_tables_a_case_says_what_it_needs() {
         let error = case.run(&empty).unwrap_err().to_string();
         assert!(error.contains("no such folder/"), "{}: {error}", case.name);
     }
+    assert_eq!(n_cases, 11);
 }
 
 #[test]

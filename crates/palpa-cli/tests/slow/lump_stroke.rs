@@ -1,59 +1,22 @@
-//! A stroke over a lump: what the 1 kHz loop lets feel of it, against converged equilibria on the same mesh.
+//! A stroke over a lump: the change of force in the 1 kHz loop, against converged equilibria on the
+//! same mesh.
 
-use std::path::{Path, PathBuf};
-
-use palpa::live::{LiveScene, RehearsalParams, RehearsalTick, rehearse};
+use palpa::live::{RehearsalParams, RehearsalTick, rehearse};
 use palpa_device::{DeviceModel, Path as Way, Scripted, Vec3, band_rms};
 use palpa_lab::trace::converged_forces;
-use palpa_plot::output::OutDir;
 use palpa_plot::{Axis, Chart, Guide, Series, panels};
-use palpa_scene::Scene;
+use palpa_testkit::{Lump, Scene};
 use serde::Serialize;
 
-/// The layers of benchmark B2 under a frictionless ball. The mesh does not know of the lump, so that it is the same without.
-const LAYERS: &str = r#"
-[body]
-generator = { kind = "block", size = ["100 mm", "100 mm", "40 mm"], spacing = "12 mm" }
-[[layer]]
-tissue = { name = "skin", young = "100 kPa", poisson = 0.45 }
-thickness = "2 mm"
-[[layer]]
-tissue = { name = "fat", young = "5 kPa", poisson = 0.45 }
-thickness = "10 mm"
-levels = 3
-[[layer]]
-tissue = { name = "muscle", young = "30 kPa", poisson = 0.45 }
-levels = 4
-[tool]
-shape = "sphere"
-radius = "10 mm"
-[press]
-at = ["0 mm", "0 mm", "0 mm"]
-depth = "6 mm"
-[mesh]
-near_tool = "4.5 mm"
-near_lumps = "100 mm"
-growth = 1.0
-[motion]
-kind = "stroke"
-depth = "6 mm"
-length = "36 mm"
-above = "5 mm"
-"#;
-const LUMP: &str = r#"
-[[lump]]
-shape = "sphere"
-radius = "6 mm"
-at = ["0 mm", "0 mm", "-14 mm"]
-tissue = { name = "lump", young = "100 kPa", poisson = 0.45 }
-"#;
+use crate::{live, results};
+
 const ABOVE: f64 = 5e-3;
 const DEPTH: f64 = 6e-3;
 const HALF: f64 = 18e-3;
 const SPEED: f64 = 0.04;
 const STEP_TIME: f64 = 4e-3;
 const TICK: f64 = 1e-3;
-/// The law lets its whole force through so long after the start. s
+/// Time after the start at which the law lets its whole force through, s.
 const START: f64 = 0.65;
 /// Ticks from one converged force to the next: 1.2 mm where the stroke is fastest.
 const EVERY: usize = 30;
@@ -66,9 +29,21 @@ struct Stroke {
     n_nodes: usize,
 }
 
-fn stroke(lump: &str) -> Stroke {
-    let scene = Scene::parse(&format!("{LAYERS}{lump}"), Path::new("")).unwrap();
-    let live = LiveScene::build(&scene).unwrap();
+/// The layers of benchmark B2. The mesh near lumps is as coarse as may be, so that it is the same with
+/// and without one.
+fn layers() -> Scene {
+    Scene::skin_fat_muscle(3, 4)
+        .press(6.0)
+        .near_tool(4.5)
+        .growth(1.0)
+        .set("mesh", "near_lumps", "100 mm")
+        .motion("stroke", 6.0)
+        .set("motion", "length", "36 mm")
+        .set("motion", "above", "5 mm")
+}
+
+fn stroke(scene: &Scene) -> Stroke {
+    let live = live(scene);
     let [from, to] = [-HALF, HALF].map(|x| Vec3::x() * x);
     let down = -Vec3::z() * (ABOVE + DEPTH);
     let way = Way::from(from).hold(START).to(from + down, 0.05).hold(0.2);
@@ -118,11 +93,8 @@ fn peak(points: &[[f64; 2]]) -> [f64; 2] {
 /// knock, 0.02 N.
 #[test]
 fn a_lump_is_felt_where_it_lies_and_as_hard_as_it_is() {
-    // It needs no data, but minutes where nothing is optimised.
-    if crate::data().is_none() {
-        return;
-    }
-    let (with, without) = (stroke(LUMP), stroke(""));
+    let lump = Lump::sphere(6.0, "lump", "100 kPa").at([0.0, 0.0, -14.0]);
+    let (with, without) = (stroke(&layers().lump(lump)), stroke(&layers()));
     assert_eq!(with.n_nodes, without.n_nodes, "one mesh for both");
     let changes: Vec<Vec3> = (with.ticks.iter().zip(&without.ticks))
         .map(|(a, b)| a.force - b.force)
@@ -170,8 +142,7 @@ fn a_lump_is_felt_where_it_lies_and_as_hard_as_it_is() {
 }
 
 fn draw(with: &Stroke, without: &Stroke, changes: &[Vec3], rows: &[Row]) {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("results/lump_stroke");
-    let out = OutDir::create(folder).unwrap();
+    let out = results("lump_stroke");
     let mut table = out.table::<Row>("lump_stroke.csv").unwrap();
     for row in rows {
         table.push(row).unwrap();
@@ -188,7 +159,7 @@ fn draw(with: &Stroke, without: &Stroke, changes: &[Vec3], rows: &[Row]) {
         rows.iter().map(|r| [r.at_mm, value(r)]).collect()
     };
     let change = Chart::new(place(), Axis::linear("change of force [N]").with_zero())
-        .title("what the lump changes")
+        .title("change by the lump")
         .line("1 kHz loop, normal", moving(|f| f.z))
         .series(Series::new("converged, normal", still(|r| r.converged_z_n)).only_markers())
         .line("1 kHz loop, along", moving(|f| f.x))

@@ -1,0 +1,21 @@
+//! The test kit: a builder of scene files ([`Scene`]), and the command in a folder of its own ([`Bench`]).
+//!
+//! It knows texts and processes alone, so that the tests of every crate can use it.
+//!
+//! ```
+//! use palpa_testkit::{Layer, Scene};
+//!
+//! let scene = Scene::block([60.0, 60.0, 30.0], 8.0)
+//!     .layer(Layer::elastic("gel", "10 kPa").levels(3))
+//!     .sphere(8.0)
+//!     .press(4.0);
+//! assert!(scene.to_string().contains("spacing = \"8 mm\""));
+//! ```
+
+mod bench;
+mod scene;
+mod wait;
+
+pub use bench::{Bench, interrupt};
+pub use scene::{Layer, Lump, Scene, Value};
+pub use wait::wait_for;
