@@ -9,7 +9,7 @@ use palpa_fem::Model;
 use super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
-use palpa_lab::bench::cases::{BenchCase, Run, BenchShape, Tissue, cases};
+use palpa_lab::bench::cases::{BenchCase, BenchShape, Run, Tissue, cases};
 use palpa_lab::bench::ratios::{Ratio, dense_inverse, full_factor};
 use palpa_lab::bench::refined::Problem;
 use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
