@@ -154,11 +154,23 @@ impl Viewer {
         })
     }
 
-    /// Lifts the hand, until the body is back at rest but for a hundredth of its displacement before.
+    /// Lifts the hand, until the body is back at rest but for a hundredth of its displacement before, and the tool has left
+    /// it for some time.
     fn lift(&self, pressed: f64) {
         self.ask(&json!({ "type": "lift" }));
         wait_for("the body is let go", || {
             (self.displacement() < 0.01 * pressed).then_some(())
+        });
+        self.pass(0.8, || ());
+    }
+
+    /// Does something again and again while so many seconds pass on the engine's clock.
+    fn pass(&self, seconds: f64, again: impl Fn()) {
+        let now = || self.json("api/engine")["seconds"].as_f64().unwrap_or(0.0);
+        let until = now() + seconds;
+        wait_for("the engine's clock", || {
+            again();
+            (now() >= until).then_some(())
         });
     }
 
@@ -303,12 +315,8 @@ fn hidden_lumps_stay_hidden_until_the_truth_is_asked_for() {
     );
     let (code, words) = viewer.post(r#"{"type":"start_recording"}"#);
     assert!(code == 409 && words.contains("hidden lumps"), "{words}");
-    // The body is not shown while lumps are hidden; the energy that the hand gave is.
-    wait_for("the hand has pressed", || {
-        viewer.hold(4e-3);
-        let energy = viewer.json("api/engine")["energy_in"].as_f64();
-        (energy > Some(2e-4)).then_some(())
-    });
+    // The body is not shown while lumps are hidden: the hand presses for some time of the engine's clock.
+    viewer.pass(3.0, || viewer.hold(4e-3));
     viewer.ask(&json!({ "type": "mark", "point": [0.01, 0.0, 0.0] }));
     viewer.ask(&json!({ "type": "reveal" }));
     let state = viewer.wait_until(|state| state["game"]["result"].is_object());
