@@ -327,7 +327,12 @@ mod tests {
         assert!(bench.hand.is_in_motion());
         bench.run(0.1);
         assert!(matches!(bench.hand.lead, Lead::Homing { .. }));
-        bench.run(3.0);
+        let mut n_steps = 0;
+        while matches!(bench.hand.lead, Lead::Homing { .. }) {
+            bench.run(0.05);
+            n_steps += 1;
+            assert!(n_steps < 200, "the hand never comes home");
+        }
         let Lead::Moving { path, time } = &bench.hand.lead else {
             panic!("{:?}", bench.hand.lead)
         };
