@@ -81,11 +81,17 @@ impl Live {
                 let body = Box::new(self.world.spring_body()?.clone());
                 Material::Springs(body, displacements.clone())
             }
-            None => {
-                let model = self.world.first_model()?;
-                let at_rest = vec![Vec3::zeros(); model.n_nodes()];
-                Material::Tissue(model, at_rest)
-            }
+            None => match (self.world.first_model(), self.world.spring_body()) {
+                (Some(model), _) => {
+                    let at_rest = vec![Vec3::zeros(); model.n_nodes()];
+                    Material::Tissue(model, at_rest)
+                }
+                (None, body) => {
+                    let body = Box::new(body?.clone());
+                    let at_rest = vec![Vec3::zeros(); body.n_nodes()];
+                    Material::Springs(body, at_rest)
+                }
+            },
         })
     }
 
