@@ -3,6 +3,38 @@
 //! A skin surface is grown inward into layers of triangular prisms, pressed with a tool, and pushes back in newtons.
 //! The parts are crates of their own, re-exported here. Pictures and files are in `palpa-plot`, the viewer in
 //! `palpa-viewer` and `palpa-session`, verification and benchmarks in `palpa-lab`, the command in `palpa-cli`.
+//!
+//! ```
+//! use std::path::Path;
+//! use std::sync::Arc;
+//!
+//! use palpa::Prepared;
+//! use palpa::press::tissue::Indentation;
+//! use palpa::scene::Scene;
+//!
+//! let text = r#"
+//!     [body]
+//!     generator = { kind = "block", size = ["40 mm", "40 mm", "16 mm"], spacing = "10 mm" }
+//!     [[layer]]
+//!     tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
+//!     [tool]
+//!     shape = "sphere"
+//!     radius = "8 mm"
+//!     [press]
+//!     depth = "2 mm"
+//!     step = "1 mm"
+//! "#;
+//! let scene = Scene::parse(text, Path::new("."))?;
+//! let press = Indentation::build(Arc::new(Prepared::build(&scene)?))?;
+//! let mut run = press.start(0);
+//! let mut forces = Vec::new();
+//! while let Some(sample) = run.advance() {
+//!     assert!(sample.outcome.is_converged());
+//!     forces.push([sample.depth_mm, sample.force_n]);
+//! }
+//! assert!(forces[2][0] == 2.0 && forces[2][1] > 0.05);
+//! # Ok::<(), anyhow::Error>(())
+//! ```
 
 pub mod build;
 pub mod continuum;

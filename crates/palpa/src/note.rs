@@ -3,8 +3,9 @@
 //! [`Display`](fmt::Display) has the English words that the command prints and files keep. The page of the viewer gets the
 //! same notes as JSON and has words of its own in each of its languages.
 //!
-//! To add a note: a variant here with its numbers in SI units, its words in `fmt` below, and its words in
-//! `web/src/i18n/en.ts` and `ja.ts` (the page's types are made from this one, so that a missing entry does not compile).
+//! To add a note: a variant here with its numbers in SI units, its words in `fmt` below, and its words in both languages in
+//! `web/src/i18n/notes.ts`. Then run `PALPA_BLESS=1 cargo test -p palpa` and, in `web/`, `npm run generate`: without an
+//! entry the page does not compile.
 
 use std::fmt;
 
@@ -227,11 +228,6 @@ pub enum Note {
         radius: f64,
         /// Mean length of the skin's edges near the tool, m.
         edge: f64,
-    },
-    /// CalculiX is given something else than the scene says.
-    Departure {
-        /// What differs, in English.
-        text: String,
     },
 }
 
@@ -494,7 +490,6 @@ impl fmt::Display for Note {
                 mm(radius),
                 mm(edge)
             ),
-            Self::Departure { text } => f.write_str(text),
         }
     }
 }

@@ -365,11 +365,6 @@ export interface components {
              * @description Radius of the circle with the largest contact area, m.
              */
             radius: number;
-        } | {
-            /** @constant */
-            kind: "departure";
-            /** @description What differs, in English. */
-            text: string;
         };
         /** @description The shape of a layer's levels. */
         LayerAspect: {

@@ -52,7 +52,6 @@ const en: Words = {
   turned_prisms: ({ n, depth, at }) => `${n} prisms have a corner turned inside out at ${mm(depth, 2)}, the worst near ${place(at)}. The force may be off.`,
   friction_smoothed: ({ n, n_all, slip }) => `Friction had to be smoothed in ${n} of ${n_all} steps, over a slip of up to ${Math.round(slip * 1e6)} µm.`,
   few_touching: ({ n_vertices, radius, edge }) => `At most ${n_vertices} skin vertices touch the tool, over a circle of radius ${mm(radius)} with edges of ${mm(edge)}: the force depends on the mesh.`,
-  departure: ({ text }) => text,
 };
 
 const ja: Words = {
@@ -88,7 +87,6 @@ const ja: Words = {
   turned_prisms: ({ n, depth, at }) => `深さ ${mm(depth, 2)} で ${n} 個の要素が裏返っています（最悪の位置 ${place(at)}）。力が正しくない可能性があります。`,
   friction_smoothed: ({ n, n_all, slip }) => `${n_all} ステップ中 ${n} ステップで摩擦を平滑化しました（滑り 最大 ${Math.round(slip * 1e6)} µm）。`,
   few_touching: ({ n_vertices, radius, edge }) => `工具に触れる皮膚の頂点は最大 ${n_vertices} 個です（半径 ${mm(radius)}、辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
-  departure: ({ text }) => text,
 };
 
 const WORDS: Record<Language, Words> = { en, ja };

@@ -7,7 +7,7 @@
 //! | --- | --- | --- | --- |
 //! | statics, each Newton iteration | [`crate::statics`], `active_set.rs` | displacements of all nodes; a touching vertex is held on the tool's surface | each touching vertex sticks (held at its anchor) or slides; decided between iterations |
 //! | moving step, each iteration at some 100 Hz | here | forces on at most 160 candidates, on their compliance | decided in sweeps over the candidates (`rub`), once an iteration |
-//! | servo, each tick at 1 kHz | `palpa-servo`, `solve.rs` and `contact.rs` | forces on at most 60 vertices of the patch, and the coupling's displacement | decided each tick, on the round cone, one vertex after the other |
+//! | servo, each tick at 1 kHz | `palpa-servo`, `solver.rs` and `contact.rs` | forces on at most 60 vertices of the patch, and the coupling's displacement | decided each tick, on the round cone, one vertex after the other |
 //!
 //! ```text
 //! s = s0 + w (f − p0),   p = f − κ s,   0 ≤ g0 + s − s0 ⟂ p ≥ 0
