@@ -1,5 +1,13 @@
 //! Material laws.
 //!
+//! To add a law:
+//! 1. A file like `yeoh.rs`. Here: `mod`, `pub use`, a variant of [`Law`], the lists `of_each` and `law_from!`; the compiler
+//!    asks for the rest, but look at the `_` arms of `volume_measure` and `kinematics` yourself.
+//! 2. `palpa-scene`: `law.rs` (name, parameters), `tissue.rs` (`Energy`), `file/tissue.rs`, `resolve/tissue.rs` (new keys),
+//!    `write/tissue.rs`, `status.rs`. Then `law` in `palpa/src/continuum.rs` and `palpa-lab/src/export/material.rs`.
+//! 3. Tests: `every_law` in `tests/it/law.rs` runs all of them over it. A row in `docs/theory/laws.md`; the page's entry as the
+//!    head of `web/src/ui/tissue.ts` says.
+//!
 //! A law is the sum of a *deviatoric* energy density, which the element evaluates at its points, and a *volumetric* one,
 //! which it evaluates once at the mean volume change of a pair of prisms, so that nearly incompressible tissue does not
 //! lock:

@@ -1,5 +1,12 @@
 //! Rigid shapes with exact distance: what presses, and what lies hidden in the tissue.
 //!
+//! To add a tool shape:
+//! 1. A file like `sphere.rs`. Here: a variant of [`Shape`], its arms (the compiler asks), its name in `from_shape!`.
+//! 2. `palpa-scene`: `file/tool.rs` (keys), `ContactShape` in `tool.rs`, `resolve/tool.rs`, `write/tool.rs`. Then
+//!    `tool_shape` in `palpa/src/continuum.rs` and `footprint` in `palpa/src/press/mesh.rs`.
+//! 3. For the page: `ToolForm` in `palpa-viewer/src/control.rs`, `palpa-session/src/world/info.rs`, and what the head of
+//!    `web/src/scene/toolshapes.ts` says. Tests: the list of shapes in `tests/it/shape.rs`.
+//!
 //! A shape stands in a frame of its own. Its origin is the *tip*, the point that touches first when the shape moves
 //! along −z; z points out of the tissue:
 //!
