@@ -1,10 +1,13 @@
 //! The tissues that a scene can name, with the source of every number.
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::law::{LawName, Parts};
+use crate::law::LawName;
+use crate::parameters::{Numbers, ParameterSpec, Unit};
+use crate::resolve::law::Parts;
 use crate::units::{Density, Pressure, Time};
 use crate::{Moduli, Prony, PronyTerm, Sourced, Status, Tissue};
 
@@ -24,17 +27,21 @@ struct File {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Entry {
     name: String,
     law: LawName,
-    young: Option<Written<Pressure>>,
-    c10: Option<Written<Pressure>>,
-    b: Option<Written<f64>>,
-    poisson: Option<Written<f64>>,
-    bulk: Option<Written<Pressure>>,
     prony: Option<WrittenProny>,
     density: Option<Written<Density>>,
+    /// The parameters of the law, by their keys.
+    #[serde(flatten)]
+    numbers: BTreeMap<String, Written<WrittenNumber>>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum WrittenNumber {
+    Plain(f64),
+    WithUnit(String),
 }
 
 #[derive(Deserialize)]
@@ -67,16 +74,21 @@ fn read(text: &str) -> Result<Vec<Tissue>, String> {
 
 impl Entry {
     fn tissue(self) -> Result<Tissue, String> {
-        let pressure =
-            |written: Option<Written<Pressure>>| written.map(|w| w.sourced(Pressure::si));
-        let number = |written: Option<Written<f64>>| written.map(|w| w.sourced(|number| number));
+        let mut numbers = Numbers::default();
+        for (key, number) in self.numbers {
+            let spec = ParameterSpec::of(&key).ok_or_else(|| format!("unknown key {key}"))?;
+            let value = match (&number.value, spec.unit) {
+                (WrittenNumber::Plain(value), Unit::One) => *value,
+                (WrittenNumber::WithUnit(text), Unit::Pascal) => {
+                    text.parse::<Pressure>().map_err(|e| e.to_string())?.si()
+                }
+                _ => return Err(format!("{}: {key} has the wrong unit", self.name)),
+            };
+            numbers.set(spec.key, number.sourced(|_| value));
+        }
         let parts = Parts {
             law: self.law,
-            young: pressure(self.young),
-            c10: pressure(self.c10),
-            b: number(self.b),
-            poisson: number(self.poisson),
-            bulk: pressure(self.bulk),
+            numbers,
             ..Parts::default()
         };
         Ok(Tissue {
@@ -91,7 +103,7 @@ impl Entry {
 }
 
 impl<T> Written<T> {
-    fn sourced(self, to_si: fn(T) -> f64) -> Sourced {
+    fn sourced(self, to_si: impl Fn(T) -> f64) -> Sourced {
         Sourced {
             value: to_si(self.value),
             status: self.status,

@@ -11,7 +11,7 @@
 
 mod either;
 mod motion;
-mod tissue;
+mod tissue_table;
 mod tool;
 
 use std::path::PathBuf;
@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use self::either::{AxisName, AxisSpec, ThicknessSpec, TissueSpec};
 pub(crate) use self::motion::{DeviceTable, MotionTable};
-pub(crate) use self::tissue::{OgdenTable, PronyTable, PronyTermTable, TissueTable};
-pub(crate) use self::tool::{LumpShapeName, LumpTable, ToolShape, ToolTable};
+pub(crate) use self::tissue_table::{OgdenTable, PronyTable, PronyTermTable, TissueTable};
+pub(crate) use self::tool::{LumpShapeName, LumpTable, ToolTable};
 use crate::Status;
 use crate::model::ModelKind;
 use crate::scene::{CutFaces, InPlane, LengthUnit, Solver};

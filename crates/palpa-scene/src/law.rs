@@ -1,11 +1,16 @@
-//! From the numbers that are written of a tissue to its elastic law: which go together, and which are possible.
+//! The elastic laws that a scene can name.
+//!
+//! To add a law: its name in [`LawName`], its parameters in [`Energy`] and [`LawName::keys`], and an
+//! arm in each `match` of this file that the compiler asks for. A number that no law has yet is
+//! declared in `parameters.rs`. The law itself is one file of `palpa-fem/src/law`, whose head lists
+//! the other places. Reading, checking, writing, schema and reports follow from these.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::limits;
+use crate::parameters::Numbers;
 use crate::units::Pressure;
-use crate::{Elastic, Energy, Law, OgdenTerm, Resistance, Sourced, Status, Stiffness, Volume};
+use crate::{Sourced, Stiffness};
 
 /// The elastic laws that a tissue can be given.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -28,302 +33,230 @@ pub(crate) enum LawName {
     Fung,
 }
 
-/// The numbers that are written of a tissue's elasticity, each within its own range.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Parts {
-    pub(crate) law: LawName,
-    pub(crate) young: Option<Sourced>,
-    pub(crate) shear: Option<Sourced>,
-    pub(crate) c10: Option<Sourced>,
-    pub(crate) c01: Option<Sourced>,
-    pub(crate) c20: Option<Sourced>,
-    pub(crate) c30: Option<Sourced>,
-    pub(crate) terms: Option<Vec<OgdenTerm>>,
-    pub(crate) alpha: Option<Sourced>,
-    pub(crate) b: Option<Sourced>,
-    pub(crate) poisson: Option<Sourced>,
-    pub(crate) bulk: Option<Sourced>,
-    pub(crate) volume: Option<Volume>,
+/// The deviatoric part of a strain energy. `Ī1`, `Ī2` are the isochoric invariants, `λ̄` the isochoric stretches.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Energy {
+    /// `µ dev ε : dev ε` of the small strain `ε`; the stiffness never changes.
+    Linear {
+        /// Gives `µ`.
+        stiffness: Stiffness,
+    },
+    /// `µ dev E : dev E` of the Green–Lagrange strain `E`; softens under compression, for comparison only.
+    StVenantKirchhoff {
+        /// Gives `µ`.
+        stiffness: Stiffness,
+    },
+    /// `C10 (Ī1 − 3)`, `µ = 2 C10`.
+    NeoHookean {
+        /// Gives `C10`.
+        stiffness: Stiffness,
+    },
+    /// `C10 (Ī1 − 3) + C01 (Ī2 − 3)`, `µ = 2 (C10 + C01)`.
+    MooneyRivlin {
+        /// Gives `C10`.
+        stiffness: Stiffness,
+        /// `C01` in pascals, 0 or more.
+        c01: Sourced,
+    },
+    /// `C10 (Ī1 − 3) + C20 (Ī1 − 3)² + C30 (Ī1 − 3)³`, `µ = 2 C10`.
+    Yeoh {
+        /// Gives `C10`.
+        stiffness: Stiffness,
+        /// `C20` in pascals.
+        c20: Sourced,
+        /// `C30` in pascals, 0 or more.
+        c30: Sourced,
+    },
+    /// `Σ 2µᵢ/αᵢ² (λ̄1^αᵢ + λ̄2^αᵢ + λ̄3^αᵢ − 3)`, `µ = Σ µᵢ`, as in Abaqus and CalculiX.
+    Ogden {
+        /// 1 to 6 terms.
+        terms: Vec<OgdenTerm>,
+    },
+    /// `µ/(2b) (exp(b (Ī1 − 3)) − 1)`: skin, which stiffens as its fibres straighten.
+    Fung {
+        /// Gives `µ`.
+        stiffness: Stiffness,
+        /// How fast it stiffens, above 0.
+        b: Sourced,
+    },
 }
 
-/// Why the numbers of a tissue make no law.
-#[derive(Debug)]
-pub(crate) struct LawFault {
-    /// The key that is to blame, if one is.
-    pub(crate) key: Option<&'static str>,
-    pub(crate) message: String,
-}
-
-fn fault<T>(
-    key: impl Into<Option<&'static str>>,
-    message: impl Into<String>,
-) -> Result<T, LawFault> {
-    Err(LawFault {
-        key: key.into(),
-        message: message.into(),
-    })
+/// A term of Ogden's energy.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OgdenTerm {
+    /// Its share `µᵢ` of the shear modulus, in pascals.
+    pub mu: Sourced,
+    /// Its exponent `αᵢ`, not 0.
+    pub alpha: f64,
 }
 
 impl LawName {
-    /// Its name as a scene writes it, with its article.
-    fn named(self) -> &'static str {
+    /// Its name with the article, the keys by one of which its stiffness is given, and its other keys. `terms` is no
+    /// parameter but a list, and `alpha` its short form.
+    fn words(
+        self,
+    ) -> (
+        &'static str,
+        &'static [&'static str],
+        &'static [&'static str],
+    ) {
         match self {
-            Self::Linear => "a linear",
-            Self::StVenantKirchhoff => "a st-venant-kirchhoff",
-            Self::NeoHookean => "a neo-hookean",
-            Self::MooneyRivlin => "a mooney-rivlin",
-            Self::Yeoh => "a yeoh",
-            Self::Ogden => "an ogden",
-            Self::Fung => "a fung",
+            Self::Linear => ("a linear", &["young", "shear"], &[]),
+            Self::StVenantKirchhoff => ("a st-venant-kirchhoff", &["young", "shear"], &[]),
+            Self::NeoHookean => ("a neo-hookean", &["young", "shear", "c10"], &[]),
+            Self::MooneyRivlin => ("a mooney-rivlin", &["young", "shear", "c10"], &["c01"]),
+            Self::Yeoh => ("a yeoh", &["young", "shear", "c10"], &["c20", "c30"]),
+            Self::Ogden => ("an ogden", &["terms", "young", "shear"], &["alpha"]),
+            Self::Fung => ("a fung", &["young", "shear"], &["b"]),
         }
+    }
+
+    /// Its name as a scene writes it.
+    pub(crate) fn name(self) -> &'static str {
+        let named = self.named();
+        named.split_once(' ').map_or(named, |(_, name)| name)
+    }
+
+    /// Its name with the article: `a fung`.
+    pub(crate) fn named(self) -> &'static str {
+        self.words().0
     }
 
     /// The keys it takes beside those of the volume.
-    fn keys(self) -> &'static [&'static str] {
-        match self {
-            Self::Linear | Self::StVenantKirchhoff => &["young", "shear"],
-            Self::NeoHookean => &["young", "shear", "c10"],
-            Self::MooneyRivlin => &["young", "shear", "c10", "c01"],
-            Self::Yeoh => &["young", "shear", "c10", "c20", "c30"],
-            Self::Ogden => &["terms", "young", "shear", "alpha"],
-            Self::Fung => &["young", "shear", "b"],
-        }
-    }
-}
-
-impl Parts {
-    /// The law that the numbers give.
-    pub(crate) fn law(self) -> Result<Law, LawFault> {
-        self.check_keys()?;
-        let is_small = matches!(self.law, LawName::Linear | LawName::StVenantKirchhoff);
-        if is_small && self.volume == Some(Volume::Logarithmic) {
-            return fault(
-                "volume",
-                format!(
-                    "{} law has a quadratic volume; remove `volume`, or use law = \"neo-hookean\"",
-                    self.law.named()
-                ),
-            );
-        }
-        let resistance = match (self.poisson.clone(), self.bulk.clone()) {
-            (Some(poisson), None) => Resistance::Poisson(poisson),
-            (None, Some(bulk)) => Resistance::Bulk(bulk),
-            (None, None) => Resistance::Poisson(Sourced {
-                value: 0.45,
-                status: Status::Assumed,
-                source: "default, customary in limb indentation".to_owned(),
-            }),
-            (Some(_), Some(_)) => {
-                return fault(
-                    "bulk",
-                    "the resistance to a change of volume is given twice; remove `poisson` or `bulk`",
-                );
-            }
-        };
-        let volume = self.volume.unwrap_or_default();
-        let elastic = Elastic {
-            energy: self.energy(&resistance)?,
-            resistance,
-            volume,
-        };
-        check(&elastic)?;
-        Ok(Law::Elastic(elastic))
+    pub(crate) fn keys(self) -> impl Iterator<Item = &'static str> {
+        let (_, stiffness, own) = self.words();
+        stiffness.iter().chain(own).copied()
     }
 
-    fn check_keys(&self) -> Result<(), LawFault> {
-        let given = [
-            ("young", self.young.is_some()),
-            ("shear", self.shear.is_some()),
-            ("c10", self.c10.is_some()),
-            ("c01", self.c01.is_some()),
-            ("c20", self.c20.is_some()),
-            ("c30", self.c30.is_some()),
-            ("terms", self.terms.is_some()),
-            ("alpha", self.alpha.is_some()),
-            ("b", self.b.is_some()),
-        ];
-        let keys = self.law.keys();
-        match given
-            .iter()
-            .find(|(key, given)| *given && !keys.contains(key))
-        {
-            None => Ok(()),
-            Some(&(key, _)) => fault(
-                key,
-                format!(
-                    "{} law does not take `{key}`; it takes `{}` (choose the law with `law`)",
-                    self.law.named(),
-                    keys.join("`, `")
-                ),
-            ),
-        }
+    /// Whether it takes the volume's quadratic energy only.
+    pub(crate) fn is_quadratic(self) -> bool {
+        matches!(self, Self::Linear | Self::StVenantKirchhoff)
     }
 
-    fn energy(mut self, resistance: &Resistance) -> Result<Energy, LawFault> {
-        let zero = || Sourced {
-            value: 0.0,
-            status: Status::Assumed,
-            source: "default".to_owned(),
-        };
-        Ok(match self.law {
-            LawName::Linear => Energy::Linear {
-                stiffness: self.stiffness()?,
+    /// The energy of this stiffness and the parameters that `own` gives by their keys; of Ogden's, `terms`.
+    pub(crate) fn energy<E>(
+        self,
+        stiffness: impl FnOnce() -> Result<Stiffness, E>,
+        own: impl Fn(&str) -> Result<Sourced, E>,
+        terms: impl FnOnce() -> Result<Vec<OgdenTerm>, E>,
+    ) -> Result<Energy, E> {
+        Ok(match self {
+            Self::Linear => Energy::Linear {
+                stiffness: stiffness()?,
             },
-            LawName::StVenantKirchhoff => Energy::StVenantKirchhoff {
-                stiffness: self.stiffness()?,
+            Self::StVenantKirchhoff => Energy::StVenantKirchhoff {
+                stiffness: stiffness()?,
             },
-            LawName::NeoHookean => Energy::NeoHookean {
-                stiffness: self.stiffness()?,
+            Self::NeoHookean => Energy::NeoHookean {
+                stiffness: stiffness()?,
             },
-            LawName::MooneyRivlin => match self.c01.take() {
-                Some(c01) => Energy::MooneyRivlin {
-                    stiffness: self.stiffness()?,
-                    c01,
-                },
-                None => return fault(None, "a mooney-rivlin law needs `c01 = \"1 kPa\"`"),
+            Self::MooneyRivlin => Energy::MooneyRivlin {
+                c01: own("c01")?,
+                stiffness: stiffness()?,
             },
-            LawName::Yeoh => Energy::Yeoh {
-                c20: self.c20.take().unwrap_or_else(zero),
-                c30: self.c30.take().unwrap_or_else(zero),
-                stiffness: self.stiffness()?,
+            Self::Yeoh => Energy::Yeoh {
+                c20: own("c20")?,
+                c30: own("c30")?,
+                stiffness: stiffness()?,
             },
-            LawName::Ogden => Energy::Ogden {
-                terms: self.ogden_terms(resistance)?,
-            },
-            LawName::Fung => match self.b.take() {
-                Some(b) => Energy::Fung {
-                    stiffness: self.stiffness()?,
-                    b,
-                },
-                None => {
-                    return fault(
-                        None,
-                        "a fung law needs `b = 10`, which says how fast it stiffens",
-                    );
-                }
+            Self::Ogden => Energy::Ogden { terms: terms()? },
+            Self::Fung => Energy::Fung {
+                b: own("b")?,
+                stiffness: stiffness()?,
             },
         })
     }
-
-    fn stiffness(self) -> Result<Stiffness, LawFault> {
-        match (self.young, self.shear, self.c10) {
-            (Some(young), None, None) => Ok(Stiffness::Young(young)),
-            (None, Some(shear), None) => Ok(Stiffness::Shear(shear)),
-            (None, None, Some(c10)) => Ok(Stiffness::C10(c10)),
-            (None, None, None) => fault(
-                None,
-                "the tissue has no stiffness; give `young = \"12 kPa\"` or `spring = \"90 dyn/cm\"`",
-            ),
-            (young, _, c10) => {
-                let [first, second] = match (young, c10) {
-                    (Some(_), None) => ["young", "shear"],
-                    (Some(_), Some(_)) => ["young", "c10"],
-                    (None, _) => ["shear", "c10"],
-                };
-                fault(
-                    second,
-                    format!("the stiffness is given twice; remove `{first}` or `{second}`"),
-                )
-            }
-        }
-    }
-
-    /// The terms as given, or the one that a modulus and an exponent make.
-    fn ogden_terms(mut self, resistance: &Resistance) -> Result<Vec<OgdenTerm>, LawFault> {
-        let is_modulus_given = self.young.is_some() || self.shear.is_some();
-        match (self.terms.take(), self.alpha.take()) {
-            (Some(terms), None) if !is_modulus_given => Ok(terms),
-            (None, Some(alpha)) if is_modulus_given => {
-                let stiffness = self.stiffness()?;
-                let given = stiffness.sourced().clone();
-                // Any law of this stiffness has its shear modulus.
-                let likeness = Elastic {
-                    energy: Energy::NeoHookean { stiffness },
-                    resistance: resistance.clone(),
-                    volume: Volume::default(),
-                };
-                check(&likeness)?;
-                let value = likeness.shear();
-                Ok(vec![OgdenTerm {
-                    mu: Sourced { value, ..given },
-                    alpha: alpha.value,
-                }])
-            }
-            _ => fault(
-                None,
-                "an ogden law takes either `terms = [{ mu = \"4 kPa\", alpha = 10 }]`, or `alpha` with `young` or `shear`",
-            ),
-        }
-    }
 }
 
-/// Whether the numbers together give a solid: a Poisson's ratio and a stiffness that a body can have, and an energy that
-/// grows with strain throughout.
-fn check(elastic: &Elastic) -> Result<(), LawFault> {
-    if matches!(elastic.resistance, Resistance::Bulk(_)) {
-        check_bulk(elastic)?;
+impl Energy {
+    /// Its law, as a scene names it.
+    pub(crate) fn law(&self) -> LawName {
+        match self {
+            Self::Linear { .. } => LawName::Linear,
+            Self::StVenantKirchhoff { .. } => LawName::StVenantKirchhoff,
+            Self::NeoHookean { .. } => LawName::NeoHookean,
+            Self::MooneyRivlin { .. } => LawName::MooneyRivlin,
+            Self::Yeoh { .. } => LawName::Yeoh,
+            Self::Ogden { .. } => LawName::Ogden,
+            Self::Fung { .. } => LawName::Fung,
+        }
     }
-    let (c10, young) = (elastic.c10(), Pressure::from_si(elastic.young()));
-    match &elastic.energy {
-        Energy::MooneyRivlin { c01, .. } if c10 < 0.0 => {
-            return fault(
+
+    /// Its name as a scene writes it.
+    pub fn name(&self) -> &'static str {
+        self.law().name()
+    }
+
+    /// The stiffness as it was given; `None` for Ogden's, whose terms give it.
+    pub fn stiffness(&self) -> Option<&Stiffness> {
+        match self {
+            Self::Linear { stiffness }
+            | Self::StVenantKirchhoff { stiffness }
+            | Self::NeoHookean { stiffness }
+            | Self::MooneyRivlin { stiffness, .. }
+            | Self::Yeoh { stiffness, .. }
+            | Self::Fung { stiffness, .. } => Some(stiffness),
+            Self::Ogden { .. } => None,
+        }
+    }
+
+    /// The terms of Ogden's energy; none of any other.
+    pub fn terms(&self) -> &[OgdenTerm] {
+        match self {
+            Self::Ogden { terms } => terms,
+            _ => &[],
+        }
+    }
+
+    /// Its parameters beside stiffness and terms, by their keys.
+    pub(crate) fn own(&self) -> Numbers<&Sourced> {
+        let mut numbers = Numbers::default();
+        match self {
+            Self::MooneyRivlin { c01, .. } => numbers.set("c01", c01),
+            Self::Yeoh { c20, c30, .. } => {
+                numbers.set("c20", c20);
+                numbers.set("c30", c30);
+            }
+            Self::Fung { b, .. } => numbers.set("b", b),
+            Self::Linear { .. }
+            | Self::StVenantKirchhoff { .. }
+            | Self::NeoHookean { .. }
+            | Self::Ogden { .. } => {}
+        }
+        numbers
+    }
+
+    /// What the second invariant has of half the shear modulus, in pascals.
+    pub(crate) fn c01(&self) -> f64 {
+        match self {
+            Self::MooneyRivlin { c01, .. } => c01.value,
+            _ => 0.0,
+        }
+    }
+
+    /// The key of a parameter that makes the energy shrink with strain beside this `C10`, in pascals, and why.
+    pub(crate) fn fault(&self, c10: f64, shear: f64) -> Option<(&'static str, String)> {
+        match self {
+            Self::MooneyRivlin { c01, .. } if c10 < 0.0 => Some((
                 "c01",
                 format!(
                     "a `c01` of {} is more than the whole stiffness, half a shear modulus of {}; make it smaller",
                     Pressure::from_si(c01.value),
-                    rounded(elastic.shear(), f64::round)
+                    Pressure::rounded(shear, f64::round)
                 ),
-            );
+            )),
+            // The slope C10 + 2 C20 x + 3 C30 x² has a root at x > 0.
+            Self::Yeoh { c20, c30, .. }
+                if c20.value < 0.0 && c20.value.powi(2) >= 3.0 * c10 * c30.value =>
+            {
+                Some((
+                    "c20",
+                    "the energy stops growing at a larger strain; take `c20` of 0 or more, or `c30` above c20²/(3 c10)"
+                        .to_owned(),
+                ))
+            }
+            _ => None,
         }
-        // The slope C10 + 2 C20 x + 3 C30 x² has a root at x > 0.
-        Energy::Yeoh { c20, c30, .. }
-            if c20.value < 0.0 && c20.value.powi(2) >= 3.0 * c10 * c30.value =>
-        {
-            return fault(
-                "c20",
-                "the energy stops growing at a larger strain; take `c20` of 0 or more, or `c30` above c20²/(3 c10)",
-            );
-        }
-        _ => {}
     }
-    if !limits::YOUNG.contains(&young) {
-        return fault(
-            None,
-            format!(
-                "the parameters together are a Young's modulus of {}, outside the allowed range {}; check the numbers \
-                 and their units",
-                rounded(young.si(), f64::round),
-                limits::YOUNG
-            ),
-        );
-    }
-    Ok(())
-}
-
-fn check_bulk(elastic: &Elastic) -> Result<(), LawFault> {
-    let poisson = elastic.poisson();
-    if limits::POISSON.contains(&poisson) {
-        return Ok(());
-    }
-    let bulk_at = |nu: f64| match elastic.energy.stiffness() {
-        Some(Stiffness::Young(e)) => e.value / (3.0 * (1.0 - 2.0 * nu)),
-        _ => 2.0 * elastic.shear() * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu)),
-    };
-    fault(
-        "bulk",
-        format!(
-            "a bulk modulus of {} beside this stiffness is a Poisson's ratio of {poisson:.7}, outside {}; take {} to {}",
-            Pressure::from_si(elastic.bulk()),
-            limits::POISSON,
-            rounded(bulk_at(limits::POISSON.min), f64::ceil),
-            rounded(bulk_at(limits::POISSON.max), f64::floor),
-        ),
-    )
-}
-
-/// To three digits, for messages.
-fn rounded(pascals: f64, round: fn(f64) -> f64) -> Pressure {
-    let unit = 10f64.powf(pascals.abs().log10().floor() - 2.0);
-    let scaled = round(pascals / unit) * unit;
-    Pressure::from_si(if scaled.is_finite() { scaled } else { pascals })
 }

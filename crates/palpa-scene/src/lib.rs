@@ -23,6 +23,7 @@
 pub mod units;
 
 mod catalogue;
+mod elastic;
 mod error;
 mod file;
 mod frame;
@@ -31,9 +32,11 @@ mod limits;
 mod lump;
 mod model;
 mod motion;
+mod parameters;
 mod resolve;
 mod scene;
 mod schema;
+mod shape;
 mod status;
 mod thickness;
 mod tissue;
@@ -41,7 +44,9 @@ mod tool;
 mod write;
 
 pub use catalogue::catalogue;
+pub use elastic::{Elastic, Resistance, Stiffness, Volume};
 pub use error::{Place, SceneError};
+pub use law::{Energy, OgdenTerm};
 pub use lump::{Lump, LumpPlace, LumpShape};
 pub use model::{Damping, Dynamics, Mesh, Model, ModelKind};
 pub use motion::{Device, DeviceKind, DevicePreset, Grip, Motion, MotionKind};
@@ -50,10 +55,8 @@ pub use scene::{
     Solver, Target,
 };
 pub use schema::scene_schema;
+pub use shape::ContactShape;
 pub use status::{MaterialStatus, Parameter};
 pub use thickness::{Thickness, ThicknessError, ThicknessSample, read_thickness};
-pub use tissue::{
-    Elastic, Energy, Law, Moduli, OgdenTerm, Prony, PronyTerm, Resistance, Sourced, Status,
-    Stiffness, Tissue, Volume,
-};
-pub use tool::{ContactShape, ContactTool, Tool};
+pub use tissue::{Law, Moduli, Prony, PronyTerm, Sourced, Status, Tissue};
+pub use tool::{ContactTool, Tool};

@@ -1,11 +1,12 @@
 //! From the scene as written to the scene: ranges, combinations, defaults, the catalogue.
 
 mod body;
+pub(crate) mod law;
 mod layers;
 mod lumps;
 mod model;
 mod motion;
-mod tissue;
+mod tissues;
 mod tool;
 
 use std::fs::File;
@@ -235,7 +236,7 @@ fn coordinates(at: &Site<'_>, point: [Length; 3]) -> Result<[f64; 3], SceneError
     each(at, point, &limits::COORDINATE)
 }
 
-fn each<K: Kind>(
+pub(crate) fn each<K: Kind>(
     at: &Site<'_>,
     values: [Quantity<K>; 3],
     limits: &Limits<Quantity<K>>,

@@ -5,10 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::units::{Pressure, Time};
-use crate::{
-    Elastic, Energy, Law, Layer, Lump, Moduli, Prony, Resistance, Sourced, Status, Stiffness,
-    Tissue, Volume,
-};
+use crate::{Elastic, Law, Layer, Lump, Moduli, Prony, Sourced, Status, Tissue, Volume};
 
 /// What a layer's or a lump's material is and how far it is to be trusted; shown beside every force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -166,38 +163,24 @@ fn law_parameters(law: &Law) -> Vec<Parameter> {
     }
 }
 
+/// Those of Ogden's terms come before Poisson's ratio or the bulk modulus, as all others do.
 fn elastic_parameters(elastic: &Elastic) -> Vec<Parameter> {
-    let mut all: Vec<Parameter> = (elastic.energy.stiffness().into_iter())
-        .map(|stiffness| match stiffness {
-            Stiffness::Young(young) => Parameter::new("young", young, "Pa"),
-            Stiffness::Shear(shear) => Parameter::new("shear", shear, "Pa"),
-            Stiffness::C10(c10) => Parameter::new("c10", c10, "Pa"),
-        })
+    let numbers = elastic.numbers();
+    let mut all: Vec<Parameter> = (numbers.given())
+        .map(|(spec, number)| Parameter::new(spec.key, number, spec.unit.symbol()))
         .collect();
-    match &elastic.energy {
-        Energy::Linear { .. } | Energy::StVenantKirchhoff { .. } | Energy::NeoHookean { .. } => {}
-        Energy::MooneyRivlin { c01, .. } => all.push(Parameter::new("c01", c01, "Pa")),
-        Energy::Yeoh { c20, c30, .. } => {
-            all.push(Parameter::new("c20", c20, "Pa"));
-            all.push(Parameter::new("c30", c30, "Pa"));
-        }
-        Energy::Fung { b, .. } => all.push(Parameter::new("b", b, "")),
-        Energy::Ogden { terms } => {
-            for (i, term) in terms.iter().enumerate() {
-                all.push(Parameter::new(&format!("terms[{i}].mu"), &term.mu, "Pa"));
-                all.push(Parameter {
-                    name: format!("terms[{i}].alpha"),
-                    value: term.alpha,
-                    unit: "",
-                    ..Parameter::new("", &term.mu, "")
-                });
-            }
-        }
-    }
-    all.push(match &elastic.resistance {
-        Resistance::Poisson(poisson) => Parameter::new("poisson", poisson, ""),
-        Resistance::Bulk(bulk) => Parameter::new("bulk", bulk, "Pa"),
+    let terms = elastic.energy.terms().iter().enumerate();
+    let terms = terms.flat_map(|(i, term)| {
+        let mu = Parameter::new(&format!("terms[{i}].mu"), &term.mu, "Pa");
+        let alpha = Parameter {
+            name: format!("terms[{i}].alpha"),
+            value: term.alpha,
+            unit: "",
+            ..Parameter::new("", &term.mu, "")
+        };
+        [mu, alpha]
     });
+    all.splice(all.len() - 1..all.len() - 1, terms);
     all
 }
 

@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use crate::frame;
-use crate::units::Length;
+use crate::{ContactShape, frame};
 
 /// What presses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,43 +30,6 @@ pub struct ContactTool {
     pub axis: Option<[f64; 3]>,
 }
 
-/// The shape of a rigid tool. All lengths in metres. At depth 0 it touches the skin at rest with the point that goes
-/// first, in the middle of its face.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ContactShape {
-    /// A ball.
-    Sphere {
-        /// Its radius.
-        radius: f64,
-    },
-    /// The flat end of a round rod, with a rounded edge.
-    FlatPunch {
-        /// Radius of the rod.
-        radius: f64,
-        /// Radius of its edge's rounding, no more than `radius`.
-        edge_radius: f64,
-    },
-    /// A lying cylinder with round ends.
-    Capsule {
-        /// Radius of the cylinder and its ends.
-        radius: f64,
-        /// Length of the straight part, between the centres of the ends.
-        length: f64,
-    },
-    /// A box with rounded edges.
-    Box {
-        /// Its whole size along, across, and in the direction of the press.
-        size: [f64; 3],
-        /// Radius of its edges' rounding, no more than half its smallest size.
-        edge_radius: f64,
-    },
-    /// The pad of a finger: an ellipsoid.
-    Fingertip {
-        /// Its radii along the finger, across it, and in the direction of the press.
-        radii: [f64; 3],
-    },
-}
-
 impl Tool {
     /// Whether the skin sticks to it: a held disc or node, not a body that touches.
     pub fn is_bonded(&self) -> bool {
@@ -82,35 +44,13 @@ impl Tool {
         }
     }
 
-    /// Radius of a circle of skin that it presses on in metres, as a size: of a disc or punch its own, of a box half its
-    /// smaller width; of a round tool that of the patch which Hertz's `√(R d)` gives at a depth `d` of half its smaller
-    /// radius of curvature `R`; 0 of a node.
+    /// Radius of a circle of skin that it presses on in metres, as a size: of a disc its own, 0 of a node, of a shape see
+    /// [`ContactShape::contact_radius`].
     pub fn contact_radius(&self) -> f64 {
-        let hertz = |curvature: f64| curvature * std::f64::consts::FRAC_1_SQRT_2;
-        let tool = match self {
-            Self::Disc { radius } => return *radius,
-            Self::Node => return 0.0,
-            Self::Contact(tool) => tool,
-        };
-        match tool.shape {
-            ContactShape::FlatPunch { radius, .. } => radius,
-            ContactShape::Box {
-                size: [x, y, _], ..
-            } => x.min(y) / 2.0,
-            ContactShape::Sphere { radius } | ContactShape::Capsule { radius, .. } => hertz(radius),
-            ContactShape::Fingertip { radii: [a, b, c] } => hertz((a * a / c).min(b * b / c)),
-        }
-    }
-}
-
-impl ContactShape {
-    /// Radius of the rounding of a flat tool's edge in metres.
-    pub fn edge_radius(&self) -> Option<f64> {
-        match *self {
-            Self::FlatPunch { edge_radius, .. } | Self::Box { edge_radius, .. } => {
-                Some(edge_radius)
-            }
-            Self::Sphere { .. } | Self::Capsule { .. } | Self::Fingertip { .. } => None,
+        match self {
+            Self::Disc { radius } => *radius,
+            Self::Node => 0.0,
+            Self::Contact(tool) => tool.shape.contact_radius(),
         }
     }
 }
@@ -132,38 +72,6 @@ impl fmt::Display for Tool {
                 write!(f, "{}, friction {}", tool.shape, tool.friction)
             }
             Self::Contact(tool) => write!(f, "{}, without friction", tool.shape),
-        }
-    }
-}
-
-impl fmt::Display for ContactShape {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mm = |length: f64| format!("{:.1} mm", length * 1e3);
-        let three = |[a, b, c]: [f64; 3]| {
-            let [a, b, c] = [a, b, c].map(|length| format!("{:.1}", length * 1e3));
-            format!("{a} × {b} × {c} mm")
-        };
-        match *self {
-            Self::Sphere { radius } => write!(f, "sphere, radius {}", mm(radius)),
-            Self::FlatPunch {
-                radius,
-                edge_radius,
-            } => write!(
-                f,
-                "flat punch, radius {}, edge rounded by {}",
-                mm(radius),
-                Length::from_si(edge_radius)
-            ),
-            Self::Capsule { radius, length } => {
-                write!(f, "capsule, radius {}, length {}", mm(radius), mm(length))
-            }
-            Self::Box { size, edge_radius } => write!(
-                f,
-                "box, {}, edges rounded by {}",
-                three(size),
-                Length::from_si(edge_radius)
-            ),
-            Self::Fingertip { radii } => write!(f, "fingertip, radii {}", three(radii)),
         }
     }
 }

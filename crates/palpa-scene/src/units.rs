@@ -102,7 +102,7 @@ kind!(
 );
 kind!(
     /// The stiffness of a spring, in newtons per metre: any force by any length, as `dyn/cm` or `N/mm`.
-    Stiffness, StiffnessKind, "a stiffness", "90 dyn/cm", "N/m",
+    SpringConstant, SpringConstantKind, "a stiffness", "90 dyn/cm", "N/m",
     &[("MN/m", 1e6, 1.0), ("kN/m", 1e3, 1.0), ("N/m", 1.0, 1.0), ("mN/m", 1e-3, 1.0), ("µN/m", 1e-6, 1.0)],
     |number, unit| {
         let (force, length) = unit.split_once('/')?;
@@ -135,6 +135,15 @@ impl<K> Quantity<K> {
     /// The value in SI base units.
     pub const fn si(self) -> f64 {
         self.si
+    }
+}
+
+impl Pressure {
+    /// To three digits, for messages.
+    pub(crate) fn rounded(pascals: f64, round: fn(f64) -> f64) -> Self {
+        let unit = 10f64.powf(pascals.abs().log10().floor() - 2.0);
+        let scaled = round(pascals / unit) * unit;
+        Self::from_si(if scaled.is_finite() { scaled } else { pascals })
     }
 }
 

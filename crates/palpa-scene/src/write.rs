@@ -1,13 +1,13 @@
 //! From the scene back to the text of a scene file.
 
 mod motion;
-mod tissue;
+mod tissues;
 mod tool;
 
 use std::path::{Path, PathBuf};
 
-pub(crate) use self::tissue::Names;
-use self::tissue::tissue;
+pub(crate) use self::tissues::Names;
+use self::tissues::tissue;
 use crate::Thickness;
 use crate::file::{
     AxisName, AxisSpec, BodyTable, DampingTable, DynamicsName, GeneratorKind, GeneratorTable,

@@ -4,6 +4,7 @@
 //! of a scene file ("12 kPa"). The JSON Schema of these types is the control API's document, and the page's types are made
 //! from it.
 
+use palpa_scene::ContactShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -358,50 +359,10 @@ pub enum LumpForm {
 /// What presses. In its own frame its tip is the origin, and z points out of the tissue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ToolInfo {
-    /// Its shape.
-    pub shape: ToolForm,
+    /// Its shape; null for a single node that is held.
+    pub shape: Option<ContactShape>,
     /// Coulomb's coefficient of friction.
     pub friction: f64,
-}
-
-/// The shape of a tool, m.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum ToolForm {
-    /// A ball.
-    Sphere {
-        /// Its radius.
-        radius: f64,
-    },
-    /// The end of a round rod along z.
-    FlatPunch {
-        /// Of the rod.
-        radius: f64,
-        /// Of the edge's rounding.
-        edge_radius: f64,
-    },
-    /// A cylinder along x with round ends.
-    Capsule {
-        /// Of the cylinder.
-        radius: f64,
-        /// Of the straight part.
-        length: f64,
-    },
-    /// A box with rounded edges.
-    Box {
-        /// Along x, y, z.
-        size: Vec3,
-        /// Of the edges' rounding.
-        edge_radius: f64,
-    },
-    /// An ellipsoid.
-    Fingertip {
-        /// Along x, y, z.
-        radii: Vec3,
-    },
-    /// A point that holds a node.
-    #[default]
-    Node,
 }
 
 /// The recording.

@@ -537,6 +537,60 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /**
+         * @description The shape of a rigid tool. All lengths in metres. In its own frame its tip is the origin, x points along its length, and
+         *     z out of the tissue. At depth 0 the tip, in the middle of its face, touches the skin at rest.
+         */
+        ContactShape: {
+            /** @constant */
+            kind: "sphere";
+            /**
+             * Format: double
+             * @description Its radius.
+             */
+            radius: number;
+        } | {
+            /**
+             * Format: double
+             * @description Radius of its edge's rounding, no more than `radius`.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "flat-punch";
+            /**
+             * Format: double
+             * @description Radius of the rod.
+             */
+            radius: number;
+        } | {
+            /** @constant */
+            kind: "capsule";
+            /**
+             * Format: double
+             * @description Length of the straight part, between the centres of the ends.
+             */
+            length: number;
+            /**
+             * Format: double
+             * @description Radius of the cylinder and its ends.
+             */
+            radius: number;
+        } | {
+            /**
+             * Format: double
+             * @description Radius of its edges' rounding, no more than half its smallest size.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "box";
+            /** @description Its whole size along x, y and z. */
+            size: number[];
+        } | {
+            /** @constant */
+            kind: "fingertip";
+            /** @description Its radii along x (the finger), y and z. */
+            radii: number[];
+        };
         /** @description A change of one key of the scene file. */
         Edit: {
             /** @description JSON pointer into [`State::scene`], as "/layer/1/tissue/young"; "/lump/-" appends. */
@@ -1043,60 +1097,6 @@ export interface components {
              */
             usual_depth: number;
         };
-        /** @description The shape of a tool, m. */
-        ToolForm: {
-            /** @constant */
-            kind: "sphere";
-            /**
-             * Format: double
-             * @description Its radius.
-             */
-            radius: number;
-        } | {
-            /**
-             * Format: double
-             * @description Of the edge's rounding.
-             */
-            edge_radius: number;
-            /** @constant */
-            kind: "flat_punch";
-            /**
-             * Format: double
-             * @description Of the rod.
-             */
-            radius: number;
-        } | {
-            /** @constant */
-            kind: "capsule";
-            /**
-             * Format: double
-             * @description Of the straight part.
-             */
-            length: number;
-            /**
-             * Format: double
-             * @description Of the cylinder.
-             */
-            radius: number;
-        } | {
-            /**
-             * Format: double
-             * @description Of the edges' rounding.
-             */
-            edge_radius: number;
-            /** @constant */
-            kind: "box";
-            /** @description Along x, y, z. */
-            size: number[];
-        } | {
-            /** @constant */
-            kind: "fingertip";
-            /** @description Along x, y, z. */
-            radii: number[];
-        } | {
-            /** @constant */
-            kind: "node";
-        };
         /** @description What presses. In its own frame its tip is the origin, and z points out of the tissue. */
         ToolInfo: {
             /**
@@ -1104,8 +1104,8 @@ export interface components {
              * @description Coulomb's coefficient of friction.
              */
             friction: number;
-            /** @description Its shape. */
-            shape: components["schemas"]["ToolForm"];
+            /** @description Its shape; null for a single node that is held. */
+            shape?: components["schemas"]["ContactShape"] | null;
         };
     };
     responses: never;
@@ -1114,6 +1114,7 @@ export interface components {
     headers: never;
     pathItems: never;
 }
+export type ContactShape = components['schemas']['ContactShape'];
 export type Edit = components['schemas']['Edit'];
 export type EngineFigures = components['schemas']['EngineFigures'];
 export type Envelope = components['schemas']['Envelope'];
@@ -1138,7 +1139,6 @@ export type Phase = components['schemas']['Phase'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type Reply = components['schemas']['Reply'];
 export type State = components['schemas']['State'];
-export type ToolForm = components['schemas']['ToolForm'];
 export type ToolInfo = components['schemas']['ToolInfo'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

@@ -4,7 +4,7 @@ import {
   BufferGeometry, CanvasTexture, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, MeshMatcapMaterial,
   SphereGeometry, SRGBColorSpace, Vector3,
 } from 'three';
-import type { ToolForm } from '../generated/api';
+import type { ContactShape } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
 import { toolGeometry } from './toolshapes';
 
@@ -45,16 +45,16 @@ export class ToolView {
     this.group.visible = false;
   }
 
-  /** Shape of the tool and scale of the arrow: the device's largest force, N, and the body's radius, m. */
-  set(form: ToolForm, maxForce: number, bodyRadius: number): void {
+  /** Shape of the tool, null for a single node, and scale of the arrow: the device's largest force, N, and the body's radius, m. */
+  set(form: ContactShape | null, maxForce: number, bodyRadius: number): void {
     this.maxForce = maxForce > 0 ? maxForce : 10;
     this.longest = 0.85 * bodyRadius;
-    this.isNode = form.kind === 'node';
+    this.isNode = form === null;
     const key = JSON.stringify([form, bodyRadius.toFixed(3)]);
     if (key === this.form) return;
     this.form = key;
     this.tool.geometry.dispose();
-    this.tool.geometry = toolGeometry(form, 0.55 * bodyRadius);
+    this.tool.geometry = form === null ? new BufferGeometry() : toolGeometry(form, 0.55 * bodyRadius);
   }
 
   place(frame: FrameSnapshot): void {

@@ -1,6 +1,6 @@
 // The shapes of tools: how each is drawn, and which fields the tool panel has for it.
 //
-// To add a shape: once the scene's schema and `ToolForm` have it, `npm run generate` puts it into `ToolShape`, and the
+// To add a shape: once palpa-scene has it, `npm run generate` puts it into `ToolShape`, and the
 // compiler asks for its entry in `TOOL_SHAPES` below and for its name, `tool_shape.…`, in i18n/en.ts and i18n/ja.ts. A size
 // that no other shape has needs a field below and its label there too, `tool.…`. Nothing else of the page names a shape.
 
@@ -9,7 +9,7 @@ import {
 } from 'three';
 import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js';
 import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js';
-import type { ToolForm } from '../generated/api';
+import type { ContactShape } from '../generated/api';
 import type { ToolShape, ToolTable } from '../generated/scene';
 
 /** A size of a tool, as a key of the scene: one length with the range of its slider, m, or three lengths. */
@@ -23,10 +23,7 @@ const EDGE_RADIUS: ToolField = { key: 'edge_radius', min: 0.1e-3, max: 5e-3 };
 const SIZE: ToolField = { key: 'size', names: ['x', 'y', 'z'] };
 const RADII: ToolField = { key: 'radii', names: ['1', '2', '3'] };
 
-/** `flat-punch` of a scene is `flat_punch` in what the engine sends. */
-type Underscored<S extends string> = S extends `${infer A}-${infer B}` ? `${A}_${Underscored<B>}` : S;
-type Dashed<S extends string> = S extends `${infer A}_${infer B}` ? `${A}-${Dashed<B>}` : S;
-type FormOf<S extends ToolShape> = Extract<ToolForm, { kind: Underscored<S> }>;
+type FormOf<S extends ToolShape> = Extract<ContactShape, { kind: S }>;
 
 /** The tip lies at the origin and z points out of the tissue; a rod is `length` long, m. */
 type Draw<F> = (form: F, length: number) => BufferGeometry;
@@ -80,8 +77,7 @@ export const TOOL_SHAPES: { [S in ToolShape]: Entry<S> } = {
     isContact: true,
   },
   disc: { draw: null, fields: [RADIUS], begin: (radius) => ({ radius }), isContact: false },
-  // Never seen: only the operated point is drawn.
-  node: { draw: () => new SphereGeometry(1e-4, 4, 3), fields: [], begin: () => ({}), isContact: false },
+  node: { draw: null, fields: [], begin: () => ({}), isContact: false },
 };
 export const TOOL_SHAPE_NAMES = Object.keys(TOOL_SHAPES) as ToolShape[];
 
@@ -95,13 +91,9 @@ export function reshaped({ radius = '10 mm', friction }: ToolTable, shape: ToolS
 }
 
 /** A tool as it is drawn. */
-export function toolGeometry(form: ToolForm, length: number): BufferGeometry {
-  const draw = TOOL_SHAPES[dashed(form.kind)].draw as Draw<ToolForm>;
+export function toolGeometry(form: ContactShape, length: number): BufferGeometry {
+  const draw = TOOL_SHAPES[form.kind].draw as Draw<ContactShape>;
   return draw(form, length);
-}
-
-function dashed<K extends string>(kind: K): Dashed<K> {
-  return kind.replaceAll('_', '-') as Dashed<K>;
 }
 
 function flatPunch({ radius: r, edge_radius: e }: FormOf<'flat-punch'>, length: number): BufferGeometry {

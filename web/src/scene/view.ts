@@ -406,7 +406,7 @@ export class BodyView {
     const isSeenThrough = looks.some((l) => !l.visible || l.opacity < 1);
     this.lumps.set(isSeenThrough ? lumps : [], body, LUMP, Boolean(state?.game?.result));
     this.marks.set(state?.game ?? null, body, options.coverage);
-    if (state) this.tool.set(state.tool.shape, state.max_force, body.radius);
+    if (state) this.tool.set(state.tool.shape ?? null, state.max_force, body.radius);
   }
 
   private slice(body: Body, surfaces: Surfaces): void {

@@ -8,7 +8,7 @@
 
 use super::error::{check_positive, moduli};
 use super::invariants::FirstInvariant;
-use super::{LawError, Volumetric};
+use super::{Described, Hardening, LawError, Volumetric};
 
 const NAME: &str = "Fung";
 
@@ -49,17 +49,21 @@ impl Fung {
     pub fn b(&self) -> f64 {
         self.b
     }
+}
 
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
+impl Described for Fung {
+    const NAME: &'static str = NAME;
 
-    pub(super) fn shear(&self) -> f64 {
+    fn shear(&self) -> f64 {
         self.shear
     }
 
-    pub(super) fn volumetric(&self) -> &Volumetric {
+    fn volumetric(&self) -> &Volumetric {
         &self.volumetric
+    }
+
+    fn hardening(&self) -> Option<Hardening> {
+        Some(Hardening::Exponential { b: self.b })
     }
 }
 

@@ -9,7 +9,7 @@
 //! With `U(v) = K/2 (tr ε)²` the whole is Hooke's law. It exists for every `F`, and is blind to rotation only to first order.
 
 use super::error::{check_positive, moduli};
-use super::{LawError, Response, Volumetric};
+use super::{Described, Kinematics, LawError, Response, VolumeMeasure, Volumetric};
 use crate::{Mat3, Mat9};
 
 const NAME: &str = "linear";
@@ -43,18 +43,6 @@ impl Linear {
         Self::new(shear, bulk)
     }
 
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
-
-    pub(super) fn shear(&self) -> f64 {
-        self.shear
-    }
-
-    pub(super) fn volumetric(&self) -> &Volumetric {
-        &self.volumetric
-    }
-
     #[inline]
     pub(super) fn energy_at(&self, f: &Mat3) -> f64 {
         self.shear * deviatoric_strain(f).norm_squared()
@@ -85,6 +73,26 @@ impl Linear {
             stress,
             tangent,
         }
+    }
+}
+
+impl Described for Linear {
+    const NAME: &'static str = NAME;
+
+    fn shear(&self) -> f64 {
+        self.shear
+    }
+
+    fn volumetric(&self) -> &Volumetric {
+        &self.volumetric
+    }
+
+    fn volume_measure(&self) -> VolumeMeasure {
+        VolumeMeasure::SmallTrace
+    }
+
+    fn kinematics(&self) -> Kinematics {
+        Kinematics::Small
     }
 }
 

@@ -1,12 +1,10 @@
 //! Material laws.
 //!
-//! To add a law:
-//! 1. A file like `yeoh.rs`. Here: `mod`, `pub use`, a variant of [`Law`], the lists `of_each` and `law_from!`; the compiler
-//!    asks for the rest, but look at the `_` arms of `volume_measure` and `kinematics` yourself.
-//! 2. `palpa-scene`: `law.rs` (name, parameters), `tissue.rs` (`Energy`), `file/tissue.rs`, `resolve/tissue.rs` (new keys),
-//!    `write/tissue.rs`, `status.rs`. Then `law` in `palpa/src/continuum.rs` and `palpa-lab/src/export/material.rs`.
-//! 3. Tests: `every_law` in `tests/it/law.rs` runs all of them over it. A row in `docs/theory/laws.md`; the page's entry as the
-//!    head of `web/src/ui/tissue.ts` says.
+//! To add a law: a file here with its energy (`fung.rs` is a short example); its name in the lists of
+//! this file (`mod`, `pub use`, [`Law`], `of_each!`, `law_from!`) and in `every_law` of
+//! `tests/it/law.rs`, which runs all tests of laws over it. Then it can be used from Rust. For scenes:
+//! its parameters in `palpa-scene/src/law.rs`, an arm in `palpa/src/continuum.rs` and one in
+//! `palpa-lab/src/export/material.rs`, its menu entry in `web/src/ui`, and a row in `docs/theory/laws.md`.
 //!
 //! A law is the sum of a *deviatoric* energy density, which the element evaluates at its points, and a *volumetric* one,
 //! which it evaluates once at the mean volume change of a pair of prisms, so that nearly incompressible tissue does not
@@ -69,6 +67,40 @@ pub enum Kinematics {
     Finite,
     /// Small strain: energy quadratic in the displacements.
     Small,
+}
+
+/// What each law says of itself; its energy, stress and tangent it gives by `energy_at`, `stress_at` and `response_at`, of
+/// its own or as a [`FirstInvariant`].
+trait Described {
+    /// Name of the law, as in messages and reports.
+    const NAME: &'static str;
+
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    /// Shear modulus at rest, Pa.
+    fn shear(&self) -> f64;
+
+    /// The energy of a change of volume, with its parameters.
+    fn volumetric(&self) -> &Volumetric;
+
+    /// How it measures the change of volume.
+    #[inline]
+    fn volume_measure(&self) -> VolumeMeasure {
+        VolumeMeasure::Jacobian
+    }
+
+    /// Whether geometry is linearised.
+    #[inline]
+    fn kinematics(&self) -> Kinematics {
+        Kinematics::Finite
+    }
+
+    /// How it hardens, if the moving step's kernel knows it; the general element evaluates all others.
+    fn hardening(&self) -> Option<Hardening> {
+        None
+    }
 }
 
 /// What a law's deviatoric part answers to a deformation gradient.
@@ -146,24 +178,7 @@ impl Law {
     /// Half the shear modulus at rest (Pa), how the law hardens, and the bulk modulus (Pa), of an isotropic law at large
     /// strain whose volumetric energy is quadratic; none of others.
     pub(crate) fn hardening(&self) -> Option<(f64, Hardening, f64)> {
-        let hardening = match self {
-            Self::NeoHookean(_) => Hardening::None,
-            Self::Yeoh(law) => {
-                let [c10, c20, c30] = law.constants();
-                let (a, b) = (c20 / c10, c30 / c10);
-                Hardening::Cubic { a, b }
-            }
-            Self::Fung(law) => Hardening::Exponential { b: law.b() },
-            Self::Ogden(law) => Hardening::Powers(Powers::new(
-                law.terms().iter().map(|term| (term.mu, term.alpha)),
-            )),
-            // C10 (Ī1 − 3) is Ogden's term of the exponent 2, C01 (Ī2 − 3) that of −2.
-            Self::MooneyRivlin(law) => {
-                let [c10, c01] = law.constants();
-                Hardening::Powers(Powers::new([(c10, 2.0), (c01, -2.0)].into_iter()))
-            }
-            Self::Linear(_) | Self::StVenantKirchhoff(_) => return None,
-        };
+        let hardening = of_each!(self, law => law.hardening())?;
         match *self.volumetric_energy() {
             Volumetric::Quadratic { bulk } => Some((0.5 * self.shear_modulus(), hardening, bulk)),
             Volumetric::Logarithmic { .. } => None,
@@ -236,19 +251,12 @@ impl Law {
 
     /// How this law measures the change of volume.
     pub fn volume_measure(&self) -> VolumeMeasure {
-        match self {
-            Self::Linear(_) => VolumeMeasure::SmallTrace,
-            Self::StVenantKirchhoff(_) => VolumeMeasure::GreenTrace,
-            _ => VolumeMeasure::Jacobian,
-        }
+        of_each!(self, law => law.volume_measure())
     }
 
     /// Whether geometry is linearised.
     pub fn kinematics(&self) -> Kinematics {
-        match self {
-            Self::Linear(_) => Kinematics::Small,
-            _ => Kinematics::Finite,
-        }
+        of_each!(self, law => law.kinematics())
     }
 
     /// Shear modulus at rest, Pa.
@@ -275,15 +283,7 @@ impl Law {
 
     /// Name of the law, as in messages and reports.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Linear(_) => Linear::name(),
-            Self::StVenantKirchhoff(_) => StVenantKirchhoff::name(),
-            Self::NeoHookean(_) => NeoHookean::name(),
-            Self::MooneyRivlin(_) => MooneyRivlin::name(),
-            Self::Yeoh(_) => Yeoh::name(),
-            Self::Ogden(_) => Ogden::name(),
-            Self::Fung(_) => Fung::name(),
-        }
+        of_each!(self, law => law.name())
     }
 
     /// The whole energy density `W_d(F) + U(v(F))`, in J/m³.

@@ -9,7 +9,7 @@
 
 use super::error::{check_not_negative, check_positive, check_share, moduli};
 use super::invariants::Isochoric;
-use super::{LawError, Response, Volumetric};
+use super::{Described, Hardening, LawError, Powers, Response, Volumetric};
 use crate::Mat3;
 
 const NAME: &str = "Mooney-Rivlin";
@@ -59,18 +59,6 @@ impl MooneyRivlin {
         [self.c10, self.c01]
     }
 
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
-
-    pub(super) fn shear(&self) -> f64 {
-        2.0 * (self.c10 + self.c01)
-    }
-
-    pub(super) fn volumetric(&self) -> &Volumetric {
-        &self.volumetric
-    }
-
     #[inline]
     pub(super) fn energy_at(&self, f: &Mat3) -> f64 {
         Isochoric::new(f).map_or(f64::INFINITY, |iso| self.energy_of(&iso))
@@ -103,5 +91,23 @@ impl MooneyRivlin {
 
     fn stress_of(&self, iso: &Isochoric) -> Mat3 {
         self.c10 * iso.gradient1() + self.c01 * iso.gradient2()
+    }
+}
+
+impl Described for MooneyRivlin {
+    const NAME: &'static str = NAME;
+
+    fn shear(&self) -> f64 {
+        2.0 * (self.c10 + self.c01)
+    }
+
+    fn volumetric(&self) -> &Volumetric {
+        &self.volumetric
+    }
+
+    /// C10 (Ī1 − 3) is Ogden's term of the exponent 2, C01 (Ī2 − 3) that of −2.
+    fn hardening(&self) -> Option<Hardening> {
+        let terms = [(self.c10, 2.0), (self.c01, -2.0)];
+        Some(Hardening::Powers(Powers::new(terms.into_iter())))
     }
 }

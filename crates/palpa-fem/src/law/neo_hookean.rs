@@ -8,7 +8,7 @@
 
 use super::error::{check_positive, moduli};
 use super::invariants::FirstInvariant;
-use super::{LawError, Volumetric};
+use super::{Described, Hardening, LawError, Volumetric};
 
 const NAME: &str = "neo-Hookean";
 
@@ -40,17 +40,21 @@ impl NeoHookean {
         let (shear, bulk) = moduli(NAME, young, poisson)?;
         Self::new(shear, Volumetric::Quadratic { bulk })
     }
+}
 
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
+impl Described for NeoHookean {
+    const NAME: &'static str = NAME;
 
-    pub(super) fn shear(&self) -> f64 {
+    fn shear(&self) -> f64 {
         2.0 * self.c10
     }
 
-    pub(super) fn volumetric(&self) -> &Volumetric {
+    fn volumetric(&self) -> &Volumetric {
         &self.volumetric
+    }
+
+    fn hardening(&self) -> Option<Hardening> {
+        Some(Hardening::None)
     }
 }
 

@@ -15,7 +15,7 @@ use super::error::{check_positive, moduli};
 use super::invariants::Isochoric;
 use super::spectral::eigen;
 use super::tangent::add_outer;
-use super::{LawError, Response, Volumetric};
+use super::{Described, Hardening, LawError, Powers, Response, Volumetric};
 use crate::{Mat3, Mat9};
 
 const NAME: &str = "Ogden";
@@ -92,18 +92,6 @@ impl Ogden {
             &[OgdenTerm { mu: shear, alpha }],
             Volumetric::Quadratic { bulk },
         )
-    }
-
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
-
-    pub(super) fn shear(&self) -> f64 {
-        self.terms().iter().map(|term| term.mu).sum()
-    }
-
-    pub(super) fn volumetric(&self) -> &Volumetric {
-        &self.volumetric
     }
 
     pub(super) fn energy_at(&self, f: &Mat3) -> f64 {
@@ -211,6 +199,23 @@ impl Ogden {
             add_outer(&mut tangent, 0.5 * against_twist, &twist, &twist);
         }
         tangent
+    }
+}
+
+impl Described for Ogden {
+    const NAME: &'static str = NAME;
+
+    fn shear(&self) -> f64 {
+        self.terms().iter().map(|term| term.mu).sum()
+    }
+
+    fn volumetric(&self) -> &Volumetric {
+        &self.volumetric
+    }
+
+    fn hardening(&self) -> Option<Hardening> {
+        let terms = self.terms().iter().map(|term| (term.mu, term.alpha));
+        Some(Hardening::Powers(Powers::new(terms)))
     }
 }
 

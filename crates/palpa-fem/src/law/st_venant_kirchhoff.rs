@@ -12,7 +12,7 @@
 use super::error::{check_positive, moduli};
 use super::tangent::{add_exchange, add_left, add_outer, add_right};
 use super::volumetric::cofactor;
-use super::{LawError, Response, Volumetric};
+use super::{Described, LawError, Response, VolumeMeasure, Volumetric};
 use crate::{Mat3, Mat9};
 
 const NAME: &str = "St. Venant-Kirchhoff";
@@ -44,18 +44,6 @@ impl StVenantKirchhoff {
     pub fn from_young(young: f64, poisson: f64) -> Result<Self, LawError> {
         let (shear, bulk) = moduli(NAME, young, poisson)?;
         Self::new(shear, bulk)
-    }
-
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
-
-    pub(super) fn shear(&self) -> f64 {
-        self.shear
-    }
-
-    pub(super) fn volumetric(&self) -> &Volumetric {
-        &self.volumetric
     }
 
     #[inline]
@@ -90,6 +78,22 @@ impl StVenantKirchhoff {
             stress: f * second,
             tangent,
         }
+    }
+}
+
+impl Described for StVenantKirchhoff {
+    const NAME: &'static str = NAME;
+
+    fn shear(&self) -> f64 {
+        self.shear
+    }
+
+    fn volumetric(&self) -> &Volumetric {
+        &self.volumetric
+    }
+
+    fn volume_measure(&self) -> VolumeMeasure {
+        VolumeMeasure::GreenTrace
     }
 }
 

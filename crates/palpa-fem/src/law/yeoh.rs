@@ -7,7 +7,7 @@
 
 use super::error::{check_positive, moduli};
 use super::invariants::FirstInvariant;
-use super::{LawError, Volumetric};
+use super::{Described, Hardening, LawError, Volumetric};
 
 const NAME: &str = "Yeoh";
 
@@ -56,17 +56,23 @@ impl Yeoh {
     pub fn constants(&self) -> [f64; 3] {
         self.c
     }
+}
 
-    pub(super) fn name() -> &'static str {
-        NAME
-    }
+impl Described for Yeoh {
+    const NAME: &'static str = NAME;
 
-    pub(super) fn shear(&self) -> f64 {
+    fn shear(&self) -> f64 {
         2.0 * self.c[0]
     }
 
-    pub(super) fn volumetric(&self) -> &Volumetric {
+    fn volumetric(&self) -> &Volumetric {
         &self.volumetric
+    }
+
+    fn hardening(&self) -> Option<Hardening> {
+        let [c10, c20, c30] = self.c;
+        let (a, b) = (c20 / c10, c30 / c10);
+        Some(Hardening::Cubic { a, b })
     }
 }
 

@@ -2,9 +2,9 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, ShapeError, across, along, checked, offset_radius};
+use super::{Distance, RigidShape, ShapeError, across, along, checked, offset_radius};
 
-pub(super) const NAME: &str = "capsule";
+const NAME: &str = "capsule";
 
 /// A lying cylinder with round ends; its axis runs along x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,19 +36,6 @@ impl Capsule {
         self.length
     }
 
-    pub(super) fn distance(&self, p: &Vec3) -> Distance {
-        self.distance_centred(&(p - Vec3::z() * self.radius))
-    }
-
-    pub(super) fn support(&self, u: &Vec3) -> Vec3 {
-        let end = if u.x == 0.0 { 0.0 } else { u.x.signum() };
-        Vec3::x() * (0.5 * self.length * end) + (u + Vec3::z()) * self.radius
-    }
-
-    pub(super) fn bounding_radius(&self) -> f64 {
-        self.radius.hypot(0.5 * self.length) + self.radius
-    }
-
     /// The distance of a point given from the capsule's middle.
     pub(crate) fn distance_centred(&self, p: &Vec3) -> Distance {
         let half = 0.5 * self.length;
@@ -65,5 +52,30 @@ impl Capsule {
             normal,
             curvature: directions / offset_radius(self.radius, distance, self.radius),
         }
+    }
+}
+
+impl RigidShape for Capsule {
+    const NAME: &'static str = NAME;
+
+    fn distance(&self, p: &Vec3) -> Distance {
+        self.distance_centred(&(p - Vec3::z() * self.radius))
+    }
+
+    fn support(&self, u: &Vec3) -> Option<Vec3> {
+        let end = if u.x == 0.0 { 0.0 } else { u.x.signum() };
+        Some(Vec3::x() * (0.5 * self.length * end) + (u + Vec3::z()) * self.radius)
+    }
+
+    fn bounding_radius(&self) -> f64 {
+        self.radius.hypot(0.5 * self.length) + self.radius
+    }
+
+    fn tip_radius(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn footprint_radius(&self) -> f64 {
+        0.5 * self.length + self.radius
     }
 }

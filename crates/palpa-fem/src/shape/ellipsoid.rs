@@ -11,10 +11,10 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, ShapeError, along, checked, offset_radius};
+use super::{Distance, RigidShape, ShapeError, along, checked, offset_radius};
 use crate::Mat3;
 
-pub(super) const NAME: &str = "ellipsoid";
+const NAME: &str = "ellipsoid";
 
 /// More steps than rounding leaves to take; from a bad start an aspect ratio of 10⁷ takes about ten.
 const MAX_STEPS: usize = 60;
@@ -46,23 +46,6 @@ impl Ellipsoid {
     /// Its radii along x, y and z. m
     pub fn radii(&self) -> Vec3 {
         self.radii
-    }
-
-    pub(super) fn tip_radius(&self) -> f64 {
-        self.radii.x.max(self.radii.y).powi(2) / self.radii.z
-    }
-
-    pub(super) fn bounding_radius(&self) -> f64 {
-        self.radii.z + self.radii.max()
-    }
-
-    pub(super) fn distance(&self, p: &Vec3) -> Distance {
-        self.distance_centred(&(p - Vec3::z() * self.radii.z))
-    }
-
-    pub(super) fn support(&self, u: &Vec3) -> Vec3 {
-        let stretched = u.component_mul(&self.radii);
-        stretched.component_mul(&self.radii) / stretched.norm() + Vec3::z() * self.radii.z
     }
 
     /// The distance of a point given from the ellipsoid's middle.
@@ -142,5 +125,30 @@ impl Ellipsoid {
         let size = self.radii.min();
         along(&first) / offset_radius(1.0 / k1, distance, size)
             + along(&second) / offset_radius(1.0 / k2, distance, size)
+    }
+}
+
+impl RigidShape for Ellipsoid {
+    const NAME: &'static str = NAME;
+
+    fn distance(&self, p: &Vec3) -> Distance {
+        self.distance_centred(&(p - Vec3::z() * self.radii.z))
+    }
+
+    fn support(&self, u: &Vec3) -> Option<Vec3> {
+        let stretched = u.component_mul(&self.radii);
+        Some(stretched.component_mul(&self.radii) / stretched.norm() + Vec3::z() * self.radii.z)
+    }
+
+    fn tip_radius(&self) -> f64 {
+        self.radii.x.max(self.radii.y).powi(2) / self.radii.z
+    }
+
+    fn bounding_radius(&self) -> f64 {
+        self.radii.z + self.radii.max()
+    }
+
+    fn footprint_radius(&self) -> f64 {
+        self.radii.x.max(self.radii.y)
     }
 }

@@ -11,10 +11,10 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, ShapeError, along, checked, checked_edge, offset_radius};
+use super::{Distance, RigidShape, ShapeError, along, checked, checked_edge, offset_radius};
 use crate::Mat3;
 
-pub(super) const NAME: &str = "flat punch";
+const NAME: &str = "flat punch";
 
 /// A round punch with a flat face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,33 @@ impl FlatPunch {
         self.radius - self.edge_radius
     }
 
-    pub(super) fn distance(&self, p: &Vec3) -> Distance {
+    /// To the quarter torus, whose middle line has the radius of the flat and lies at `z = edge_radius`.
+    fn distance_to_rim(&self, from_axis: f64, radial: &Vec3, out: f64, down: f64) -> Distance {
+        let from_line = out.hypot(down);
+        let distance = from_line - self.edge_radius;
+        let normal = (radial * out - Vec3::z() * down) / from_line;
+        let along_meridian = (radial * down + Vec3::z() * out) / from_line;
+        let around = Vec3::z().cross(radial);
+        // The second curvature is normal·radial / from_axis, bounded like the first by the share that `out` is of it.
+        let bend = 1.0 / offset_radius(self.edge_radius, distance, self.radius);
+        let share = if out < from_axis {
+            out / from_axis
+        } else {
+            1.0
+        };
+        let turn = share * bend;
+        Distance {
+            distance,
+            normal,
+            curvature: along(&along_meridian) * bend + along(&around) * turn,
+        }
+    }
+}
+
+impl RigidShape for FlatPunch {
+    const NAME: &'static str = NAME;
+
+    fn distance(&self, p: &Vec3) -> Distance {
         let from_axis = p.x.hypot(p.y);
         let radial = Vec3::new(p.x, p.y, 0.0)
             .try_normalize(0.0)
@@ -80,29 +106,7 @@ impl FlatPunch {
         }
     }
 
-    /// To the quarter torus, whose middle line has the radius of the flat and lies at `z = edge_radius`.
-    fn distance_to_rim(&self, from_axis: f64, radial: &Vec3, out: f64, down: f64) -> Distance {
-        let from_line = out.hypot(down);
-        let distance = from_line - self.edge_radius;
-        let normal = (radial * out - Vec3::z() * down) / from_line;
-        let along_meridian = (radial * down + Vec3::z() * out) / from_line;
-        let around = Vec3::z().cross(radial);
-        // The second curvature is normal·radial / from_axis, bounded like the first by the share that `out` is of it.
-        let bend = 1.0 / offset_radius(self.edge_radius, distance, self.radius);
-        let share = if out < from_axis {
-            out / from_axis
-        } else {
-            1.0
-        };
-        let turn = share * bend;
-        Distance {
-            distance,
-            normal,
-            curvature: along(&along_meridian) * bend + along(&around) * turn,
-        }
-    }
-
-    pub(super) fn support(&self, u: &Vec3) -> Option<Vec3> {
+    fn support(&self, u: &Vec3) -> Option<Vec3> {
         if u.z > 0.0 {
             return None;
         }
@@ -110,5 +114,21 @@ impl FlatPunch {
             .try_normalize(0.0)
             .unwrap_or_else(Vec3::zeros);
         Some(radial * self.flat_radius() + (u + Vec3::z()) * self.edge_radius)
+    }
+
+    fn tip_radius(&self) -> f64 {
+        if self.flat_radius() > 0.0 {
+            f64::INFINITY
+        } else {
+            self.radius
+        }
+    }
+
+    fn bounding_radius(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn footprint_radius(&self) -> f64 {
+        self.radius
     }
 }

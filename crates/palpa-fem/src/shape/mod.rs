@@ -1,11 +1,10 @@
-//! Rigid shapes with exact distance: what presses, and what lies hidden in the tissue.
+//! Rigid shapes with exact distance: tools that press, and lumps in the tissue.
 //!
-//! To add a tool shape:
-//! 1. A file like `sphere.rs`. Here: a variant of [`Shape`], its arms (the compiler asks), its name in `from_shape!`.
-//! 2. `palpa-scene`: `file/tool.rs` (keys), `ContactShape` in `tool.rs`, `resolve/tool.rs`, `write/tool.rs`. Then
-//!    `tool_shape` in `palpa/src/continuum.rs` and `footprint` in `palpa/src/press/mesh.rs`.
-//! 3. For the page: `ToolForm` in `palpa-viewer/src/control.rs`, `palpa-session/src/world/info.rs`, and what the head of
-//!    `web/src/scene/toolshapes.ts` says. Tests: the list of shapes in `tests/it/shape.rs`.
+//! To add a shape: a file here with its `RigidShape` (`flat_punch.rs` is an example); its name in the
+//! lists of this file (`mod`, `pub use`, [`Shape`], `of_each!`, `from_shape!`) and in `cases` of
+//! `tests/it/shape.rs`, which runs all tests of shapes over it. Then it can be used from Rust. For
+//! scenes: its sizes in `palpa-scene/src/shape.rs`, an arm of `tool_shape` in `palpa/src/continuum.rs`,
+//! its drawing and menu entry in `web/src/scene`, and a word in `docs/theory/contact.md`.
 //!
 //! A shape stands in a frame of its own. Its origin is the *tip*, the point that touches first when the shape moves
 //! along −z; z points out of the tissue:
@@ -114,82 +113,77 @@ pub enum ShapeError {
     },
 }
 
+/// The questions that every shape answers. All lengths in metres, in the shape's frame.
+trait RigidShape {
+    /// Name of the shape, such as `flat punch`.
+    const NAME: &'static str;
+
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    /// The distance of the point `p`, for any finite point.
+    fn distance(&self, p: &Vec3) -> Distance;
+
+    /// The point that lies farthest along the unit vector `u`; `None` up a shaft without end.
+    fn support(&self, u: &Vec3) -> Option<Vec3>;
+
+    /// The larger principal radius of curvature at the tip, infinite where the tip is flat or straight.
+    fn tip_radius(&self) -> f64;
+
+    /// Radius of a ball round the tip that holds the shape; infinite for a shaft.
+    fn bounding_radius(&self) -> f64;
+
+    /// Radius of the cylinder round z that holds the shape.
+    fn footprint_radius(&self) -> f64;
+}
+
+/// `expression` with `$shape` bound to whichever shape it is.
+macro_rules! of_each {
+    ($self:expr, $shape:ident => $expression:expr) => {
+        match $self {
+            Shape::Sphere($shape) => $expression,
+            Shape::FlatPunch($shape) => $expression,
+            Shape::Capsule($shape) => $expression,
+            Shape::RoundedBox($shape) => $expression,
+            Shape::Ellipsoid($shape) => $expression,
+        }
+    };
+}
+
 impl Shape {
     /// The distance of the point `p_local`, in the shape's frame.
     ///
     /// Any finite point is answered, also deep inside: distance and normal are then those of the nearest surface.
     pub fn distance(&self, p_local: &Vec3) -> Distance {
-        match self {
-            Self::Sphere(shape) => shape.distance(p_local),
-            Self::FlatPunch(shape) => shape.distance(p_local),
-            Self::Capsule(shape) => shape.distance(p_local),
-            Self::RoundedBox(shape) => shape.distance(p_local),
-            Self::Ellipsoid(shape) => shape.distance(p_local),
-        }
+        of_each!(self, shape => shape.distance(p_local))
     }
 
     /// The point of the shape that lies farthest along `direction` (of any length but 0), in the shape's frame; `None`
     /// where the shape has no end, up the shaft of a punch.
     pub fn support(&self, direction: &Vec3) -> Option<Vec3> {
         let u = direction.normalize();
-        match self {
-            Self::Sphere(shape) => Some(shape.support(&u)),
-            Self::FlatPunch(shape) => shape.support(&u),
-            Self::Capsule(shape) => Some(shape.support(&u)),
-            Self::RoundedBox(shape) => Some(shape.support(&u)),
-            Self::Ellipsoid(shape) => Some(shape.support(&u)),
-        }
+        of_each!(self, shape => shape.support(&u))
     }
 
     /// The larger principal radius of curvature at the tip, infinite where the tip is flat or straight. m
     pub fn tip_radius(&self) -> f64 {
-        match self {
-            Self::Sphere(shape) => shape.radius(),
-            Self::FlatPunch(shape) if shape.flat_radius() > 0.0 => f64::INFINITY,
-            Self::FlatPunch(shape) => shape.radius(),
-            Self::Capsule(_) => f64::INFINITY,
-            Self::RoundedBox(shape) => {
-                if shape.is_flat() {
-                    f64::INFINITY
-                } else {
-                    shape.edge_radius()
-                }
-            }
-            Self::Ellipsoid(shape) => shape.tip_radius(),
-        }
+        of_each!(self, shape => shape.tip_radius())
     }
 
     /// Radius of a ball round the tip that holds the shape; infinite for a shaft. m
     pub fn bounding_radius(&self) -> f64 {
-        match self {
-            Self::Sphere(shape) => 2.0 * shape.radius(),
-            Self::FlatPunch(_) => f64::INFINITY,
-            Self::Capsule(shape) => shape.bounding_radius(),
-            Self::RoundedBox(shape) => shape.bounding_radius(),
-            Self::Ellipsoid(shape) => shape.bounding_radius(),
-        }
+        of_each!(self, shape => shape.bounding_radius())
     }
 
     /// Radius of the cylinder round z that holds the shape: how far its shadow on the skin reaches. m
     pub fn footprint_radius(&self) -> f64 {
-        match self {
-            Self::Sphere(shape) => shape.radius(),
-            Self::FlatPunch(shape) => shape.radius(),
-            Self::Capsule(shape) => 0.5 * shape.length() + shape.radius(),
-            Self::RoundedBox(shape) => shape.footprint_radius(),
-            Self::Ellipsoid(shape) => shape.radii().x.max(shape.radii().y),
-        }
+        of_each!(self, shape => shape.footprint_radius())
     }
 
     /// What the shape is called, such as `flat punch`.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Sphere(_) => sphere::NAME,
-            Self::FlatPunch(_) => flat_punch::NAME,
-            Self::Capsule(_) => capsule::NAME,
-            Self::RoundedBox(_) => rounded_box::NAME,
-            Self::Ellipsoid(_) => ellipsoid::NAME,
-        }
+        of_each!(self, shape => shape.name())
     }
 }
 

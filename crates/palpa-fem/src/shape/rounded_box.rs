@@ -2,10 +2,10 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, ShapeError, across, checked, checked_edge, offset_radius};
+use super::{Distance, RigidShape, ShapeError, across, checked, checked_edge, offset_radius};
 use crate::Mat3;
 
-pub(super) const NAME: &str = "box";
+const NAME: &str = "box";
 
 /// A box that rests on the middle of its lower face, with rounded edges and corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,32 @@ impl RoundedBox {
         self.core().xy().max() > 0.0
     }
 
-    pub(super) fn distance(&self, p: &Vec3) -> Distance {
+    /// For points in the core: the nearest of the six faces, the pressing one first.
+    fn distance_to_face(&self, beyond_core: &Vec3, sign: &Vec3) -> Distance {
+        let nearest = [2, 0, 1]
+            .into_iter()
+            .reduce(|a, b| {
+                if beyond_core[b] > beyond_core[a] {
+                    b
+                } else {
+                    a
+                }
+            })
+            .unwrap_or(2);
+        let mut normal = Vec3::zeros();
+        normal[nearest] = sign[nearest];
+        Distance {
+            distance: beyond_core[nearest] - self.edge_radius,
+            normal,
+            curvature: Mat3::zeros(),
+        }
+    }
+}
+
+impl RigidShape for RoundedBox {
+    const NAME: &'static str = NAME;
+
+    fn distance(&self, p: &Vec3) -> Distance {
         let p = p - Vec3::z() * self.half_extents.z;
         // By symmetry in the octant of positive coordinates; in the middle, the pressing side is the lower one.
         let sign = Vec3::new(
@@ -81,38 +106,29 @@ impl RoundedBox {
         }
     }
 
-    /// For points in the core: the nearest of the six faces, the pressing one first.
-    fn distance_to_face(&self, beyond_core: &Vec3, sign: &Vec3) -> Distance {
-        let nearest = [2, 0, 1]
-            .into_iter()
-            .reduce(|a, b| {
-                if beyond_core[b] > beyond_core[a] {
-                    b
-                } else {
-                    a
-                }
-            })
-            .unwrap_or(2);
-        let mut normal = Vec3::zeros();
-        normal[nearest] = sign[nearest];
-        Distance {
-            distance: beyond_core[nearest] - self.edge_radius,
-            normal,
-            curvature: Mat3::zeros(),
-        }
-    }
-
-    pub(super) fn support(&self, u: &Vec3) -> Vec3 {
+    fn support(&self, u: &Vec3) -> Option<Vec3> {
         let corner = u.map(|x| if x == 0.0 { 0.0 } else { x.signum() });
-        corner.component_mul(&self.core()) + u * self.edge_radius + Vec3::z() * self.half_extents.z
+        Some(
+            corner.component_mul(&self.core())
+                + u * self.edge_radius
+                + Vec3::z() * self.half_extents.z,
+        )
     }
 
-    pub(super) fn bounding_radius(&self) -> f64 {
+    fn bounding_radius(&self) -> f64 {
         let corner = self.core() + Vec3::z() * self.half_extents.z;
         corner.norm() + self.edge_radius
     }
 
-    pub(super) fn footprint_radius(&self) -> f64 {
+    fn footprint_radius(&self) -> f64 {
         self.core().xy().norm() + self.edge_radius
+    }
+
+    fn tip_radius(&self) -> f64 {
+        if self.is_flat() {
+            f64::INFINITY
+        } else {
+            self.edge_radius
+        }
     }
 }

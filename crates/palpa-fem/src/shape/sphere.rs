@@ -2,9 +2,9 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, ShapeError, across, checked, offset_radius};
+use super::{Distance, RigidShape, ShapeError, across, checked, offset_radius};
 
-pub(super) const NAME: &str = "sphere";
+const NAME: &str = "sphere";
 
 /// A ball that rests on its tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,14 +28,6 @@ impl Sphere {
         self.radius
     }
 
-    pub(super) fn distance(self, p: &Vec3) -> Distance {
-        self.distance_centred(&(p - Vec3::z() * self.radius))
-    }
-
-    pub(super) fn support(self, u: &Vec3) -> Vec3 {
-        (u + Vec3::z()) * self.radius
-    }
-
     /// The distance of a point given from the ball's middle.
     pub(crate) fn distance_centred(self, p: &Vec3) -> Distance {
         let from_middle = p.norm();
@@ -46,5 +38,29 @@ impl Sphere {
             normal,
             curvature: across(&normal) / offset_radius(self.radius, distance, self.radius),
         }
+    }
+}
+
+impl RigidShape for Sphere {
+    const NAME: &'static str = NAME;
+
+    fn distance(&self, p: &Vec3) -> Distance {
+        self.distance_centred(&(p - Vec3::z() * self.radius))
+    }
+
+    fn support(&self, u: &Vec3) -> Option<Vec3> {
+        Some((u + Vec3::z()) * self.radius)
+    }
+
+    fn tip_radius(&self) -> f64 {
+        self.radius
+    }
+
+    fn bounding_radius(&self) -> f64 {
+        2.0 * self.radius
+    }
+
+    fn footprint_radius(&self) -> f64 {
+        self.radius
     }
 }

@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{AxisSpec, TissueSpec};
+use crate::shape::ToolShape;
 use crate::units::Length;
 
 /// What presses. A disc and a node hold the skin; the other shapes press by contact.
@@ -46,27 +47,6 @@ pub(crate) struct ToolTable {
     /// All but disc and node: Coulomb's coefficient of friction with the skin, 0 to 5. Default: 0, without friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) friction: Option<f64>,
-}
-
-/// The shapes of tools.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum ToolShape {
-    /// A patch of skin bonded to a rigid disc.
-    #[default]
-    Disc,
-    /// A single node of the skin that is moved; for the reference method, or to try out a mesh.
-    Node,
-    /// A ball.
-    Sphere,
-    /// The flat end of a round rod.
-    FlatPunch,
-    /// A lying cylinder with round ends.
-    Capsule,
-    /// A box.
-    Box,
-    /// The pad of a finger: an ellipsoid.
-    Fingertip,
 }
 
 /// A lump in the layers. It lies below a place of the skin (`depth`, with `below` or where the tool presses) or in a place

@@ -1,6 +1,6 @@
 //! The layers: their tissues and thicknesses.
 
-use super::tissue::tissue;
+use super::tissues::tissue;
 use super::{Reader, direction};
 use crate::error::Site;
 use crate::file::{LayerTable, ThicknessSpec, ThicknessTable};

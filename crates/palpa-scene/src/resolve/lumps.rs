@@ -1,6 +1,6 @@
 //! The lumps: their shapes, places and tissues.
 
-use super::tissue::tissue;
+use super::tissues::tissue;
 use super::{Reader, coordinates, direction, each};
 use crate::error::Site;
 use crate::file::{LumpShapeName, LumpTable};

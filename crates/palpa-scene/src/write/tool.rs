@@ -1,10 +1,11 @@
 //! Tools and lumps back to their tables.
 
 use super::{Names, direction, point, relative, tissue, vertex};
-use crate::file::{LumpShapeName, LumpTable, ToolShape, ToolTable};
+use crate::file::{LumpShapeName, LumpTable, ToolTable};
 use crate::lump::{Lump, LumpPlace, LumpShape};
 use crate::scene::Scene;
-use crate::tool::{ContactShape, Tool};
+use crate::shape::ToolShape;
+use crate::tool::Tool;
 use crate::units::Length;
 
 pub(super) fn tool(tool: &Tool) -> ToolTable {
@@ -22,34 +23,7 @@ pub(super) fn tool(tool: &Tool) -> ToolTable {
     };
     table.friction = Some(tool.friction);
     table.axis = tool.axis.map(direction);
-    table.shape = match tool.shape {
-        ContactShape::Sphere { radius } => {
-            table.radius = Some(Length::from_si(radius));
-            ToolShape::Sphere
-        }
-        ContactShape::FlatPunch {
-            radius,
-            edge_radius,
-        } => {
-            table.radius = Some(Length::from_si(radius));
-            table.edge_radius = Some(Length::from_si(edge_radius));
-            ToolShape::FlatPunch
-        }
-        ContactShape::Capsule { radius, length } => {
-            table.radius = Some(Length::from_si(radius));
-            table.length = Some(Length::from_si(length));
-            ToolShape::Capsule
-        }
-        ContactShape::Box { size, edge_radius } => {
-            table.size = Some(size.map(Length::from_si));
-            table.edge_radius = Some(Length::from_si(edge_radius));
-            ToolShape::Box
-        }
-        ContactShape::Fingertip { radii } => {
-            table.radii = Some(radii.map(Length::from_si));
-            ToolShape::Fingertip
-        }
-    };
+    tool.shape.write(&mut table);
     table
 }
 

@@ -1,7 +1,7 @@
 //! Texts with a unit, and what they are in SI.
 
 use palpa_scene::units::{
-    Angle, Density, Force, Kind, Length, Pressure, Quantity, Stiffness, Time, Velocity,
+    Angle, Density, Force, Kind, Length, Pressure, Quantity, SpringConstant, Time, Velocity,
 };
 use proptest::prelude::*;
 
@@ -55,7 +55,7 @@ fn units_become_si() {
         ("5 kN/m", 5000.0),
         ("2 gf/cm", 1.96133),
     ] {
-        is(Stiffness::from_si, text, si);
+        is(SpringConstant::from_si, text, si);
     }
     is(Velocity::from_si, "10 mm/s", 0.01);
     is(Velocity::from_si, "600 mm/min", 0.01);
@@ -107,7 +107,7 @@ fn what_is_no_quantity_is_refused_with_a_reason() {
         "90 Pa",
         "1e308 kN/nm",
     ] {
-        let error = text.parse::<Stiffness>().unwrap_err();
+        let error = text.parse::<SpringConstant>().unwrap_err();
         said += &format!("{error}\n");
     }
     insta::assert_snapshot!(said);
@@ -126,7 +126,7 @@ fn quantities_are_written_in_the_unit_that_reads_best() {
     assert_eq!(Pressure::from_si(2.5e6).to_string(), "2.5 MPa");
     assert_eq!(Velocity::from_si(0.01).to_string(), "10 mm/s");
     assert_eq!(Time::from_si(0.25).to_string(), "0.25 s");
-    assert_eq!(Stiffness::from_si(0.09).to_string(), "90 mN/m");
+    assert_eq!(SpringConstant::from_si(0.09).to_string(), "90 mN/m");
     assert_eq!(Density::from_si(1060.0).to_string(), "1060 kg/m³");
 }
 
@@ -140,12 +140,12 @@ fn back<K: Kind>(si: f64) -> f64 {
 proptest! {
     #[test]
     fn what_is_written_is_read_to_the_bit(x in proptest::num::f64::NORMAL | proptest::num::f64::ZERO) {
-        use palpa_scene::units::{DensityKind, LengthKind, PressureKind, StiffnessKind, TimeKind, VelocityKind};
+        use palpa_scene::units::{DensityKind, LengthKind, PressureKind, SpringConstantKind, TimeKind, VelocityKind};
         prop_assert_eq!(back::<LengthKind>(x), x);
         prop_assert_eq!(back::<PressureKind>(x), x);
         prop_assert_eq!(back::<VelocityKind>(x), x);
         prop_assert_eq!(back::<TimeKind>(x), x);
-        prop_assert_eq!(back::<StiffnessKind>(x), x);
+        prop_assert_eq!(back::<SpringConstantKind>(x), x);
         prop_assert_eq!(back::<DensityKind>(x), x);
     }
 

@@ -2,21 +2,15 @@
 
 use palpa_fem::lump::{Lump as PlacedLump, LumpShape};
 use palpa_mesh::{LayeredBody, Vec3};
-use palpa_scene::{ContactShape, MaterialStatus, Scene, Tool};
-use palpa_viewer::control::{LayerInfo, LumpForm, LumpInfo, ToolForm, ToolInfo};
+use palpa_scene::{MaterialStatus, Scene, Tool};
+use palpa_viewer::control::{LayerInfo, LumpForm, LumpInfo, ToolInfo};
 
 use super::World;
 
 impl World {
     /// Largest extent of the tool from its axis, m.
     pub(crate) fn tool_size(&self) -> f64 {
-        match self.tool.shape {
-            ToolForm::Sphere { radius } | ToolForm::FlatPunch { radius, .. } => radius,
-            ToolForm::Capsule { radius, length } => radius + 0.5 * length,
-            ToolForm::Box { size, .. } => 0.5 * size[0].max(size[1]),
-            ToolForm::Fingertip { radii } => radii[0].max(radii[1]),
-            ToolForm::Node => 0.0,
-        }
+        self.tool.shape.map_or(0.0, |shape| shape.half_width())
     }
 
     /// Young's modulus at small strain of every prism of a body, Pa; for a network of bars the
@@ -103,26 +97,9 @@ pub(super) fn lump_infos(scene: &Scene, placed: &[PlacedLump]) -> Vec<LumpInfo> 
 
 /// The tool.
 pub(super) fn tool_info(tool: &Tool) -> ToolInfo {
-    let Tool::Contact(tool) = tool else {
-        return ToolInfo {
-            shape: ToolForm::Node,
-            friction: 0.0,
-        };
-    };
+    let tool = tool.contact();
     ToolInfo {
-        shape: match tool.shape {
-            ContactShape::Sphere { radius } => ToolForm::Sphere { radius },
-            ContactShape::FlatPunch {
-                radius,
-                edge_radius,
-            } => ToolForm::FlatPunch {
-                radius,
-                edge_radius,
-            },
-            ContactShape::Capsule { radius, length } => ToolForm::Capsule { radius, length },
-            ContactShape::Box { size, edge_radius } => ToolForm::Box { size, edge_radius },
-            ContactShape::Fingertip { radii } => ToolForm::Fingertip { radii },
-        },
-        friction: tool.friction,
+        shape: tool.map(|tool| tool.shape),
+        friction: tool.map_or(0.0, |tool| tool.friction),
     }
 }

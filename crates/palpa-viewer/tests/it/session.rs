@@ -1,11 +1,10 @@
 //! A little session: a block of one layer under a punch, which is a spring. It has a state, meshes, frames and files as the
 //! real one has, so that what the server does with them can be seen.
 
+use palpa_scene::ContactShape;
 use palpa_viewer::{
     Answer, Clients, Host, HostFile, Publisher, Server, ServerParams,
-    control::{
-        Field, Hand, LayerInfo, Method, Phase, RecordingInfo, Request, State, ToolForm, ToolInfo,
-    },
+    control::{Field, Hand, LayerInfo, Method, Phase, RecordingInfo, Request, State, ToolInfo},
     wire::{FrameSnapshot, MeshSnapshot},
 };
 use serde_json::{Value, json};
@@ -196,7 +195,7 @@ impl Inner {
             }],
             lumps: vec![],
             tool: ToolInfo {
-                shape: ToolForm::Sphere { radius: 0.005 },
+                shape: Some(ContactShape::Sphere { radius: 0.005 }),
                 friction: 0.3,
             },
             home: hand(-0.002),

@@ -7,7 +7,7 @@ use palpa_mesh::refine::{
     parts_for, refine, split_levels,
 };
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
-use palpa_scene::{ContactShape, Scene, Target, Tool};
+use palpa_scene::{Scene, Target, Tool};
 
 use super::place::mesh_size_near;
 use super::{Place, nodes_under_disc};
@@ -242,22 +242,10 @@ impl CoarseBody {
 
 /// Points of the skin that the tool presses on, and how far round them it reaches. m
 fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
-    // A round tool sinks in: the circle in which it cuts the skin's plane at its deepest.
-    let sunk = |r: f64| (scene.press.depth * (2.0 * r - scene.press.depth).max(0.0)).sqrt();
     let (reach, radius) = match scene.tool {
         Tool::Disc { radius } => ([0.0; 2], radius),
         Tool::Node => ([0.0; 2], 0.0),
-        Tool::Contact(tool) => match tool.shape {
-            ContactShape::Sphere { radius } => ([0.0; 2], sunk(radius)),
-            ContactShape::FlatPunch { radius, .. } => ([0.0; 2], radius),
-            ContactShape::Capsule { radius, length } => ([length / 2.0, 0.0], sunk(radius)),
-            ContactShape::Box {
-                size: [x, y, _], ..
-            } => ([x / 2.0, y / 2.0], 0.0),
-            ContactShape::Fingertip { radii: [a, b, c] } => {
-                ([0.0; 2], sunk((a * a / c).max(b * b / c)))
-            }
-        },
+        Tool::Contact(tool) => tool.shape.reach(scene.press.depth),
     };
     let mut points = vec![at];
     if let Some(tool) = scene.tool.contact() {

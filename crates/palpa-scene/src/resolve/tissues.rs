@@ -1,9 +1,10 @@
 //! Tissues: a name of the catalogue, or a law with its parameters.
 
+use super::law::{LawFault, Parts};
 use crate::error::Site;
 use crate::file::{OgdenTable, PronyTable, TissueSpec, TissueTable};
-use crate::law::{LawFault, Parts};
 use crate::limits::{self, Limits};
+use crate::parameters::{Numbers, ParameterSpec};
 use crate::units::{Kind, Quantity};
 use crate::{Law, OgdenTerm, Prony, PronyTerm, SceneError, Sourced, Status, Tissue, catalogue};
 
@@ -23,12 +24,12 @@ pub(super) fn tissue(at: &Site<'_>, spec: TissueSpec) -> Result<Tissue, SceneErr
 }
 
 /// What the scene gives, with the words in which it says where from.
-struct Given<'a> {
+struct Sources<'a> {
     at: &'a Site<'a>,
     source: &'a str,
 }
 
-impl Given<'_> {
+impl Sources<'_> {
     fn sourced(&self, value: f64) -> Sourced {
         Sourced {
             value,
@@ -49,49 +50,28 @@ impl Given<'_> {
         let quantity = self.at.key(key).within(quantity, limits)?;
         Ok(Some(self.sourced(quantity.si())))
     }
-
-    fn number(
-        &self,
-        key: &'static str,
-        number: Option<f64>,
-        limits: &Limits<f64>,
-    ) -> Result<Option<Sourced>, SceneError> {
-        let Some(number) = number else {
-            return Ok(None);
-        };
-        let number = self.at.key(key).within(number, limits)?;
-        Ok(Some(self.sourced(number)))
-    }
 }
 
 fn inline(at: &Site<'_>, table: TissueTable) -> Result<Tissue, SceneError> {
-    let given = Given {
+    let given = Sources {
         at,
         source: &table.source,
     };
     let density = given.quantity("density", table.density, &limits::DENSITY)?;
     let spring = given.quantity("spring", table.spring, &limits::SPRING)?;
-    let alpha = match table.alpha {
-        None => None,
-        Some(alpha) => Some(given.sourced(exponent(&at.key("alpha"), alpha)?)),
-    };
+    let mut numbers = Numbers::default();
+    for (spec, &value) in table.numbers.given() {
+        let value = spec.checked(&at.key(spec.key), value)?;
+        numbers.set(spec.key, given.sourced(value));
+    }
     let terms = match &table.terms {
         None => None,
         Some(terms) => Some(ogden_terms(&given, terms)?),
     };
     let parts = Parts {
         law: table.law.unwrap_or_default(),
-        young: given.quantity("young", table.young, &limits::YOUNG)?,
-        shear: given.quantity("shear", table.shear, &limits::SHEAR)?,
-        c10: given.quantity("c10", table.c10, &limits::SHEAR)?,
-        c01: given.quantity("c01", table.c01, &limits::C01)?,
-        c20: given.quantity("c20", table.c20, &limits::C20)?,
-        c30: given.quantity("c30", table.c30, &limits::C30)?,
+        numbers,
         terms,
-        alpha,
-        b: given.number("b", table.b, &limits::FUNG_B)?,
-        poisson: given.number("poisson", table.poisson, &limits::POISSON)?,
-        bulk: given.quantity("bulk", table.bulk, &limits::BULK)?,
         volume: table.volume,
     };
     let law = match spring {
@@ -118,12 +98,12 @@ fn inline(at: &Site<'_>, table: TissueTable) -> Result<Tissue, SceneError> {
 
 /// Bars of one stiffness take nothing else.
 fn check_spring(at: &Site<'_>, table: &TissueTable) -> Result<(), SceneError> {
-    if table.young.is_some() {
+    if table.numbers.get("young").is_some() {
         return Err(at
             .key("spring")
             .invalid("the stiffness is given twice; remove `young` or `spring`"));
     }
-    if table.poisson.is_some() {
+    if table.numbers.get("poisson").is_some() {
         return Err(at.key("poisson").invalid(
             "bars of one spring stiffness have no Poisson's ratio to choose; remove `poisson`, or \
              give `young` instead of `spring`",
@@ -131,50 +111,34 @@ fn check_spring(at: &Site<'_>, table: &TissueTable) -> Result<(), SceneError> {
     }
     let others = [
         ("law", table.law.is_some()),
-        ("shear", table.shear.is_some()),
-        ("c10", table.c10.is_some()),
-        ("c01", table.c01.is_some()),
-        ("c20", table.c20.is_some()),
-        ("c30", table.c30.is_some()),
         ("terms", table.terms.is_some()),
-        ("alpha", table.alpha.is_some()),
-        ("b", table.b.is_some()),
-        ("bulk", table.bulk.is_some()),
         ("volume", table.volume.is_some()),
         ("prony", table.prony.is_some()),
     ];
-    match others.iter().find(|(_, given)| *given) {
+    let others = others.iter().filter(|(_, is_given)| *is_given);
+    let numbers = table.numbers.given().map(|(spec, _)| spec.key);
+    match { others.map(|(key, _)| *key).chain(numbers) }.next() {
         None => Ok(()),
-        Some((key, _)) => Err(at.key(key).invalid(format!(
+        Some(key) => Err(at.key(key).invalid(format!(
             "bars of one spring stiffness have no law; remove `{key}`, or give `young` instead of `spring`"
         ))),
     }
 }
 
-fn ogden_terms(given: &Given<'_>, terms: &[OgdenTable]) -> Result<Vec<OgdenTerm>, SceneError> {
+fn ogden_terms(given: &Sources<'_>, terms: &[OgdenTable]) -> Result<Vec<OgdenTerm>, SceneError> {
     let at = given.at.key("terms");
     check_number(&at, terms.len(), limits::MAX_OGDEN_TERMS)?;
+    let exponent = ParameterSpec::of("alpha").expect("an exponent is a parameter");
     (terms.iter().enumerate())
         .map(|(i, term)| {
             let at = at.index(i);
             let mu = at.key("mu").within(term.mu, &limits::SHEAR)?;
             Ok(OgdenTerm {
                 mu: given.sourced(mu.si()),
-                alpha: exponent(&at.key("alpha"), term.alpha)?,
+                alpha: exponent.checked(&at.key("alpha"), term.alpha)?,
             })
         })
         .collect()
-}
-
-/// An exponent of either sign and an allowed size.
-fn exponent(at: &Site<'_>, alpha: f64) -> Result<f64, SceneError> {
-    if limits::OGDEN_ALPHA.contains(&alpha.abs()) {
-        return Ok(alpha);
-    }
-    Err(at.invalid(format!(
-        "an exponent of {alpha} is outside the allowed range {limits} of either sign; check the number",
-        limits = limits::OGDEN_ALPHA
-    )))
 }
 
 fn relaxation(at: &Site<'_>, prony: &PronyTable, source: &str) -> Result<Prony, SceneError> {

@@ -1,0 +1,318 @@
+//! The shapes of tools that press by contact.
+//!
+//! To add a shape: its name in [`ToolShape`], its sizes in [`ContactShape`], and an arm in each
+//! `match` of this file that the compiler asks for. A size that no shape has yet is a key of
+//! `ToolTable` (`file/tool.rs`) with its range in `limits.rs`. Its geometry is one file of
+//! `palpa-fem/src/shape`, whose head lists the other places. [`ContactShape`] is also the shape that
+//! the page gets, as JSON.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::SceneError;
+use crate::error::Site;
+use crate::file::ToolTable;
+use crate::limits::{self, Limits};
+use crate::units::Length;
+
+/// Radius of a tool where none is given. m
+const RADIUS: f64 = 8e-3;
+/// Length of a capsule's straight part. m
+const LENGTH: f64 = 20e-3;
+/// Size of a box. m
+const SIZE: [f64; 3] = [16e-3; 3];
+/// Radii of a finger's pad: they curve by 9.1 mm along and 7 mm across, within the 7–10 mm and 6–8 mm of index fingers
+/// (from memory, after Serina et al. 1998). m
+const FINGERTIP: [f64; 3] = [8e-3, 7e-3, 7e-3];
+/// Share of a punch's radius, or of half a box's smallest size, by which its edges are rounded.
+const EDGE: f64 = 0.3;
+
+/// The shapes of tools.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum ToolShape {
+    /// A patch of skin bonded to a rigid disc.
+    #[default]
+    Disc,
+    /// A single node of the skin that is moved; for the reference method, or to try out a mesh.
+    Node,
+    /// A ball.
+    Sphere,
+    /// The flat end of a round rod.
+    FlatPunch,
+    /// A lying cylinder with round ends.
+    Capsule,
+    /// A box.
+    Box,
+    /// The pad of a finger: an ellipsoid.
+    Fingertip,
+}
+
+/// The shape of a rigid tool. All lengths in metres. In its own frame its tip is the origin, x points along its length, and
+/// z out of the tissue. At depth 0 the tip, in the middle of its face, touches the skin at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum ContactShape {
+    /// A ball.
+    Sphere {
+        /// Its radius.
+        radius: f64,
+    },
+    /// The flat end of a round rod along z, with a rounded edge.
+    FlatPunch {
+        /// Radius of the rod.
+        radius: f64,
+        /// Radius of its edge's rounding, no more than `radius`.
+        edge_radius: f64,
+    },
+    /// A lying cylinder along x with round ends.
+    Capsule {
+        /// Radius of the cylinder and its ends.
+        radius: f64,
+        /// Length of the straight part, between the centres of the ends.
+        length: f64,
+    },
+    /// A box with rounded edges.
+    Box {
+        /// Its whole size along x, y and z.
+        size: [f64; 3],
+        /// Radius of its edges' rounding, no more than half its smallest size.
+        edge_radius: f64,
+    },
+    /// The pad of a finger: an ellipsoid.
+    Fingertip {
+        /// Its radii along x (the finger), y and z.
+        radii: [f64; 3],
+    },
+}
+
+impl ToolShape {
+    /// Its name in a sentence, and the keys it takes.
+    pub(crate) fn takes(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Disc => ("a disc", &["radius"]),
+            Self::Node => ("a node", &[]),
+            Self::Sphere => ("a sphere", &["radius", "friction"]),
+            Self::FlatPunch => ("a flat punch", &["radius", "edge_radius", "friction"]),
+            Self::Capsule => ("a capsule", &["radius", "length", "axis", "friction"]),
+            Self::Box => ("a box", &["size", "edge_radius", "axis", "friction"]),
+            Self::Fingertip => ("a fingertip", &["radii", "axis", "friction"]),
+        }
+    }
+}
+
+impl ContactShape {
+    /// The shape that a scene's table describes, if it presses by contact.
+    pub(crate) fn read(at: &Site<'_>, table: &ToolTable) -> Result<Option<Self>, SceneError> {
+        let sizes = Sizes { at, table };
+        Ok(Some(match table.shape {
+            ToolShape::Disc | ToolShape::Node => return Ok(None),
+            ToolShape::Sphere => Self::Sphere {
+                radius: sizes.radius()?,
+            },
+            ToolShape::FlatPunch => {
+                let radius = sizes.radius()?;
+                let edge_radius = sizes.edge_radius(radius)?;
+                Self::FlatPunch {
+                    radius,
+                    edge_radius,
+                }
+            }
+            ToolShape::Capsule => Self::Capsule {
+                radius: sizes.radius()?,
+                length: sizes.one("length", table.length, LENGTH, &limits::TOOL_LENGTH)?,
+            },
+            ToolShape::Box => {
+                let size = sizes.three("size", table.size, SIZE, &limits::TOOL_SIZE)?;
+                let smallest = size.iter().copied().fold(f64::INFINITY, f64::min);
+                Self::Box {
+                    size,
+                    edge_radius: sizes.edge_radius(smallest / 2.0)?,
+                }
+            }
+            ToolShape::Fingertip => Self::Fingertip {
+                radii: sizes.three("radii", table.radii, FINGERTIP, &limits::TOOL_RADIUS)?,
+            },
+        }))
+    }
+
+    /// Its name and sizes into a scene's table.
+    pub(crate) fn write(&self, table: &mut ToolTable) {
+        let length = |length: f64| Some(Length::from_si(length));
+        let three = |lengths: [f64; 3]| Some(lengths.map(Length::from_si));
+        table.shape = match *self {
+            Self::Sphere { radius } => {
+                table.radius = length(radius);
+                ToolShape::Sphere
+            }
+            Self::FlatPunch {
+                radius,
+                edge_radius,
+            } => {
+                table.radius = length(radius);
+                table.edge_radius = length(edge_radius);
+                ToolShape::FlatPunch
+            }
+            Self::Capsule {
+                radius,
+                length: straight,
+            } => {
+                table.radius = length(radius);
+                table.length = length(straight);
+                ToolShape::Capsule
+            }
+            Self::Box { size, edge_radius } => {
+                table.size = three(size);
+                table.edge_radius = length(edge_radius);
+                ToolShape::Box
+            }
+            Self::Fingertip { radii } => {
+                table.radii = three(radii);
+                ToolShape::Fingertip
+            }
+        };
+    }
+
+    /// Radius of the rounding of a flat tool's edge in metres.
+    pub fn edge_radius(&self) -> Option<f64> {
+        match *self {
+            Self::FlatPunch { edge_radius, .. } | Self::Box { edge_radius, .. } => {
+                Some(edge_radius)
+            }
+            Self::Sphere { .. } | Self::Capsule { .. } | Self::Fingertip { .. } => None,
+        }
+    }
+
+    /// Radius of a circle of skin that it presses on in metres, as a size: of a punch its own, of a box half its smaller
+    /// width; of a round tool that of the patch which Hertz's `√(R d)` gives at a depth `d` of half its smaller radius of
+    /// curvature `R`.
+    pub fn contact_radius(&self) -> f64 {
+        let hertz = |curvature: f64| curvature * FRAC_1_SQRT_2;
+        match *self {
+            Self::FlatPunch { radius, .. } => radius,
+            Self::Box {
+                size: [x, y, _], ..
+            } => x.min(y) / 2.0,
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => hertz(radius),
+            Self::Fingertip { radii: [a, b, c] } => hertz((a * a / c).min(b * b / c)),
+        }
+    }
+
+    /// How far it reaches along the skin where it is pressed to this depth: a rectangle of these half widths along x and y,
+    /// and all points within a radius round it, in metres.
+    pub fn reach(&self, depth: f64) -> ([f64; 2], f64) {
+        // A round tool sinks in: the circle in which it cuts the skin's plane at its deepest.
+        let sunk = |r: f64| (depth * (2.0 * r - depth).max(0.0)).sqrt();
+        match *self {
+            Self::Sphere { radius } => ([0.0; 2], sunk(radius)),
+            Self::FlatPunch { radius, .. } => ([0.0; 2], radius),
+            Self::Capsule { radius, length } => ([length / 2.0, 0.0], sunk(radius)),
+            Self::Box {
+                size: [x, y, _], ..
+            } => ([x / 2.0, y / 2.0], 0.0),
+            Self::Fingertip { radii: [a, b, c] } => ([0.0; 2], sunk((a * a / c).max(b * b / c))),
+        }
+    }
+
+    /// Half its greater width along the skin, in metres.
+    pub fn half_width(&self) -> f64 {
+        match *self {
+            Self::Sphere { radius } | Self::FlatPunch { radius, .. } => radius,
+            Self::Capsule { radius, length } => radius + 0.5 * length,
+            Self::Box { size, .. } => 0.5 * size[0].max(size[1]),
+            Self::Fingertip { radii } => radii[0].max(radii[1]),
+        }
+    }
+}
+
+/// The sizes that a scene's table gives, checked, or their defaults.
+struct Sizes<'a> {
+    at: &'a Site<'a>,
+    table: &'a ToolTable,
+}
+
+impl Sizes<'_> {
+    fn one(
+        &self,
+        key: &'static str,
+        given: Option<Length>,
+        default: f64,
+        limits: &Limits<Length>,
+    ) -> Result<f64, SceneError> {
+        let length = given.unwrap_or(Length::from_si(default));
+        Ok(self.at.key(key).within(length, limits)?.si())
+    }
+
+    fn three(
+        &self,
+        key: &'static str,
+        given: Option<[Length; 3]>,
+        default: [f64; 3],
+        limits: &Limits<Length>,
+    ) -> Result<[f64; 3], SceneError> {
+        let lengths = given.unwrap_or(default.map(Length::from_si));
+        crate::resolve::each(&self.at.key(key), lengths, limits)
+    }
+
+    fn radius(&self) -> Result<f64, SceneError> {
+        self.one("radius", self.table.radius, RADIUS, &limits::TOOL_RADIUS)
+    }
+
+    /// The rounding of edges that have room for this radius, in metres.
+    fn edge_radius(&self, most: f64) -> Result<f64, SceneError> {
+        let edge = self.one(
+            "edge_radius",
+            self.table.edge_radius,
+            EDGE * most,
+            &limits::EDGE_RADIUS,
+        )?;
+        if edge > most {
+            return Err(self.at.key("edge_radius").invalid(format!(
+                "edges rounded by {} are rounder than the tool, which has room for {}; make `edge_radius` smaller",
+                Length::from_si(edge),
+                Length::from_si(most)
+            )));
+        }
+        Ok(edge)
+    }
+}
+
+/// Radius of a bonded disc, in metres.
+pub(crate) fn disc_radius(at: &Site<'_>, table: &ToolTable) -> Result<f64, SceneError> {
+    Sizes { at, table }.radius()
+}
+
+impl fmt::Display for ContactShape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm = |length: f64| format!("{:.1} mm", length * 1e3);
+        let three = |[a, b, c]: [f64; 3]| {
+            let [a, b, c] = [a, b, c].map(|length| format!("{:.1}", length * 1e3));
+            format!("{a} × {b} × {c} mm")
+        };
+        match *self {
+            Self::Sphere { radius } => write!(f, "sphere, radius {}", mm(radius)),
+            Self::FlatPunch {
+                radius,
+                edge_radius,
+            } => write!(
+                f,
+                "flat punch, radius {}, edge rounded by {}",
+                mm(radius),
+                Length::from_si(edge_radius)
+            ),
+            Self::Capsule { radius, length } => {
+                write!(f, "capsule, radius {}, length {}", mm(radius), mm(length))
+            }
+            Self::Box { size, edge_radius } => write!(
+                f,
+                "box, {}, edges rounded by {}",
+                three(size),
+                Length::from_si(edge_radius)
+            ),
+            Self::Fingertip { radii } => write!(f, "fingertip, radii {}", three(radii)),
+        }
+    }
+}
