@@ -104,7 +104,7 @@ test('tool and friction change', async () => {
   await palpa.have('block');
   await palpa.tab('tool');
   await palpa.by('tool-shape').selectOption('sphere');
-  await palpa.viewer.running('the tool is a ball', ({ tool }) => tool.shape.kind === 'sphere');
+  await palpa.viewer.running('the tool is a ball', ({ tool }) => tool.shape?.kind === 'sphere');
   await palpa.type('tool-friction', '0.8', ({ tool }) => tool.friction === 0.8);
   const { newtons } = await forceOfPress(palpa);
   assert.ok(newtons > 0.1, `${newtons} N`);
