@@ -31,6 +31,8 @@ pub(crate) enum LawName {
     Ogden,
     /// µ/(2b) (exp(b (I1 − 3)) − 1), which stiffens as skin does: takes `young` or `shear`, and `b`.
     Fung,
+    /// −µ jm/2 ln(1 − (I1 − 3)/jm), whose chains stretch only so far: takes `young` or `shear`, and `jm`.
+    Gent,
 }
 
 /// The deviatoric part of a strain energy. `Ī1`, `Ī2` are the isochoric invariants, `λ̄` the isochoric stretches.
@@ -80,6 +82,13 @@ pub enum Energy {
         /// How fast it stiffens, above 0.
         b: Sourced,
     },
+    /// `−µ Jm/2 ln(1 − (Ī1 − 3)/Jm)`: stretches no further than `Ī1 − 3 = Jm`.
+    Gent {
+        /// Gives `µ`.
+        stiffness: Stiffness,
+        /// The limit `Jm`, above 0.
+        jm: Sourced,
+    },
 }
 
 /// A term of Ogden's energy.
@@ -109,6 +118,7 @@ impl LawName {
             Self::Yeoh => ("a yeoh", &["young", "shear", "c10"], &["c20", "c30"]),
             Self::Ogden => ("an ogden", &["terms", "young", "shear"], &["alpha"]),
             Self::Fung => ("a fung", &["young", "shear"], &["b"]),
+            Self::Gent => ("a gent", &["young", "shear"], &["jm"]),
         }
     }
 
@@ -165,6 +175,10 @@ impl LawName {
                 b: own("b")?,
                 stiffness: stiffness()?,
             },
+            Self::Gent => Energy::Gent {
+                jm: own("jm")?,
+                stiffness: stiffness()?,
+            },
         })
     }
 }
@@ -180,6 +194,7 @@ impl Energy {
             Self::Yeoh { .. } => LawName::Yeoh,
             Self::Ogden { .. } => LawName::Ogden,
             Self::Fung { .. } => LawName::Fung,
+            Self::Gent { .. } => LawName::Gent,
         }
     }
 
@@ -196,7 +211,8 @@ impl Energy {
             | Self::NeoHookean { stiffness }
             | Self::MooneyRivlin { stiffness, .. }
             | Self::Yeoh { stiffness, .. }
-            | Self::Fung { stiffness, .. } => Some(stiffness),
+            | Self::Fung { stiffness, .. }
+            | Self::Gent { stiffness, .. } => Some(stiffness),
             Self::Ogden { .. } => None,
         }
     }
@@ -219,6 +235,7 @@ impl Energy {
                 numbers.set("c30", c30);
             }
             Self::Fung { b, .. } => numbers.set("b", b),
+            Self::Gent { jm, .. } => numbers.set("jm", jm),
             Self::Linear { .. }
             | Self::StVenantKirchhoff { .. }
             | Self::NeoHookean { .. }

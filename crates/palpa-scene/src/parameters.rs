@@ -59,7 +59,7 @@ use Range::{Size, Within};
 use Unit::{One, Pascal};
 
 /// Number of [`PARAMETERS`].
-const N_PARAMETERS: usize = 10;
+const N_PARAMETERS: usize = 11;
 
 /// All parameters, in the order in which a scene writes them.
 pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
@@ -122,6 +122,14 @@ pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
         missing: Refused("`b = 10`, which says how fast it stiffens"),
         about: "Fung: how fast the tissue stiffens, {range}. The shear stiffness is doubled where I1 − 3 = 0.7/b, at a \
                 stretch of about 1 + 0.5/√b.",
+    },
+    ParameterSpec {
+        key: "jm",
+        unit: One,
+        range: Within(0.01, 10_000.0),
+        missing: Refused("`jm = 10`, the I1 − 3 beyond which it cannot be stretched"),
+        about: "Gent: the I1 − 3 beyond which the tissue cannot be stretched, {range}. A pull to the stretch λ at constant \
+                volume is I1 − 3 = λ² + 2/λ − 3.",
     },
     ParameterSpec {
         key: "poisson",

@@ -3,8 +3,8 @@
 use anyhow::{Context as _, bail};
 use nalgebra::{Rotation3, UnitQuaternion};
 use palpa_fem::law::{
-    Fung, Law, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm,
-    Prony, PronyTerm, StVenantKirchhoff, Volumetric, Yeoh,
+    Fung, Gent, Law, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden,
+    OgdenTerm, Prony, PronyTerm, StVenantKirchhoff, Volumetric, Yeoh,
 };
 use palpa_fem::lump::{ClosedMesh, Lump, LumpShape};
 use palpa_fem::shape::{
@@ -92,6 +92,7 @@ fn law(elastic: &Elastic) -> Result<Law, LawError> {
             Ogden::new(&terms.collect::<Vec<_>>(), volume)?.into()
         }
         Energy::Fung { b, .. } => Fung::new(shear, b.value, volume)?.into(),
+        Energy::Gent { jm, .. } => Gent::new(shear, jm.value, volume)?.into(),
     })
 }
 

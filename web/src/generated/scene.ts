@@ -210,7 +210,7 @@ export interface components {
         /** @description Material of the bars in a level between two layers. */
         InPlane: "above" | "below" | "mean";
         /** @description The elastic laws that a tissue can be given. */
-        LawName: "linear" | "st-venant-kirchhoff" | "neo-hookean" | "mooney-rivlin" | "yeoh" | "ogden" | "fung";
+        LawName: "linear" | "st-venant-kirchhoff" | "neo-hookean" | "mooney-rivlin" | "yeoh" | "ogden" | "fung" | "gent";
         /** @description One layer of tissue. */
         LayerTable: {
             /**
@@ -654,6 +654,11 @@ export interface components {
              * @example 1060 kg/m³
              */
             density?: string;
+            /**
+             * Format: double
+             * @description Gent: the I1 − 3 beyond which the tissue cannot be stretched, 0.01 to 10000. A pull to the stretch λ at constant volume is I1 − 3 = λ² + 2/λ − 3.
+             */
+            jm?: number;
             /** @description The elastic law, which says what parameters the tissue takes. All laws are alike at small strain. Default: "neo-hookean". */
             law?: components["schemas"]["LawName"];
             /**
@@ -796,7 +801,7 @@ export const CHOICES = {
   GeneratorKind: ['block', 'cylinder', 'forearm'],
   Grip: ['soft', 'medium', 'stiff'],
   InPlane: ['above', 'below', 'mean'],
-  LawName: ['linear', 'st-venant-kirchhoff', 'neo-hookean', 'mooney-rivlin', 'yeoh', 'ogden', 'fung'],
+  LawName: ['linear', 'st-venant-kirchhoff', 'neo-hookean', 'mooney-rivlin', 'yeoh', 'ogden', 'fung', 'gent'],
   LengthUnit: ['m', 'cm', 'mm', 'in'],
   LumpShapeName: ['sphere', 'ellipsoid', 'capsule', 'mesh'],
   ModelKind: ['tissue', 'reference'],

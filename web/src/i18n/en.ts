@@ -204,6 +204,7 @@ export const en = {
   'tissues.c30': 'C30',
   'tissues.alpha': 'Exponent α',
   'tissues.b': 'Stiffening b',
+  'tissues.jm': 'Stretch limit Jm',
   'tissues.spring': 'Bar stiffness',
   'tissues.poisson': 'Poisson’s ratio',
   'tissues.bulk': 'Bulk modulus',
@@ -219,6 +220,7 @@ export const en = {
   'law.yeoh': 'Yeoh',
   'law.ogden': 'Ogden',
   'law.fung': 'Fung',
+  'law.gent': 'Gent',
 
   'lumps.add': 'New lump',
   'lumps.see_through': 'Make layers transparent',

@@ -206,6 +206,7 @@ export const ja: Dictionary = {
   'tissues.c30': 'C30',
   'tissues.alpha': '指数 α',
   'tissues.b': '硬化係数 b',
+  'tissues.jm': '伸びの限界 Jm',
   'tissues.spring': 'バネ定数',
   'tissues.poisson': 'ポアソン比',
   'tissues.bulk': '体積弾性率',
@@ -221,6 +222,7 @@ export const ja: Dictionary = {
   'law.yeoh': 'ヨー（Yeoh）',
   'law.ogden': 'オグデン',
   'law.fung': 'ファン（Fung）',
+  'law.gent': 'ジェント（Gent）',
 
   'lumps.add': '新しいしこり',
   'lumps.see_through': '層を透明にする',

@@ -11,7 +11,7 @@ import { formatQuantity, type Dimension } from './quantity';
 export type Tissue = LayerTable['tissue'];
 
 /** Parameters beside stiffness and Poisson's ratio. */
-type ParameterKey = 'c01' | 'c20' | 'c30' | 'alpha' | 'b';
+type ParameterKey = 'c01' | 'c20' | 'c30' | 'alpha' | 'b' | 'jm';
 
 interface Parameter {
   key: ParameterKey;
@@ -35,6 +35,7 @@ export const LAWS: Record<LawName, Parameter[]> = {
   ],
   ogden: [{ key: 'alpha', dimension: 'number', start: () => 8 }],
   fung: [{ key: 'b', dimension: 'number', start: () => 10 }],
+  gent: [{ key: 'jm', dimension: 'number', start: () => 1 }],
 };
 export const LAW_NAMES = Object.keys(LAWS) as LawName[];
 

@@ -332,6 +332,11 @@ fn what_calculix_cannot_say_is_refused_or_noted() {
             "YEOH",
         ),
         (
+            r#"law = "gent", young = "40 kPa", jm = 5"#,
+            "Gent's logarithm",
+            "YEOH",
+        ),
+        (
             r#"young = "40 kPa", volume = "logarithmic""#,
             "(ln J)²",
             "NEO HOOKE",

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, Rotation3};
 
 use super::*;
 use crate::law::{
-    Fung, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, StVenantKirchhoff, Volumetric, Yeoh,
+    Fung, Gent, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, StVenantKirchhoff, Volumetric,
+    Yeoh,
 };
 
 /// Numbers between −1 and 1, the same in each run.
@@ -47,6 +48,7 @@ fn laws() -> Vec<Law> {
         Yeoh::new([5e3, 1e3, 500.0], quadratic).unwrap().into(),
         Ogden::new(&terms, quadratic).unwrap().into(),
         Fung::new(mu, 3.0, quadratic).unwrap().into(),
+        Gent::new(mu, 5.0, quadratic).unwrap().into(),
     ]
 }
 

@@ -16,6 +16,7 @@
 
 mod error;
 mod fung;
+mod gent;
 mod hardening;
 mod invariants;
 mod linear;
@@ -32,6 +33,7 @@ mod yeoh;
 
 pub use error::LawError;
 pub use fung::Fung;
+pub use gent::Gent;
 pub use linear::Linear;
 pub use material::Material;
 pub use mooney_rivlin::MooneyRivlin;
@@ -157,6 +159,8 @@ pub enum Law {
     Ogden(Ogden),
     /// An exponential in the first isochoric invariant.
     Fung(Fung),
+    /// A logarithm in the first isochoric invariant, with a limit of stretch.
+    Gent(Gent),
 }
 
 /// `expression` with `$law` bound to the parameters of whichever law it is.
@@ -170,6 +174,7 @@ macro_rules! of_each {
             Law::Yeoh($law) => $expression,
             Law::Ogden($law) => $expression,
             Law::Fung($law) => $expression,
+            Law::Gent($law) => $expression,
         }
     };
 }
@@ -196,7 +201,7 @@ macro_rules! law_from {
     )* };
 }
 
-law_from!(Linear StVenantKirchhoff NeoHookean MooneyRivlin Yeoh Ogden Fung);
+law_from!(Linear StVenantKirchhoff NeoHookean MooneyRivlin Yeoh Ogden Fung Gent);
 
 impl Law {
     /// `W_d(F)`, in J/m³; infinite for `det F ≤ 0` (but not of the linear law, which knows no inversion).

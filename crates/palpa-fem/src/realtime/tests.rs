@@ -5,7 +5,7 @@ use super::column_pattern;
 use crate::assembly::assemble;
 use crate::columns::SurfaceGroup;
 use crate::law::{
-    Fung, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm,
+    Fung, Gent, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm,
     StVenantKirchhoff, Volumetric, Yeoh,
 };
 use crate::model::Model;
@@ -88,7 +88,7 @@ fn cases() -> Vec<(&'static str, Materials)> {
     let strange = [
         StVenantKirchhoff::from_young(50e3, 0.45).unwrap().into(),
         NeoHookean::new(1e4, log).unwrap().into(),
-        soft(30e3),
+        Gent::from_young(30e3, 0.45, 20.0).unwrap().into(),
     ];
     vec![
         ("neo-Hookean", materials(&neo_hookean, false)),

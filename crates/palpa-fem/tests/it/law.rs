@@ -8,8 +8,8 @@ mod relaxation;
 
 use palpa_fem::Mat3;
 use palpa_fem::law::{
-    Fung, Law, LawError, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, StVenantKirchhoff,
-    Volumetric, Yeoh,
+    Fung, Gent, Law, LawError, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm,
+    StVenantKirchhoff, Volumetric, Yeoh,
 };
 
 /// Every law, each with several sets of parameters: soft and hard, compressible and nearly not.
@@ -47,6 +47,8 @@ pub(crate) fn every_law() -> Vec<Law> {
         )),
         law(Fung::from_young(30e3, 0.45, 1.2)),
         law(Fung::new(300.0, 12.0, logarithmic(3e4))),
+        law(Gent::from_young(30e3, 0.45, 60.0)),
+        law(Gent::new(300.0, 12.0, logarithmic(3e4))),
     ]
 }
 

@@ -4,7 +4,7 @@
 //! 2.20 on one confined element, to 7 digits. There, a second or third D of 0 stands for a default, not for nothing.
 
 use anyhow::bail;
-use palpa_fem::law::{Fung, Law, Material, OgdenTerm, Volumetric, Yeoh};
+use palpa_fem::law::{Law, Material, OgdenTerm, Volumetric, Yeoh};
 
 /// Terms of Ogden's energy that CalculiX takes.
 const MOST_OGDEN_TERMS: usize = 3;
@@ -57,6 +57,7 @@ pub(super) fn card(
             "tissue \"{name}\" has K/2 (ln J)² for its volume, and the deck K/2 (J − 1)²"
         ));
     }
+    let volumetric = material.law.volumetric_energy();
     let (keyword, numbers) = match &material.law {
         Law::Linear(_) | Law::StVenantKirchhoff(_) => {
             let shear = material.law.shear_modulus() * to_mpa;
@@ -77,11 +78,19 @@ pub(super) fn card(
             departures.push(format!(
                 "tissue \"{name}\" has Fung's exponential, and the deck the first three terms of its series"
             ));
-            let law = first_terms(
-                law,
-                material.law.shear_modulus(),
-                material.law.volumetric_energy(),
-            )?;
+            // μ/(2b) (exp(b x) − 1) = μ/2 (x + b x²/2 + b² x³/6 + …)
+            let (c10, b) = (0.5 * material.law.shear_modulus(), law.b());
+            let law = Yeoh::new([c10, c10 * b / 2.0, c10 * b * b / 6.0], *volumetric)?;
+            yeoh(&law, to_mpa, bulk)
+        }
+        Law::Gent(law) => {
+            departures.push(format!(
+                "tissue \"{name}\" has Gent's logarithm with its limit of stretch, and the deck the first three terms of \
+                 its series, without limit"
+            ));
+            // −μ Jm/2 ln(1 − x/Jm) = μ/2 (x + x²/(2 Jm) + x³/(3 Jm²) + …)
+            let (c10, jm) = (0.5 * material.law.shear_modulus(), law.limit());
+            let law = Yeoh::new([c10, c10 / (2.0 * jm), c10 / (3.0 * jm * jm)], *volumetric)?;
             yeoh(&law, to_mpa, bulk)
         }
         Law::Ogden(law) if law.terms().len() > MOST_OGDEN_TERMS => bail!(
@@ -95,16 +104,6 @@ pub(super) fn card(
         keyword,
         lines: numbers.chunks(8).map(line).collect(),
     })
-}
-
-/// `exp` to the third power of its argument: `μ/(2b) (b x + b² x²/2 + b³ x³/6)`.
-fn first_terms(law: &Fung, shear: f64, volumetric: &Volumetric) -> anyhow::Result<Yeoh> {
-    let b = law.b();
-    let c10 = 0.5 * shear;
-    Ok(Yeoh::new(
-        [c10, c10 * b / 2.0, c10 * b * b / 6.0],
-        *volumetric,
-    )?)
 }
 
 fn yeoh(law: &Yeoh, to_mpa: f64, bulk: f64) -> (String, Vec<f64>) {

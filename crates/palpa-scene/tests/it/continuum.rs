@@ -182,7 +182,13 @@ fn each_law_has_the_parameters_it_was_given() {
 
     let fung = law("law = \"fung\", young = \"29 kPa\", b = 20, poisson = 0.45");
     assert_near(fung.shear(), 10e3);
-    for law in [neo, mooney, ogden, one, yeoh, fung] {
+    let gent = law("law = \"gent\", shear = \"5 kPa\", jm = 12, bulk = \"90 kPa\"");
+    assert_near(gent.shear(), 5e3);
+    let Energy::Gent { jm, .. } = &gent.energy else {
+        panic!("{gent:?}")
+    };
+    assert_eq!((jm.value, jm.status), (12.0, Status::Given));
+    for law in [neo, mooney, ogden, one, yeoh, fung, gent] {
         assert_consistent(&law);
     }
 }

@@ -2,8 +2,8 @@
 
 use palpa_fem::Mat3;
 use palpa_fem::law::{
-    Fung, Law, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, StVenantKirchhoff, Volumetric,
-    Yeoh,
+    Fung, Gent, Law, Linear, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, StVenantKirchhoff,
+    Volumetric, Yeoh,
 };
 
 use super::assert_close;
@@ -48,6 +48,12 @@ fn tension_at_constant_volume() {
             1e4 * (2.0 * x).exp() * strain,
             1e-11,
         );
+        let gent = Gent::new(1e4, 9.0, VOLUMETRIC).unwrap();
+        assert_close(
+            tension(gent, stretch),
+            1e4 * 9.0 / (9.0 - x) * strain,
+            1e-12,
+        );
         let terms = [(4e3, 5.0), (2e3, -3.0), (1e3, 0.5)];
         let expected: f64 = terms
             .iter()
@@ -83,6 +89,12 @@ fn simple_shear() {
         assert_close(
             shear(fung.into()),
             1e4 * slope * (0.7 * slope * slope).exp(),
+            1e-12,
+        );
+        let gent = Gent::new(1e4, 5.0, VOLUMETRIC).unwrap();
+        assert_close(
+            shear(gent.into()),
+            1e4 * slope * 5.0 / (5.0 - slope * slope),
             1e-12,
         );
         assert_close(

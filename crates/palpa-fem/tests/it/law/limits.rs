@@ -1,6 +1,8 @@
 //! Laws that are special cases of others, and strains at which formulas degenerate.
 
-use palpa_fem::law::{Fung, Law, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Volumetric, Yeoh};
+use palpa_fem::law::{
+    Fung, Gent, Law, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Volumetric, Yeoh,
+};
 use palpa_fem::{Mat3, Response};
 
 use super::{Chance, every_law};
@@ -60,6 +62,7 @@ fn each_law_ends_in_neo_hookean() {
         1e-14,
     );
     assert_same_law(Fung::new(MU, 1e-14, VOLUMETRIC).unwrap(), expected, 1e-12);
+    assert_same_law(Gent::new(MU, 1e14, VOLUMETRIC).unwrap(), expected, 1e-12);
 }
 
 /// `Ī2` is `Ī1` of the inverse, so that the exponent −2 is the second constant of Mooney and Rivlin.
@@ -102,6 +105,42 @@ fn fung_starts_as_yeoh() {
             &series.deviatoric_response(&f),
             1e-7,
         );
+    }
+}
+
+/// At the limit of stretch the energy and the stress grow without bound, and beyond it there is no law.
+#[test]
+fn gent_ends_at_its_limit() {
+    let limit = 2.0;
+    let gent = Law::from(Gent::new(MU, limit, VOLUMETRIC).unwrap());
+    // Ī1 − 3 = λ² + 2/λ − 3 of an incompressible tension.
+    let tension = |stretch: f64| {
+        let across = stretch.sqrt().recip();
+        Mat3::from_diagonal(&[stretch, across, across].into())
+    };
+    let excess = |stretch: f64| stretch * stretch + 2.0 / stretch - 3.0;
+    let (mut inside, mut outside) = (1.0, 3.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if excess(middle) < limit {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    let stress = |share: f64| {
+        let f = tension(1.0 + share * (inside - 1.0));
+        let (energy, stress) = gent.deviatoric_stress(&f);
+        assert!(energy.is_finite(), "{share}: {energy}");
+        stress.norm()
+    };
+    assert!(stress(0.9) > 3.0 * stress(0.5));
+    assert!(stress(1.0 - 1e-9) > 1e6 * stress(0.9));
+    for stretch in [1.0 + 1.000_001 * (inside - 1.0), 3.0, 1e3] {
+        let refused = gent.deviatoric_response(&tension(stretch));
+        assert_eq!(refused.energy, f64::INFINITY, "{stretch}");
+        assert_eq!(refused.stress, Mat3::zeros());
+        assert_eq!(gent.deviatoric_energy(&tension(stretch)), f64::INFINITY);
     }
 }
 

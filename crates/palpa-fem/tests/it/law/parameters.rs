@@ -1,8 +1,8 @@
 //! Parameters that make no material are refused, in words.
 
 use palpa_fem::law::{
-    Fung, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony,
-    PronyTerm, StVenantKirchhoff, Volumetric, Yeoh,
+    Fung, Gent, LawError, Linear, Material, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm,
+    Prony, PronyTerm, StVenantKirchhoff, Volumetric, Yeoh,
 };
 
 const VOLUMETRIC: Volumetric = Volumetric::Quadratic { bulk: 1e5 };
@@ -21,6 +21,7 @@ fn moduli_must_be_those_of_a_solid() {
         assert!(Linear::from_young(young, 0.3).is_err());
         assert!(StVenantKirchhoff::from_young(young, 0.3).is_err());
         assert!(Fung::from_young(young, 0.3, 1.0).is_err());
+        assert!(Gent::from_young(young, 0.3, 1.0).is_err());
         assert!(Linear::new(young, 1e3).is_err());
         assert!(Linear::new(1e3, young).is_err());
         let volumetric = Volumetric::Logarithmic { bulk: young };
@@ -63,6 +64,10 @@ fn constants_must_keep_the_energy_growing() {
     assert_refused(
         Fung::new(1e4, 0.0, VOLUMETRIC),
         "Fung: the exponent b is 0, but must be positive and finite",
+    );
+    assert_refused(
+        Gent::new(1e4, 0.0, VOLUMETRIC),
+        "Gent: the limit Jm is 0, but must be positive and finite",
     );
 }
 
