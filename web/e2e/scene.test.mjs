@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
+import { saveShot } from './shots.mjs';
 import { until } from './viewer.mjs';
 import { extent, readBody } from './vtu.mjs';
 
@@ -108,6 +109,26 @@ test('tool and friction change', async () => {
   await palpa.type('tool-friction', '0.8', ({ tool }) => tool.friction === 0.8);
   const { newtons } = await forceOfPress(palpa);
   assert.ok(newtons > 0.1, `${newtons} N`);
+  await palpa.choose('block');
+});
+
+test('a cone can be chosen, made blunter and pressed', async (t) => {
+  const palpa = await sharedPage();
+  await palpa.have('block');
+  await palpa.tab('tool');
+  await palpa.by('tool-shape').selectOption('cone');
+  await palpa.viewer.running('the tool is a cone', ({ tool }) => tool.shape?.kind === 'cone');
+  await palpa.type('tool-opening_angle', '140 deg',
+    ({ tool }) => tool.shape?.kind === 'cone' && Math.abs(tool.shape.opening_angle - (7 * Math.PI) / 9) < 1e-6);
+  await palpa.type('tool-tip_radius', '2 mm', ({ tool }) => tool.shape?.kind === 'cone' && Math.abs(tool.shape.tip_radius - 2e-3) < 1e-9);
+  await palpa.atRest();
+  await palpa.focus();
+  await palpa.page.keyboard.press('Space');
+  const { newtons } = await palpa.steady();
+  t.diagnostic(`a cone presses with ${newtons.toFixed(3)} N`);
+  await saveShot(palpa, 'cone');
+  await palpa.page.keyboard.press('Escape');
+  assert.ok(newtons > 0.02, `${newtons} N`);
   await palpa.choose('block');
 });
 

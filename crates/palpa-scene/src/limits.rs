@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::units::{
-    Density, Kind, Length, Pressure, Quantity, Rate, SpringConstant, Time, Velocity,
+    Angle, Density, Kind, Length, Pressure, Quantity, Rate, SpringConstant, Time, Velocity,
 };
 
 /// Larger scene files are refused unread. bytes
@@ -87,6 +87,8 @@ pub(crate) const TOOL_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
 pub(crate) const TOOL_SIZE: Limits<Length> = between(0.2e-3, 0.4);
 pub(crate) const TOOL_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
 pub(crate) const EDGE_RADIUS: Limits<Length> = between(1e-6, 0.2);
+/// 20° and 160°, as texts of degrees are read.
+pub(crate) const OPENING_ANGLE: Limits<Angle> = between(0.349065850398866, 2.792526803190927);
 pub(crate) const FRICTION: Limits<f64> = numbers(0.0, 5.0);
 pub(crate) const LUMP_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
 pub(crate) const LUMP_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
@@ -192,6 +194,8 @@ mod tests {
         says("ToolTable", "length", &TOOL_LENGTH);
         says("ToolTable", "size", &TOOL_SIZE);
         says("ToolTable", "edge_radius", &EDGE_RADIUS);
+        says("ToolTable", "opening_angle", &OPENING_ANGLE);
+        says("ToolTable", "tip_radius", &EDGE_RADIUS);
         says("ToolTable", "friction", &FRICTION);
         says("LumpTable", "radius", &LUMP_RADIUS);
         says("LumpTable", "radii", &LUMP_RADIUS);

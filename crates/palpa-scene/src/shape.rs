@@ -6,7 +6,7 @@
 //! `palpa-fem/src/shape`, whose head lists the other places. [`ContactShape`] is also the shape that
 //! the page gets, as JSON.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, FRAC_PI_3};
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -16,7 +16,7 @@ use crate::SceneError;
 use crate::error::Site;
 use crate::file::ToolTable;
 use crate::limits::{self, Limits};
-use crate::units::Length;
+use crate::units::{Angle, Length};
 
 /// Radius of a tool where none is given. m
 const RADIUS: f64 = 8e-3;
@@ -27,7 +27,11 @@ const SIZE: [f64; 3] = [16e-3; 3];
 /// Radii of a finger's pad: they curve by 9.1 mm along and 7 mm across, within the 7–10 mm and 6–8 mm of index fingers
 /// (from memory, after Serina et al. 1998). m
 const FINGERTIP: [f64; 3] = [8e-3, 7e-3, 7e-3];
-/// Share of a punch's radius, or of half a box's smallest size, by which its edges are rounded.
+/// Whole angle at the tip of a cone. rad
+const OPENING_ANGLE: f64 = 2.0 * FRAC_PI_3;
+/// Radius of a cone's rounded tip. m
+const TIP_RADIUS: f64 = 3e-3;
+/// Share of a punch's or a cone's radius, or of half a box's smallest size, by which its edges are rounded.
 const EDGE: f64 = 0.3;
 
 /// The shapes of tools.
@@ -49,6 +53,8 @@ pub(crate) enum ToolShape {
     Box,
     /// The pad of a finger: an ellipsoid.
     Fingertip,
+    /// A cone with a rounded tip, on a round rod.
+    Cone,
 }
 
 /// The shape of a rigid tool. All lengths in metres. In its own frame its tip is the origin, x points along its length, and
@@ -87,6 +93,17 @@ pub enum ContactShape {
         /// Its radii along x (the finger), y and z.
         radii: [f64; 3],
     },
+    /// A cone with its tip down, on a round rod along z; tip and rim are rounded.
+    Cone {
+        /// Radius of the rod.
+        radius: f64,
+        /// Whole angle at its tip, in radians.
+        opening_angle: f64,
+        /// Radius of its tip's rounding, no more than `radius`.
+        tip_radius: f64,
+        /// Radius of the rounding between cone and rod, no more than `radius`.
+        edge_radius: f64,
+    },
 }
 
 impl ToolShape {
@@ -100,6 +117,16 @@ impl ToolShape {
             Self::Capsule => ("a capsule", &["radius", "length", "axis", "friction"]),
             Self::Box => ("a box", &["size", "edge_radius", "axis", "friction"]),
             Self::Fingertip => ("a fingertip", &["radii", "axis", "friction"]),
+            Self::Cone => (
+                "a cone",
+                &[
+                    "radius",
+                    "opening_angle",
+                    "tip_radius",
+                    "edge_radius",
+                    "friction",
+                ],
+            ),
         }
     }
 }
@@ -136,6 +163,15 @@ impl ContactShape {
             ToolShape::Fingertip => Self::Fingertip {
                 radii: sizes.three("radii", table.radii, FINGERTIP, &limits::TOOL_RADIUS)?,
             },
+            ToolShape::Cone => {
+                let radius = sizes.radius()?;
+                Self::Cone {
+                    radius,
+                    opening_angle: sizes.opening_angle()?,
+                    tip_radius: sizes.tip_radius(radius)?,
+                    edge_radius: sizes.edge_radius(radius)?,
+                }
+            }
         }))
     }
 
@@ -173,22 +209,37 @@ impl ContactShape {
                 table.radii = three(radii);
                 ToolShape::Fingertip
             }
+            Self::Cone {
+                radius,
+                opening_angle,
+                tip_radius,
+                edge_radius,
+            } => {
+                table.radius = length(radius);
+                table.opening_angle = Some(Angle::from_si(opening_angle));
+                table.tip_radius = length(tip_radius);
+                table.edge_radius = length(edge_radius);
+                ToolShape::Cone
+            }
         };
     }
 
-    /// Radius of the rounding of a flat tool's edge in metres.
+    /// Radius of the rounding of a flat tool's edge in metres. A cone's rim is not meant: skin touches it last.
     pub fn edge_radius(&self) -> Option<f64> {
         match *self {
             Self::FlatPunch { edge_radius, .. } | Self::Box { edge_radius, .. } => {
                 Some(edge_radius)
             }
-            Self::Sphere { .. } | Self::Capsule { .. } | Self::Fingertip { .. } => None,
+            Self::Sphere { .. }
+            | Self::Capsule { .. }
+            | Self::Fingertip { .. }
+            | Self::Cone { .. } => None,
         }
     }
 
     /// Radius of a circle of skin that it presses on in metres, as a size: of a punch its own, of a box half its smaller
     /// width; of a round tool that of the patch which Hertz's `√(R d)` gives at a depth `d` of half its smaller radius of
-    /// curvature `R`.
+    /// curvature `R`; of a cone that of Sneddon's `2/π d tan α` at a depth `d` of its radius, or of its tip.
     pub fn contact_radius(&self) -> f64 {
         let hertz = |curvature: f64| curvature * FRAC_1_SQRT_2;
         match *self {
@@ -198,6 +249,14 @@ impl ContactShape {
             } => x.min(y) / 2.0,
             Self::Sphere { radius } | Self::Capsule { radius, .. } => hertz(radius),
             Self::Fingertip { radii: [a, b, c] } => hertz((a * a / c).min(b * b / c)),
+            Self::Cone {
+                radius,
+                opening_angle,
+                tip_radius,
+                ..
+            } => (FRAC_2_PI * radius * (0.5 * opening_angle).tan())
+                .max(hertz(tip_radius))
+                .min(radius),
         }
     }
 
@@ -214,13 +273,30 @@ impl ContactShape {
                 size: [x, y, _], ..
             } => ([x / 2.0, y / 2.0], 0.0),
             Self::Fingertip { radii: [a, b, c] } => ([0.0; 2], sunk((a * a / c).max(b * b / c))),
+            Self::Cone {
+                radius,
+                opening_angle,
+                tip_radius,
+                ..
+            } => {
+                let (sin, cos) = (0.5 * opening_angle).sin_cos();
+                let over_tip = depth - tip_radius * (1.0 - sin);
+                let cut = if over_tip > 0.0 {
+                    tip_radius * cos + over_tip * sin / cos
+                } else {
+                    sunk(tip_radius)
+                };
+                ([0.0; 2], cut.min(radius))
+            }
         }
     }
 
     /// Half its greater width along the skin, in metres.
     pub fn half_width(&self) -> f64 {
         match *self {
-            Self::Sphere { radius } | Self::FlatPunch { radius, .. } => radius,
+            Self::Sphere { radius }
+            | Self::FlatPunch { radius, .. }
+            | Self::Cone { radius, .. } => radius,
             Self::Capsule { radius, length } => radius + 0.5 * length,
             Self::Box { size, .. } => 0.5 * size[0].max(size[1]),
             Self::Fingertip { radii } => radii[0].max(radii[1]),
@@ -259,6 +335,32 @@ impl Sizes<'_> {
 
     fn radius(&self) -> Result<f64, SceneError> {
         self.one("radius", self.table.radius, RADIUS, &limits::TOOL_RADIUS)
+    }
+
+    fn opening_angle(&self) -> Result<f64, SceneError> {
+        let angle = self.table.opening_angle;
+        let angle = angle.unwrap_or(Angle::from_si(OPENING_ANGLE));
+        let at = self.at.key("opening_angle");
+        Ok(at.within(angle, &limits::OPENING_ANGLE)?.si())
+    }
+
+    /// The rounding of a tip that has room for this radius, in metres.
+    fn tip_radius(&self, most: f64) -> Result<f64, SceneError> {
+        let default = TIP_RADIUS.min(most);
+        let tip = self.one(
+            "tip_radius",
+            self.table.tip_radius,
+            default,
+            &limits::EDGE_RADIUS,
+        )?;
+        if tip > most {
+            return Err(self.at.key("tip_radius").invalid(format!(
+                "a tip rounded by {} is rounder than the cone, which has room for {}; make `tip_radius` smaller",
+                Length::from_si(tip),
+                Length::from_si(most)
+            )));
+        }
+        Ok(tip)
     }
 
     /// The rounding of edges that have room for this radius, in metres.
@@ -313,6 +415,18 @@ impl fmt::Display for ContactShape {
                 Length::from_si(edge_radius)
             ),
             Self::Fingertip { radii } => write!(f, "fingertip, radii {}", three(radii)),
+            Self::Cone {
+                radius,
+                opening_angle,
+                tip_radius,
+                ..
+            } => write!(
+                f,
+                "cone, opening {:.0}°, radius {}, tip rounded by {}",
+                opening_angle.to_degrees(),
+                mm(radius),
+                Length::from_si(tip_radius)
+            ),
         }
     }
 }

@@ -91,7 +91,7 @@ kind!(
 kind!(
     /// An angle, in radians.
     Angle, AngleKind, "an angle", "30 deg", "rad",
-    &[("rad", 1.0, 1.0)],
+    &[("deg", std::f64::consts::PI / 180.0, 0.0)],
     |number, unit| Some(parse::<si::Angle>(number, unit)?.value)
 );
 kind!(

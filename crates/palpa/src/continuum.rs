@@ -8,7 +8,7 @@ use palpa_fem::law::{
 };
 use palpa_fem::lump::{ClosedMesh, Lump, LumpShape};
 use palpa_fem::shape::{
-    Capsule, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, ShapeError, Sphere, Tool,
+    Capsule, Cone, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, ShapeError, Sphere, Tool,
 };
 use palpa_fem::{Mat3, Supports};
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
@@ -291,5 +291,11 @@ fn tool_shape(shape: &ContactShape) -> Result<Shape, ShapeError> {
             RoundedBox::new(0.5 * Vec3::from(size), edge_radius)?.into()
         }
         ContactShape::Fingertip { radii } => Ellipsoid::new(Vec3::from(radii))?.into(),
+        ContactShape::Cone {
+            radius,
+            opening_angle,
+            tip_radius,
+            edge_radius,
+        } => Cone::new(radius, 0.5 * opening_angle, tip_radius, edge_radius)?.into(),
     })
 }

@@ -590,6 +590,29 @@ export interface components {
             kind: "fingertip";
             /** @description Its radii along x (the finger), y and z. */
             radii: number[];
+        } | {
+            /**
+             * Format: double
+             * @description Radius of the rounding between cone and rod, no more than `radius`.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "cone";
+            /**
+             * Format: double
+             * @description Whole angle at its tip, in radians.
+             */
+            opening_angle: number;
+            /**
+             * Format: double
+             * @description Radius of the rod.
+             */
+            radius: number;
+            /**
+             * Format: double
+             * @description Radius of its tip's rounding, no more than `radius`.
+             */
+            tip_radius: number;
         };
         /** @description A change of one key of the scene file. */
         Edit: {

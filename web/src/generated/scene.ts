@@ -696,7 +696,7 @@ export interface components {
             young?: string;
         };
         /** @description The shapes of tools. */
-        ToolShape: "disc" | "node" | "sphere" | "flat-punch" | "capsule" | "box" | "fingertip";
+        ToolShape: "disc" | "node" | "sphere" | "flat-punch" | "capsule" | "box" | "fingertip" | "cone";
         /** @description What presses. A disc and a node hold the skin; the other shapes press by contact. */
         ToolTable: {
             /** @description Capsule, box and fingertip: the direction that the tool's length points along, as nearly as it can lying across the press. Default: as near to x as it goes, or to y where the press is along x. */
@@ -706,7 +706,7 @@ export interface components {
                 number
             ];
             /**
-             * @description Flat punch and box: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the punch's radius or half the box's smallest size. Default: 0.3 of these.
+             * @description Flat punch, box and cone: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the radius of punch or cone or half the box's smallest size. Default: 0.3 of these.
              * @example 1.5 mm
              */
             edge_radius?: string;
@@ -720,6 +720,11 @@ export interface components {
              * @example 1.5 mm
              */
             length?: string;
+            /**
+             * @description Cone only: the whole angle at its tip, 20 deg to 160 deg. Default: "120 deg".
+             * @example 30 deg
+             */
+            opening_angle?: string;
             /** @description Fingertip only: the radii of the pad along the finger, across it and in the direction of the press, each 0.1 mm to 200 mm. Default: ["8 mm", "7 mm", "7 mm"], which curve by 9.1 mm along and 7 mm across; pads of index fingers have 7-10 mm and 6-8 mm (from memory, after Serina et al. 1998). */
             radii?: [
                 string,
@@ -727,7 +732,7 @@ export interface components {
                 string
             ];
             /**
-             * @description Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Default: "8 mm".
+             * @description Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Cone: that of its shaft. Default: "8 mm".
              * @example 1.5 mm
              */
             radius?: string;
@@ -742,6 +747,11 @@ export interface components {
                 string,
                 string
             ];
+            /**
+             * @description Cone only: the radius by which its tip is rounded, 1 µm to 200 mm, no more than `radius`. Default: "3 mm", or `radius` if that is less.
+             * @example 1.5 mm
+             */
+            tip_radius?: string;
         };
         /** @description How the volumetric part of an energy grows with the volume ratio `v`, which is `det F` but in the linear law (its small-strain likeness `1 + tr ε`) and in St. Venant–Kirchhoff's (`1 + tr E`). */
         Volume: "quadratic" | "logarithmic";
@@ -809,6 +819,6 @@ export const CHOICES = {
   MotionKind: ['press', 'stroke', 'drag', 'tap', 'palpate'],
   Solver: ['sparse', 'dense-inverse', 'euler'],
   Status: ['measured', 'literature', 'assumed', 'given'],
-  ToolShape: ['disc', 'node', 'sphere', 'flat-punch', 'capsule', 'box', 'fingertip'],
+  ToolShape: ['disc', 'node', 'sphere', 'flat-punch', 'capsule', 'box', 'fingertip', 'cone'],
   Volume: ['quadratic', 'logarithmic'],
 } as const;

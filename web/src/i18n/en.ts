@@ -252,6 +252,8 @@ export const en = {
   'tool.shape': 'Shape',
   'tool.radius': 'Radius',
   'tool.edge_radius': 'Edge radius',
+  'tool.opening_angle': 'Opening angle',
+  'tool.tip_radius': 'Tip radius',
   'tool.length': 'Length',
   'tool.size': 'Size',
   'tool.radii': 'Radii',
@@ -263,6 +265,7 @@ export const en = {
   'tool_shape.capsule': 'Capsule',
   'tool_shape.box': 'Box',
   'tool_shape.fingertip': 'Fingertip',
+  'tool_shape.cone': 'Cone',
   'tool_shape.disc': 'Bonded disc',
   'tool_shape.node': 'Single node',
 

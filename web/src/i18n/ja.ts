@@ -254,6 +254,8 @@ export const ja: Dictionary = {
   'tool.shape': '形',
   'tool.radius': '半径',
   'tool.edge_radius': '角の丸み',
+  'tool.opening_angle': '先端の角度',
+  'tool.tip_radius': '先端の丸み',
   'tool.length': '長さ',
   'tool.size': '大きさ',
   'tool.radii': '各軸の半径',
@@ -265,6 +267,7 @@ export const ja: Dictionary = {
   'tool_shape.capsule': 'カプセル',
   'tool_shape.box': '直方体',
   'tool_shape.fingertip': '指先',
+  'tool_shape.cone': '円錐',
   'tool_shape.disc': '円板（接着）',
   'tool_shape.node': '単一の節点',
 

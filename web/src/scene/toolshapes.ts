@@ -12,14 +12,17 @@ import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js
 import type { ContactShape } from '../generated/api';
 import type { ToolShape, ToolTable } from '../generated/scene';
 
-/** A size of a tool, as a key of the scene: one length with the range of its slider, m, or three lengths. */
+/** A size of a tool, as a key of the scene: one length or angle with the range of its slider, m or rad, or three
+ * lengths. */
 export type ToolField =
-  | { key: 'radius' | 'length' | 'edge_radius'; min: number; max: number }
+  | { key: 'radius' | 'length' | 'edge_radius' | 'tip_radius' | 'opening_angle'; dimension: 'length' | 'angle'; min: number; max: number }
   | { key: 'size' | 'radii'; names: [string, string, string] };
 
-const RADIUS: ToolField = { key: 'radius', min: 2e-3, max: 25e-3 };
-const LENGTH: ToolField = { key: 'length', min: 2e-3, max: 60e-3 };
-const EDGE_RADIUS: ToolField = { key: 'edge_radius', min: 0.1e-3, max: 5e-3 };
+const RADIUS: ToolField = { key: 'radius', dimension: 'length', min: 2e-3, max: 25e-3 };
+const LENGTH: ToolField = { key: 'length', dimension: 'length', min: 2e-3, max: 60e-3 };
+const EDGE_RADIUS: ToolField = { key: 'edge_radius', dimension: 'length', min: 0.1e-3, max: 5e-3 };
+const TIP_RADIUS: ToolField = { key: 'tip_radius', dimension: 'length', min: 0.2e-3, max: 5e-3 };
+const OPENING_ANGLE: ToolField = { key: 'opening_angle', dimension: 'angle', min: 0.35, max: 2.79 };
 const SIZE: ToolField = { key: 'size', names: ['x', 'y', 'z'] };
 const RADII: ToolField = { key: 'radii', names: ['1', '2', '3'] };
 
@@ -76,6 +79,12 @@ export const TOOL_SHAPES: { [S in ToolShape]: Entry<S> } = {
     begin: () => ({ radii: ['8 mm', '7 mm', '7 mm'] }),
     isContact: true,
   },
+  cone: {
+    draw: cone,
+    fields: [RADIUS, OPENING_ANGLE, TIP_RADIUS],
+    begin: (radius) => ({ radius, opening_angle: '120 deg', tip_radius: '3 mm' }),
+    isContact: true,
+  },
   disc: { draw: null, fields: [RADIUS], begin: (radius) => ({ radius }), isContact: false },
   node: { draw: null, fields: [], begin: () => ({}), isContact: false },
 };
@@ -105,6 +114,24 @@ function flatPunch({ radius: r, edge_radius: e }: FormOf<'flat-punch'>, length: 
   const top = Math.max(0.35 * length, 1.2 * r);
   const bevel = 0.08 * r;
   profile.push(new Vector2(r, top - bevel), new Vector2(r - bevel, top), new Vector2(0, top));
+  return withStem(new LatheGeometry(profile, 64).rotateX(Math.PI / 2), r, top, length);
+}
+
+function cone({ radius: r, opening_angle, tip_radius: t, edge_radius: e }: FormOf<'cone'>, length: number): BufferGeometry {
+  const half = opening_angle / 2;
+  // The flank touches the roundings of tip and rim, whose middles are `t` and `rim` high.
+  const rim = t + (Math.cos(half) * (r - e) - (t - e)) / Math.sin(half);
+  const profile: Vector2[] = [];
+  for (let i = 0; i <= 8; i++) {
+    const a = (i / 8) * (Math.PI / 2 - half);
+    profile.push(new Vector2(t * Math.sin(a), t - t * Math.cos(a)));
+  }
+  for (let i = 0; i <= 6; i++) {
+    const a = half * (1 - i / 6);
+    profile.push(new Vector2(r - e + e * Math.cos(a), rim - e * Math.sin(a)));
+  }
+  const top = rim + 0.3 * r;
+  profile.push(new Vector2(r, top), new Vector2(0, top));
   return withStem(new LatheGeometry(profile, 64).rotateX(Math.PI / 2), r, top, length);
 }
 

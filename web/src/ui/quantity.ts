@@ -1,12 +1,13 @@
 // Quantities: as a scene file writes them ("12 kPa"), and as the page shows them.
 
-export type Dimension = 'length' | 'pressure' | 'time' | 'speed' | 'spring' | 'number';
+export type Dimension = 'length' | 'pressure' | 'time' | 'speed' | 'spring' | 'angle' | 'number';
 
 const UNITS: Record<Exclude<Dimension, 'number'>, Record<string, number>> = {
   length: { m: 1, cm: 1e-2, mm: 1e-3, µm: 1e-6, μm: 1e-6, um: 1e-6, in: 0.0254 },
   pressure: { Pa: 1, kPa: 1e3, MPa: 1e6, GPa: 1e9 },
   time: { s: 1, ms: 1e-3, min: 60 },
   speed: { 'm/s': 1, 'cm/s': 1e-2, 'mm/s': 1e-3 },
+  angle: { rad: 1, deg: Math.PI / 180, '°': Math.PI / 180 },
   spring: { 'N/m': 1, 'mN/m': 1e-3, 'N/mm': 1e3, 'dyn/cm': 1e-3 },
 };
 
@@ -30,6 +31,7 @@ const WRITTEN: Record<Exclude<Dimension, 'number'>, [atLeast: number, unit: stri
   pressure: [[1e6, 'MPa'], [1e3, 'kPa'], [0, 'Pa']],
   time: [[0.1, 's'], [0, 'ms']],
   speed: [[0, 'mm/s']],
+  angle: [[0, 'deg']],
   spring: [[0.1, 'N/m'], [0, 'dyn/cm']],
 };
 
@@ -48,7 +50,7 @@ export function formatQuantity(value: number, dimension: Dimension, digits = 3):
 }
 
 const DEFAULT_UNITS: Record<Dimension, string> = {
-  length: 'mm', pressure: 'kPa', time: 's', speed: 'mm/s', spring: 'N/m', number: '',
+  length: 'mm', pressure: 'kPa', time: 's', speed: 'mm/s', spring: 'N/m', angle: 'deg', number: '',
 };
 
 export function defaultUnit(dimension: Dimension): string {

@@ -323,7 +323,12 @@ fn tools_touch_push_and_never_pull() {
         .tool("flat-punch", 8.0)
         .set("tool", "edge_radius", "2 mm")
         .set("tool", "friction", 0.3);
-    for (tool, scene) in [("sphere", block().sphere(12.0)), ("punch", punch)] {
+    let cone = block().tool("cone", 8.0).set("tool", "friction", 0.3);
+    for (tool, scene) in [
+        ("sphere", block().sphere(12.0)),
+        ("punch", punch),
+        ("cone", cone),
+    ] {
         let report = report(&press, &scene);
         assert_eq!(report["result"]["outcome"], "converged", "{tool}");
         let force = column(&report, "force_n");

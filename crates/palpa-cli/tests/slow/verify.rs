@@ -14,5 +14,5 @@ fn every_case_by_formula_is_within_its_tolerance() {
         }
         n_cases += 1;
     }
-    assert_eq!(n_cases, 7);
+    assert_eq!(n_cases, 8);
 }

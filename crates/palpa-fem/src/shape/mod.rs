@@ -20,6 +20,7 @@
 //! the regions of a surface meet). Inside, it is smooth down to the medial axis, where the nearest surface point jumps.
 
 mod capsule;
+mod cone;
 mod ellipsoid;
 mod flat_punch;
 mod rounded_box;
@@ -27,6 +28,7 @@ mod sphere;
 mod tool;
 
 pub use capsule::Capsule;
+pub use cone::Cone;
 pub use ellipsoid::Ellipsoid;
 pub use flat_punch::FlatPunch;
 pub use rounded_box::RoundedBox;
@@ -73,6 +75,8 @@ pub enum Shape {
     RoundedBox(RoundedBox),
     /// An ellipsoid, such as the pad of a finger.
     Ellipsoid(Ellipsoid),
+    /// A cone with a rounded tip.
+    Cone(Cone),
 }
 
 /// Why a shape is refused.
@@ -104,6 +108,20 @@ pub enum ShapeError {
         value: f64,
         /// The largest that fits. m
         limit: f64,
+    },
+    /// A half angle that makes no cone.
+    #[error(
+        "{shape}: a half angle of {value} rad is outside {least} to {most} rad; give the angle between flank and axis"
+    )]
+    Angle {
+        /// Name of the shape.
+        shape: &'static str,
+        /// The value given. rad
+        value: f64,
+        /// The smallest allowed. rad
+        least: f64,
+        /// The largest allowed. rad
+        most: f64,
     },
     /// A coefficient of friction that is none.
     #[error("a friction coefficient of {value} is not possible; give 0 (slippery) or more")]
@@ -147,6 +165,7 @@ macro_rules! of_each {
             Shape::Capsule($shape) => $expression,
             Shape::RoundedBox($shape) => $expression,
             Shape::Ellipsoid($shape) => $expression,
+            Shape::Cone($shape) => $expression,
         }
     };
 }
@@ -196,7 +215,7 @@ macro_rules! from_shape {
         }
     )*};
 }
-from_shape!(Sphere, FlatPunch, Capsule, RoundedBox, Ellipsoid);
+from_shape!(Sphere, FlatPunch, Capsule, RoundedBox, Ellipsoid, Cone);
 
 /// `value`, if a shape can have this size.
 fn checked(shape: &'static str, what: &'static str, value: f64) -> Result<f64, ShapeError> {

@@ -2,7 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use palpa_fem::Mat3;
-use palpa_fem::shape::{Capsule, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, Sphere, Tool};
+use palpa_fem::shape::{
+    Capsule, Cone, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, Sphere, Tool,
+};
 use palpa_mesh::Vec3;
 
 /// A shape beside what decides, independently of it, which points are inside, and points all over its surface.
@@ -131,6 +133,66 @@ fn ellipsoid(radii: Vec3) -> Case {
     }
 }
 
+fn cone(r: f64, half_angle: f64, tip: f64, edge: f64) -> Case {
+    let (sin, cos) = half_angle.sin_cos();
+    // Where the flank leaves the tip and reaches the rim, in distance from the axis and height.
+    let start = [tip * cos, tip * (1.0 - sin)];
+    let end_out = r - edge + edge * cos;
+    let end = [end_out, start[1] + (end_out - start[0]) * cos / sin];
+    let rim_height = end[1] + edge * sin;
+    let height = 1.5 * r;
+    Case {
+        shape: Cone::new(r, half_angle, tip, edge).unwrap().into(),
+        is_inside: Box::new(move |p| {
+            let out = p.x.hypot(p.y);
+            let is_over_flank = p.z - start[1] > (out - start[0]) * cos / sin;
+            let is_in_tip = out.hypot(p.z - tip) < tip || p.z >= start[1];
+            let from_rim = [out - (r - edge), p.z - rim_height];
+            let is_in_rim = from_rim[0] <= 0.0
+                || p.z <= end[1]
+                || from_rim[1] >= 0.0
+                || from_rim[0].hypot(from_rim[1]) < edge;
+            out < r && is_over_flank && is_in_tip && is_in_rim
+        }),
+        surface: Box::new(move |a, b| {
+            // Along the profile by its length: tip, flank, rim, shaft.
+            let arcs = [
+                tip * (std::f64::consts::FRAC_PI_2 - half_angle),
+                edge * half_angle,
+            ];
+            let flank = (end[0] - start[0]).hypot(end[1] - start[1]);
+            let s = a * (arcs[0] + flank + arcs[1] + height);
+            let (x, z) = if s < arcs[0] {
+                let angle = s / tip;
+                (tip * angle.sin(), tip - tip * angle.cos())
+            } else if s < arcs[0] + flank {
+                let share = (s - arcs[0]) / flank;
+                (
+                    start[0] + share * (end[0] - start[0]),
+                    start[1] + share * (end[1] - start[1]),
+                )
+            } else if s < arcs[0] + flank + arcs[1] {
+                // The angle of the normal over the flank's, up to the shaft's.
+                let angle = half_angle - (s - arcs[0] - flank) / edge;
+                (
+                    r - edge + edge * angle.cos(),
+                    rim_height - edge * angle.sin(),
+                )
+            } else {
+                (r, rim_height + s - arcs[0] - flank - arcs[1])
+            };
+            let (sin, cos) = (std::f64::consts::TAU * b).sin_cos();
+            Vec3::new(x * cos, x * sin, z)
+        }),
+        borders: vec![
+            Vec3::new(start[0] + 0.3 * r * cos, 0.0, start[1] - 0.3 * r * sin),
+            Vec3::new(0.0, end[0] + 0.2 * r * cos, end[1] - 0.2 * r * sin),
+            Vec3::new(-1.3 * r, 0.0, rim_height),
+        ],
+        size: r,
+    }
+}
+
 fn cases() -> Vec<Case> {
     vec![
         sphere(8e-3),
@@ -151,6 +213,11 @@ fn cases() -> Vec<Case> {
         ellipsoid(Vec3::new(3e-3, 8e-3, 8e-3)),
         ellipsoid(Vec3::new(8e-3, 8e-3, 8e-3 * (1.0 + 1e-12))),
         ellipsoid(Vec3::new(0.5, 1e-2, 1e-3)),
+        cone(8e-3, 0.8, 1e-3, 2e-3),
+        cone(8e-3, 0.3, 2e-3, 5e-3),
+        cone(10e-3, 1.3, 2e-5, 0.0),
+        cone(5e-3, 0.6, 5e-3, 1e-3),
+        cone(0.1, 1.2, 1e-4, 0.1),
     ]
 }
 
@@ -573,6 +640,8 @@ fn sizes_that_no_shape_has_are_refused() {
         Capsule::new(1e-3, -1.0).unwrap_err(),
         FlatPunch::new(1e-2, 2e-2).unwrap_err(),
         FlatPunch::new(f64::INFINITY, 0.0).unwrap_err(),
+        Cone::new(1e-2, 0.5, 2e-2, 0.0).unwrap_err(),
+        Cone::new(1e-2, 1.6, 1e-3, 0.0).unwrap_err(),
         RoundedBox::new(Vec3::new(1e-2, 1e-2, 1e-9), 0.0).unwrap_err(),
         RoundedBox::new(Vec3::new(1e-2, 5e-3, 1e-2), -1e-3).unwrap_err(),
         Ellipsoid::new(Vec3::new(1e-2, 11.0, 1e-2)).unwrap_err(),
@@ -588,6 +657,8 @@ fn sizes_that_no_shape_has_are_refused() {
             "capsule: the length is -1 m, outside 0.000001 to 10 m; give a positive length in metres",
             "flat punch: an edge radius of 0.02 m does not fit; give 0 (sharp) to 0.01 m, which rounds it completely",
             "flat punch: the radius is inf m, outside 0.000001 to 10 m; give a positive length in metres",
+            "cone: an edge radius of 0.02 m does not fit; give 0 (sharp) to 0.01 m, which rounds it completely",
+            "cone: a half angle of 1.6 rad is outside 0.05 to 1.55 rad; give the angle between flank and axis",
             "box: the half height is 0.000000001 m, outside 0.000001 to 10 m; give a positive length in metres",
             "box: an edge radius of -0.001 m does not fit; give 0 (sharp) to 0.005 m, which rounds it completely",
             "ellipsoid: the radius along y is 11 m, outside 0.000001 to 10 m; give a positive length in metres",

@@ -29,7 +29,7 @@ const DISTANCES: [f64; 5] = [4.0, 4.5, 5.0, 5.5, 6.0];
 const RADIUS: f64 = 0.01;
 
 /// A half-space with E = 1 Pa and the disc in its middle.
-fn unit(nu: f64, size: f64, finest: Finest) -> Stack {
+pub(crate) fn unit(nu: f64, size: f64, finest: Finest) -> Stack {
     let width = match finest {
         Finest::Rim | Finest::Around => WIDTH * RADIUS,
         Finest::Inside => WIDTH_FOR_SPHERE * RADIUS,

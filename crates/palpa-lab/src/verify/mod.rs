@@ -14,6 +14,7 @@
 
 mod block;
 mod columns;
+mod cone;
 mod contact;
 mod economy;
 mod half_space;
@@ -229,6 +230,13 @@ static CASES: &[Case] = &[
         source: "the laws of contact",
         needs_reference: false,
         run: contact::run,
+    },
+    Case {
+        name: "cone",
+        title: "cone on a half-space, its tip sharp and rounded",
+        source: "exact (Sneddon)",
+        needs_reference: false,
+        run: cone::run,
     },
     Case {
         name: "A1",

@@ -169,24 +169,39 @@ impl Stack {
         depth: f64,
         shallow: f64,
     ) -> Result<Measured, VerifyError> {
-        let Sector { body, ring, .. } = &self.sector;
-        let mut pressed = self.pressed()?;
         // So shallow a sphere is a paraboloid that touches the same place; the force is smaller by the scale.
-        let shallow = shallow * ring;
+        let shallow = shallow * self.sector.ring;
         let scale = shallow / depth;
         let radius = radius / scale;
         let tool = Tool::new(Sphere::new(radius).expect("valid size"), 0.0).expect("no friction");
-        pressed.params.gap_tolerance = 1e-6 * shallow;
+        let force = self.indented(tool, shallow, |p| p.norm_squared() / (2.0 * radius))?;
+        Ok(Measured {
+            value: force.value / scale,
+            ..force
+        })
+    }
+
+    /// Force on a smooth tool whose tip is `depth` below the plane, N. It should touch nearly all of the disc, see
+    /// [`TOUCHED`]. `height` is that of the tool over its tip, m.
+    pub(crate) fn indented(
+        &self,
+        tool: Tool,
+        depth: f64,
+        height: impl Fn(&Vec3) -> f64,
+    ) -> Result<Measured, VerifyError> {
+        let Sector { body, ring, .. } = &self.sector;
+        let mut pressed = self.pressed()?;
+        pressed.params.gap_tolerance = 1e-6 * depth;
         // A guess of what touches, so that the search for it is short: all of the disc, and nothing outside.
         for (v, p) in body.skin.points.iter().enumerate() {
             let r = p.norm();
             let apart = if r <= *ring { -1e-3 } else { 1e-3 };
-            let surface = p.norm_squared() / (2.0 * radius) - shallow;
-            pressed.state.displacements[body.node(v, 0)].z = (surface - apart * shallow).min(0.0);
+            let surface = height(p) - depth;
+            pressed.state.displacements[body.node(v, 0)].z = (surface - apart * depth).min(0.0);
         }
-        let report = pressed.press(tool, [0.0; 2], shallow)?;
+        let report = pressed.press(tool, [0.0; 2], depth)?;
         Ok(Measured {
-            value: N_SECTORS * report.tool_forces[0].z / scale,
+            value: N_SECTORS * report.tool_forces[0].z,
             nodes: pressed.nodes(),
         })
     }

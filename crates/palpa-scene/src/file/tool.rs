@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{AxisSpec, TissueSpec};
 use crate::shape::ToolShape;
-use crate::units::Length;
+use crate::units::{Angle, Length};
 
 /// What presses. A disc and a node hold the skin; the other shapes press by contact.
 #[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
@@ -21,7 +21,7 @@ pub(crate) struct ToolTable {
     /// Its shape. Default: "disc".
     #[serde(default)]
     pub(crate) shape: ToolShape,
-    /// Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Default: "8 mm".
+    /// Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Cone: that of its shaft. Default: "8 mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radius: Option<Length>,
     /// Fingertip only: the radii of the pad along the finger, across it and in the direction of the press, each 0.1 mm to
@@ -36,8 +36,15 @@ pub(crate) struct ToolTable {
     /// ["16 mm", "16 mm", "16 mm"].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) size: Option<[Length; 3]>,
-    /// Flat punch and box: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the punch's radius or
-    /// half the box's smallest size. Default: 0.3 of these.
+    /// Cone only: the whole angle at its tip, 20 deg to 160 deg. Default: "120 deg".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) opening_angle: Option<Angle>,
+    /// Cone only: the radius by which its tip is rounded, 1 µm to 200 mm, no more than `radius`. Default: "3 mm", or
+    /// `radius` if that is less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) tip_radius: Option<Length>,
+    /// Flat punch, box and cone: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the radius of
+    /// punch or cone or half the box's smallest size. Default: 0.3 of these.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) edge_radius: Option<Length>,
     /// Capsule, box and fingertip: the direction that the tool's length points along, as nearly as it can lying across the

@@ -37,6 +37,8 @@ fn check_keys(at: &Site<'_>, tool: &ToolTable) -> Result<(), SceneError> {
         ("radii", tool.radii.is_some()),
         ("length", tool.length.is_some()),
         ("size", tool.size.is_some()),
+        ("opening_angle", tool.opening_angle.is_some()),
+        ("tip_radius", tool.tip_radius.is_some()),
         ("edge_radius", tool.edge_radius.is_some()),
         ("axis", tool.axis.is_some()),
         ("friction", tool.friction.is_some()),

@@ -238,6 +238,7 @@ fn every_tool_has_a_size_where_none_is_given() {
         "capsule",
         "box",
         "fingertip",
+        "cone",
     ] {
         let tool = tool(&format!("shape = \"{shape}\""));
         assert_eq!(tool.is_bonded(), ["disc", "node"].contains(&shape));

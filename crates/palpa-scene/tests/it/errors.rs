@@ -386,6 +386,18 @@ fn wrong_lumps_and_tools() {
             "[tool]",
             "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 m\", \"9 mm\"]".to_owned(),
         ),
+        (
+            "[tool]",
+            "shape = \"cone\"\nopening_angle = \"170 deg\"".to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"cone\"\nradius = \"5 mm\"\ntip_radius = \"6 mm\"".to_owned(),
+        ),
+        (
+            "[tool]",
+            "shape = \"sphere\"\ntip_radius = \"1 mm\"".to_owned(),
+        ),
     ] {
         let text = format!(
             "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{table}\n{keys}"

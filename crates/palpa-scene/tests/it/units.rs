@@ -128,6 +128,10 @@ fn quantities_are_written_in_the_unit_that_reads_best() {
     assert_eq!(Time::from_si(0.25).to_string(), "0.25 s");
     assert_eq!(SpringConstant::from_si(0.09).to_string(), "90 mN/m");
     assert_eq!(Density::from_si(1060.0).to_string(), "1060 kg/m³");
+    assert_eq!(
+        Angle::from_si(std::f64::consts::FRAC_PI_2).to_string(),
+        "90 deg"
+    );
 }
 
 fn back<K: Kind>(si: f64) -> f64 {
@@ -140,13 +144,14 @@ fn back<K: Kind>(si: f64) -> f64 {
 proptest! {
     #[test]
     fn what_is_written_is_read_to_the_bit(x in proptest::num::f64::NORMAL | proptest::num::f64::ZERO) {
-        use palpa_scene::units::{DensityKind, LengthKind, PressureKind, SpringConstantKind, TimeKind, VelocityKind};
+        use palpa_scene::units::{AngleKind, DensityKind, LengthKind, PressureKind, SpringConstantKind, TimeKind, VelocityKind};
         prop_assert_eq!(back::<LengthKind>(x), x);
         prop_assert_eq!(back::<PressureKind>(x), x);
         prop_assert_eq!(back::<VelocityKind>(x), x);
         prop_assert_eq!(back::<TimeKind>(x), x);
         prop_assert_eq!(back::<SpringConstantKind>(x), x);
         prop_assert_eq!(back::<DensityKind>(x), x);
+        prop_assert_eq!(back::<AngleKind>(x), x);
     }
 
     #[test]

@@ -54,7 +54,7 @@ function SizeField({ field, tool }: { field: ToolField; tool: ToolTable }) {
     <QuantityField
       label={label}
       value={value}
-      dimension="length"
+      dimension={field.dimension}
       range={field}
       onCommit={(written) => edit([path, written])}
       testid={`tool-${field.key}`}
