@@ -53,10 +53,9 @@ dist: $(PAGE)
 	cargo build --release --package palpa-cli
 	tools/dist.sh "$(TARGET)" "$(VERSION)"
 
-# The slow tests, and the quick ones of the command once more as it is shipped.
 test-slow:
-	@if command -v cargo-nextest >/dev/null; then cargo nextest run --release --package palpa-cli --features slow-tests; \
-	else cargo test --release --package palpa-cli --features slow-tests --tests; fi
+	@if command -v cargo-nextest >/dev/null; then cargo nextest run --release --package palpa-cli --features slow-tests --test slow; \
+	else cargo test --release --package palpa-cli --features slow-tests --test slow; fi
 
 test-data: shared $(VENV)/ready
 	rm -rf "$(RESULTS)"

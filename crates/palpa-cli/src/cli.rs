@@ -1,4 +1,4 @@
-//! What every command shares: options, exit codes, errors, Ctrl-C.
+//! Shared by all commands: options, exit codes, errors, Ctrl-C.
 //!
 //! | exit code | meaning |
 //! | --- | --- |
@@ -27,7 +27,8 @@ const ERROR: Style = AnsiColor::Red.on_default().bold();
 
 /// Feel what lies beneath the skin.
 ///
-/// A skin surface is grown inward into layers of triangular prisms, pressed with a tool, and pushes back in newtons.
+/// Palpa grows a skin surface inward into layers of tissue. When a tool presses the skin, Palpa
+/// computes how the tissue deforms and the force that pushes back, in newtons.
 #[derive(Debug, Parser)]
 #[command(name = "palpa", version, max_term_width = 100)]
 struct Cli {
@@ -40,10 +41,10 @@ struct Cli {
 /// The options of every command.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Options {
-    /// Print the result as JSON on standard output, and nothing else there
+    /// Print the result as JSON on standard output, and nothing else
     #[arg(long, global = true)]
     pub json: bool,
-    /// Folder for the files that are written [default: out/COMMAND]
+    /// Folder for the output files [default: out/COMMAND]
     #[arg(long, global = true, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -71,7 +72,7 @@ pub fn main() -> ExitCode {
             });
             ExitCode::from(130)
         }
-        // Whoever reads us, `head` for one, has had enough: no error.
+        // The reader of the output, such as `head`, has closed it. This is not an error.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             print_error(&error);
@@ -95,7 +96,8 @@ fn print_error(error: &anyhow::Error) {
     eprint_quietly(&format!("{ERROR}error:{ERROR:#} {}", one_paragraph(error)));
 }
 
-/// One line on standard error, coloured only on a terminal. That nobody can read it is no reason to fail.
+/// Prints one line on standard error, coloured only on a terminal. A closed standard error is
+/// ignored.
 fn eprint_quietly(line: &str) {
     let _ = writeln!(anstream::stderr(), "{line}");
 }

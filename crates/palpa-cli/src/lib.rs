@@ -1,6 +1,7 @@
-//! The command `palpa`: arguments, commands, and what they print.
+//! The command `palpa`: arguments, commands, and their output.
 
-// `println!` panics when the reader has gone, as in `palpa check … | head`: print through `cli::Context`.
+// `println!` panics if the reader has closed the pipe, as in `palpa check … | head`; print through
+// `cli::Context` instead.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod cli;

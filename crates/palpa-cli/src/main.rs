@@ -1,4 +1,4 @@
-//! The `palpa` command; what it does is in the library, so that tests reach it too.
+//! The `palpa` command. Its code is in the library, so that tests can call it too.
 
 use std::process::ExitCode;
 

@@ -26,7 +26,7 @@ impl<const N: usize> Table<N> {
         }
     }
 
-    /// Aligns the first column at the left: for words.
+    /// Aligns the first column at the left, for words.
     #[must_use]
     pub fn with_left_names(mut self) -> Self {
         self.is_first_left = true;

@@ -1,22 +1,23 @@
-//! A bed of tissue for trials of the loop: small, dense, stiffening, with friction, and solved
-//! without the servo's help.
+//! A bed of tissue for trials of the loop: small and dense, it stiffens with depth, has friction,
+//! and is solved without the servo's code.
 //!
 //! ```text
 //! W_ij = s_i s_j a / √(|p_i − p_j|² + a²) · 1 / (1 + κ δ)        a softened 1/r, as of an elastic half-space
 //! ```
-//! δ is the tool's depth; κ makes the tissue stiffen; `s` is smaller over a lump. Its contact is
-//! solved by plain Gauss–Seidel to convergence, which makes it an oracle too.
+//! `δ` is the tool's depth; `κ` makes the tissue stiffen; `s` is smaller over a lump. The contact
+//! is solved by plain Gauss–Seidel to convergence, so the bed also checks the results of the servo.
 
 use palpa_servo::{Candidate, ContactPatch, MAX_CONTACTS, Mat3, Pose, ToolContact, Vec3};
 
 /// Settings of a bed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BedParams {
-    /// Compliance of one vertex, m/N; the tool feels several at once.
+    /// Compliance of one vertex, m/N. The tool touches several vertices at once, so it feels a
+    /// stiffer tissue.
     pub compliance: f64,
     /// Stiffening with depth, 1/m.
     pub stiffening: f64,
-    /// Distance of vertices, m.
+    /// Distance between neighbouring vertices, m.
     pub spacing: f64,
     /// Vertices along a side.
     pub n_side: usize,
@@ -24,7 +25,7 @@ pub struct BedParams {
     pub radius: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// Stiffness where `x > 0` over that elsewhere.
+    /// Stiffness where `x > 0`, relative to the stiffness elsewhere.
     pub edge: f64,
 }
 
@@ -42,8 +43,8 @@ impl Default for BedParams {
     }
 }
 
-/// The bed: its surface is `z = 0` about the origin, the tool a sphere about the device's position,
-/// pressed along −z.
+/// The bed. Its surface is `z = 0` around the origin. The tool is a sphere centred at the device's
+/// position and pressed along −z.
 #[derive(Debug, Clone)]
 pub struct Bed {
     params: BedParams,
@@ -55,7 +56,7 @@ pub struct Bed {
 }
 
 impl Bed {
-    /// Untouched.
+    /// A bed that nothing touches yet.
     pub fn new(params: &BedParams) -> Self {
         let half = 0.5 * (params.n_side.saturating_sub(1)) as f64 * params.spacing;
         let mut rest = Vec::new();
@@ -85,7 +86,8 @@ impl Bed {
         }
     }
 
-    /// The next step: contact with the tool at that pose, into `patch`; the force on the tool, N.
+    /// Solves the contact with the tool at this pose and writes it to `patch`. Returns the force on
+    /// the tool, N.
     pub fn step(
         &mut self,
         pose: &Pose,
@@ -211,7 +213,7 @@ impl Bed {
             friction: self.params.friction,
             is_bonded: false,
             force: total,
-            // Not known here: the servo finds it.
+            // The bed does not know it; the servo estimates it.
             stiffness: Mat3::zeros(),
         };
     }

@@ -2,36 +2,36 @@
 //!
 //! 1. Write a file in `src/` with its type and its `impl` of [`HapticDevice`]; `scripted.rs` is the
 //!    shortest one.
-//! 2. Add a variant to [`Driver`](crate::Driver) in `open.rs`; the compiler then asks for the line
-//!    that opens it.
+//! 2. Add a variant to [`Driver`](crate::Driver) in `open.rs`; the compiler then points to the
+//!    place that must open it.
 //! 3. Add a test in `tests/it/`, named like the file: readings, limits, and the [`DeviceFault`]
-//!    when it is gone.
-//! 4. If scene files shall name it: a variant of the scene's `DeviceKind`, which callers match to a
-//!    `Driver`.
+//!    when the device is gone.
+//! 4. If scene files must be able to name the device, add a variant of the scene's `DeviceKind`,
+//!    which callers match to a `Driver`.
 //!
 //! Nothing else changes: the loop, the recorder and the replay know the trait only.
 
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand};
 
-/// Why a device did not do what it was asked.
+/// Why a device did not deliver a reading or accept a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceFault {
-    /// It is not connected, or not any more.
-    #[error("the device is not connected; plug it in and give it power")]
+    /// The device is not connected, or no longer connected.
+    #[error("the device is not connected; connect it and switch on its power")]
     Unplugged,
-    /// It did not answer in time; the next call may succeed.
+    /// The device did not answer in time; the next call may succeed.
     #[error("the device did not answer in time")]
     TimedOut,
-    /// Its answer makes no sense.
-    #[error("the device answered what cannot be understood")]
+    /// The answer of the device makes no sense.
+    #[error("the device sent a reply that Palpa does not understand")]
     Garbled,
 }
 
-/// A hand-piece that tells its pose and exerts a force. No call may wait longer than a tick,
-/// allocate, lock or log.
+/// A hand-piece that reports its pose and exerts a force. No call may allocate, lock, log, or wait
+/// longer than a tick.
 ///
-/// `now` is the loop's clock, s. A real device does not need it; a simulated one lives by it.
+/// `now` is the loop's clock, s. A real device does not need it; a simulated device moves by it.
 pub trait HapticDevice: Send {
     /// Limits of force and stability.
     fn spec(&self) -> DeviceSpec;
@@ -48,14 +48,15 @@ pub trait HapticDevice: Send {
     /// If the device gives no reading.
     fn read(&mut self, now: f64) -> Result<DeviceState, DeviceFault>;
 
-    /// Exerts a force from now on until the next is written.
+    /// Exerts this force until the next one is written.
     ///
     /// # Errors
-    /// If the device does not take it.
+    /// If the device does not accept the force.
     fn write(&mut self, now: f64, command: &ForceCommand) -> Result<(), DeviceFault>;
 }
 
-/// A device that was opened by name can stand behind [`Faulty`](crate::Faulty) too.
+/// Lets a device behind a pointer, as [`DeviceSetup::open`](crate::DeviceSetup::open) returns it,
+/// be wrapped in [`Faulty`](crate::Faulty).
 impl<D: HapticDevice + ?Sized> HapticDevice for Box<D> {
     fn spec(&self) -> DeviceSpec {
         (**self).spec()

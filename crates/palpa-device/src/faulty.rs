@@ -1,4 +1,4 @@
-//! Faults on purpose, in front of any device.
+//! A wrapper that makes any device show faults on purpose.
 
 use crate::{DeviceFault, HapticDevice};
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Vec3};
@@ -15,7 +15,7 @@ pub enum Fault {
     NotANumber,
     /// Every reading is the same.
     Stall,
-    /// The device is not there.
+    /// The device is not connected.
     Unplug,
     /// No answer in time.
     Late,
@@ -26,13 +26,13 @@ pub enum Fault {
 pub struct FaultSwitch(Arc<AtomicBool>);
 
 impl FaultSwitch {
-    /// Turns it on or off.
+    /// Turns the fault on or off.
     pub fn set(&self, is_on: bool) {
         self.0.store(is_on, Ordering::Relaxed);
     }
 }
 
-/// The time in which a fault is there.
+/// When a fault is active.
 #[derive(Debug, Clone)]
 enum When {
     /// From the first to the second moment of the loop's clock, s.
@@ -58,7 +58,7 @@ pub struct Faulty<D> {
 }
 
 impl<D> Faulty<D> {
-    /// Without faults yet.
+    /// Wraps a device, without faults yet.
     pub fn new(inner: D) -> Self {
         Self {
             inner,
@@ -67,21 +67,21 @@ impl<D> Faulty<D> {
         }
     }
 
-    /// With one more fault, from one moment of the loop's clock to another, s.
+    /// Adds a fault that is active from one moment of the loop's clock to another, s.
     #[must_use]
     pub fn with(mut self, from: f64, to: f64, fault: Fault) -> Self {
         self.faults.push((When::Between(from, to), fault));
         self
     }
 
-    /// With one more fault, while the switch is on.
+    /// Adds a fault that is active while the switch is on.
     #[must_use]
     pub fn with_switch(mut self, switch: &FaultSwitch, fault: Fault) -> Self {
         self.faults.push((When::Switched(switch.clone()), fault));
         self
     }
 
-    /// The device behind.
+    /// The wrapped device.
     pub fn inner(&self) -> &D {
         &self.inner
     }

@@ -1,4 +1,4 @@
-//! The simulated hand: how firmly it grips, where it wants to be, and how it follows a target that
+//! The simulated hand: its grip, the point to which it pulls, and how it follows a target that
 //! jumps.
 
 use crate::Path;
@@ -7,25 +7,25 @@ use palpa_servo::{Pose, Vec3};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Time in which the hand follows a live target, s, as a critically damped mass: a live target
-/// jumps from one event of a mouse to the next.
+/// Time in which the hand follows a live target, s. The hand moves like a critically damped mass,
+/// because a live target jumps from one mouse event to the next.
 const FOLLOW_TIME: f64 = 0.02;
 /// Largest speed at which the hand follows a live target, m/s.
 const FOLLOW_SPEED: f64 = 1.0;
 
 /// How firmly a hand grips the device.
 ///
-/// Stiffness from 200 to 800 N/m is what Hajian & Howe (1997, J. Biomech. Eng. 119:109) measured at
-/// the tip of a finger from slight to strong activation, with damping ratios that fall from well
-/// damped to about a half. The masses, those of the part of the hand that moves with the device,
-/// are assumed.
+/// The stiffness, 200 to 800 N/m, was measured by Hajian & Howe (1997, J. Biomech. Eng. 119:109) at
+/// the fingertip from slight to strong activation. Their damping ratio falls from well damped to
+/// about one half. The masses are assumed: they stand for the part of the hand that moves with the
+/// device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grip {
     /// Mass that moves with the device, kg.
     pub mass: f64,
-    /// Damping towards the path, N s/m.
+    /// Damping of the spring that pulls the device to the path, N s/m.
     pub damping: f64,
-    /// Stiffness towards the path, N/m.
+    /// Stiffness of the spring that pulls the device to the path, N/m.
     pub stiffness: f64,
 }
 
@@ -50,8 +50,7 @@ impl Grip {
     };
 }
 
-/// The pose that a live hand goes to; any thread may set it, without waiting. Clones share the
-/// pose.
+/// Target pose of a live hand. Any thread may set it without waiting. Clones share the pose.
 ///
 /// The seven numbers are stored one after the other, so a reader may see some old and some new
 /// ones. The hand goes to the pose smoothly, so this does not matter.
@@ -59,21 +58,22 @@ impl Grip {
 pub struct LiveTarget(Arc<[AtomicU64; 7]>);
 
 impl LiveTarget {
-    /// At a point, m, with the identity orientation.
+    /// A target at a point, m, with the identity orientation.
     pub fn new(at: Vec3) -> Self {
         let target = Self(Arc::new([0.0_f64; 7].map(|x| AtomicU64::new(x.to_bits()))));
         target.set_pose(&Pose::translation(at.x, at.y, at.z));
         target
     }
 
-    /// Moves it to a point, m, and keeps its orientation. A point that is not finite is ignored.
+    /// Moves the target to a point, m, and keeps its orientation. A point that is not finite is
+    /// ignored.
     pub fn set(&self, at: Vec3) {
         if at.iter().all(|x| x.is_finite()) {
             self.store(0, at.as_slice());
         }
     }
 
-    /// Moves and turns it. A position or orientation that is not finite is ignored.
+    /// Moves and turns the target. A position or orientation that is not finite is ignored.
     pub fn set_pose(&self, pose: &Pose) {
         let turn = pose.rotation.coords;
         if turn.iter().all(|x| x.is_finite()) {
@@ -107,9 +107,9 @@ impl LiveTarget {
 /// The motion that a simulated hand follows.
 #[derive(Debug, Clone)]
 pub enum HandTarget {
-    /// A path, from the first reading on, with the identity orientation.
+    /// A path that starts at the first reading, with the identity orientation.
     Path(Path),
-    /// A pose that someone sets while the hand moves.
+    /// A pose that the program sets while the hand moves.
     Live(LiveTarget),
 }
 
@@ -125,23 +125,23 @@ impl From<LiveTarget> for HandTarget {
     }
 }
 
-/// A hand with its grip, and the place that it has reached on the way to its target.
+/// A hand with its grip, and the point that it has reached on the way to its target.
 #[derive(Debug, Clone)]
 pub(crate) struct Hand {
     pub(crate) grip: Grip,
     target: HandTarget,
-    /// Place towards which the grip pulls, m.
+    /// Point to which the grip pulls the device, m.
     pub(crate) wanted: Vec3,
-    /// Velocity with which that place follows a live target, m/s; zero on a path.
+    /// Velocity of that point while it follows a live target, m/s; zero on a path.
     following: Vec3,
     pub(crate) turned: UnitQuaternion<f64>,
 }
 
-/// Motion of the place towards which the grip pulls, over one step.
+/// Motion over one step of the point to which the grip pulls.
 pub(crate) struct Pull {
-    /// Its mean, m.
+    /// Mean position, m.
     pub(crate) middle: Vec3,
-    /// Its velocity, m/s.
+    /// Velocity, m/s.
     pub(crate) velocity: Vec3,
 }
 
@@ -160,7 +160,7 @@ impl Hand {
         }
     }
 
-    /// Moves on by a step of `dt`, s, to the moment `time`, s since the first reading.
+    /// Advances by a step of `dt`, s, to the moment `time`, in s since the first reading.
     pub(crate) fn advance(&mut self, time: f64, dt: f64) -> Pull {
         let next = match &self.target {
             HandTarget::Path(path) => path.at(time),

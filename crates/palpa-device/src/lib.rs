@@ -1,4 +1,4 @@
-//! Haptic devices behind one trait, and a simulated one in a simulated hand.
+//! Haptic devices behind one trait, and a simulated device in a simulated hand.
 //!
 //! ```
 //! use palpa_device::{DeviceModel, Grip, HapticDevice, Path, SimulatedDevice, Vec3};

@@ -1,7 +1,7 @@
 //! Figures of haptic devices: mass, friction, sensor, delays and limits.
 //!
-//! To add the figures of a device: a constant of [`DeviceModel`] with the source of each figure in
-//! its doc comment, and a line in [`DeviceModel::ALL`].
+//! To add a device, write a constant of [`DeviceModel`] with the source of each figure in its doc
+//! comment, and a line in [`DeviceModel::ALL`].
 
 use palpa_servo::DeviceSpec;
 
@@ -14,15 +14,15 @@ pub struct DeviceModel {
     pub viscous: f64,
     /// Dry friction, N.
     pub dry: f64,
-    /// Step of the position sensor, m; 0 for none.
+    /// Step of the position sensor, m; 0 for a continuous reading.
     pub resolution: f64,
     /// Time from the sensor to the reading, s.
     pub position_delay: f64,
-    /// Time from writing a force to its action, s.
+    /// Time from writing a force until it acts, s.
     pub force_delay: f64,
     /// Rate of new readings, Hz.
     pub rate: f64,
-    /// Limits that the loop keeps to.
+    /// Limits that the loop keeps.
     pub spec: DeviceSpec,
 }
 
@@ -30,9 +30,9 @@ impl DeviceModel {
     /// Novint Falcon.
     ///
     /// 8 N, 3000 N/m and 20 N s/m are CHAI3D's figures for it (`CDeltaDevices.cpp`, 3.3.0). The
-    /// sensor's step, 0.045 mm, follows from libnifalcon's geometry and encoder scale (0.041 to
-    /// 0.048 mm near the centre); one delay of 1 ms is the latency timer of its USB chip. The mass
-    /// is what a public driver compensates (90 g); friction is assumed.
+    /// sensor's step of 0.045 mm follows from libnifalcon's geometry and encoder scale (0.041 to
+    /// 0.048 mm near the centre). The delay of 1 ms is the latency timer of its USB chip. The mass,
+    /// 90 g, is the value that a public driver compensates. Friction is assumed.
     pub const FALCON: Self = Self {
         mass: 0.09,
         viscous: 0.5,
@@ -53,7 +53,7 @@ impl DeviceModel {
     /// 3D Systems Touch, formerly Phantom Omni.
     ///
     /// From its data sheet: 3.3 N, 0.055 mm, less than 0.26 N of friction, 45 g, and 1.26, 2.31 and
-    /// 1.02 N/mm along its axes; the least is taken. Viscous friction, delays and damping are
+    /// 1.02 N/mm along its axes; the smallest is used. Viscous friction, delays and damping are
     /// assumed.
     pub const TOUCH: Self = Self {
         mass: 0.045,

@@ -33,11 +33,12 @@ pub enum Driver {
 pub struct DeviceSetup {
     /// The code that drives it.
     pub driver: Driver,
-    /// Its figures. A driver of a real device reads the limits and the sensor's step from it.
+    /// Figures of the device. The driver of a real device takes the limits and the sensor's step
+    /// from here.
     pub model: DeviceModel,
-    /// Grip of a simulated hand. A person's hand has its own.
+    /// Grip of the simulated hand; unused when a person holds the device.
     pub grip: Grip,
-    /// Motion of a simulated hand. A person moves by themselves.
+    /// Motion of the simulated hand; unused when a person holds the device.
     pub target: HandTarget,
 }
 
@@ -45,7 +46,7 @@ impl DeviceSetup {
     /// Opens the device.
     ///
     /// # Errors
-    /// If a real device is not connected or does not answer. A simulated one always opens.
+    /// If a real device is not connected or does not answer. A simulated device always opens.
     pub fn open(self) -> Result<Box<dyn HapticDevice>, DeviceFault> {
         match self.driver {
             Driver::Simulated => Ok(Box::new(SimulatedDevice::following(

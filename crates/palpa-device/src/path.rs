@@ -5,10 +5,11 @@ mod tremor;
 
 use palpa_servo::Vec3;
 
-/// Largest speed of a minimum-jerk motion over its mean (Flash & Hogan 1985).
+/// Ratio of the largest to the mean speed of a minimum-jerk motion (Flash & Hogan 1985).
 const PEAK_OVER_MEAN: f64 = 1.875;
 
-/// A path through waypoints, with minimum jerk between them as hands move, and sines on top.
+/// A path through waypoints, with sines added. Between waypoints it has minimum jerk, as a hand
+/// moves.
 ///
 /// ```
 /// use palpa_device::{Path, Vec3};
@@ -23,7 +24,7 @@ pub struct Path {
     waves: Vec<Wave>,
 }
 
-/// A sine on top of a path, between two moments.
+/// A sine added to a path, between two moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Wave {
     /// m
@@ -38,7 +39,7 @@ struct Wave {
 }
 
 impl From<Vec3> for Path {
-    /// Stays at a point.
+    /// A path that stays at one point.
     fn from(start: Vec3) -> Self {
         Self {
             start,

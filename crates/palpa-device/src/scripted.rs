@@ -1,9 +1,9 @@
-//! A device that goes along a path, whatever the force.
+//! A device that follows a path and ignores the force.
 
 use crate::{DeviceFault, HapticDevice, Path};
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Pose, Vec3};
 
-/// An ideal device whose pose *is* the path, whatever the force: for tests of accuracy.
+/// An ideal device whose pose *is* the path; forces do not move it. For tests of accuracy.
 #[derive(Debug, Clone)]
 pub struct Scripted {
     path: Path,
@@ -13,7 +13,7 @@ pub struct Scripted {
 }
 
 impl Scripted {
-    /// Along the path from the first reading on.
+    /// A device that starts along the path at the first reading.
     pub fn new(path: Path, spec: DeviceSpec) -> Self {
         Self {
             path,

@@ -4,21 +4,21 @@
 //! (m_d + m_h) a = F − b_d v − c v/|v| + k (p(t) − x) + b (p'(t) − v)        |stiction| ≤ c
 //! ```
 //! The device has mass, viscous and dry friction, a position sensor with steps, a largest force,
-//! and delays; the hand is a mass on spring and damper that follows a path. Integrated in steps of
-//! 0.1 ms by the implicit midpoint, so that the integrator neither damps nor feeds an oscillation;
-//! dry friction is exact in the step. The force from the loop is held between writes, as a real
-//! amplifier does: what is unstable at 1 kHz is unstable here.
+//! and delays. The hand is a mass on a spring and a damper that follows a path. The equation is
+//! integrated in steps of 0.1 ms with the implicit midpoint rule, so the integrator neither damps
+//! an oscillation nor feeds it. Dry friction is exact within a step. The force from the loop is
+//! held between two writes, as by a real amplifier; therefore a loop that is unstable at 1 kHz is
+//! unstable here too.
 
 use crate::hand::Hand;
 use crate::{DeviceFault, DeviceModel, Grip, HandTarget, HapticDevice, LiveTarget, Path};
 use palpa_servo::{DeviceSpec, DeviceState, ForceCommand, Pose, Vec3};
 
-/// Step of the integration, s.
+/// Integration step, s.
 const STEP: f64 = 1e-4;
-/// Steps that delays may reach back.
+/// Length of the position history, in steps; no delay may be longer.
 const HISTORY: usize = 128;
-/// Longest time that one call makes up for, s: after a longer gap of the clock the rest is left
-/// out.
+/// Longest time that one call integrates, s. After a longer gap of the clock, the rest is skipped.
 const MAX_GAP: f64 = 0.25;
 
 /// A device of a model, in a hand with a grip.
@@ -32,7 +32,8 @@ pub struct SimulatedDevice {
     velocity: Vec3,
     /// Positions, m, one for each step, newest first.
     history: [Vec3; HISTORY],
-    /// Forces that do not act yet, N, with the moment from which they will, s; oldest first.
+    /// Forces that do not act yet: the moment at which each begins to act, s, and the force, N;
+    /// oldest first.
     pending: [(f64, Vec3); 16],
     n_pending: usize,
     acting: Vec3,
@@ -40,17 +41,17 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
-    /// In a hand that follows a path, from the first reading on.
+    /// A device in a hand that follows a path, starting at the first reading.
     pub fn new(model: DeviceModel, grip: Grip, path: Path) -> Self {
         Self::following(model, grip, path.into())
     }
 
-    /// In a hand that goes where the target is set.
+    /// A device in a hand that follows a live target.
     pub fn live(model: DeviceModel, grip: Grip, target: LiveTarget) -> Self {
         Self::following(model, grip, target.into())
     }
 
-    /// In a hand that follows either.
+    /// A device in a hand that follows a path or a live target.
     pub fn following(model: DeviceModel, grip: Grip, target: HandTarget) -> Self {
         let hand = Hand::new(grip, target);
         let at = hand.wanted;
@@ -107,7 +108,7 @@ impl SimulatedDevice {
         let Grip {
             damping, stiffness, ..
         } = self.hand.grip;
-        // For the mean velocity of the step, all forces but dry friction.
+        // Solve for the mean velocity of the step, with all forces except dry friction.
         let inertia = 2.0 * mass / STEP + damping + self.model.viscous + 0.5 * STEP * stiffness;
         let push = self.velocity * (2.0 * mass / STEP)
             + self.acting

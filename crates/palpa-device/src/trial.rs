@@ -1,5 +1,5 @@
-//! Trials of the closed loop in simulated time: servo, device, hand and a bed of tissue whose
-//! patches come late.
+//! Trials of the closed loop in simulated time: servo, device, hand, and a bed of tissue whose
+//! patches arrive late.
 
 use crate::{Bed, BedParams, DeviceModel, Grip, HapticDevice, Path, SimulatedDevice};
 use palpa_servo::{
@@ -7,7 +7,7 @@ use palpa_servo::{
     Vec3,
 };
 
-/// A mailbox without threads, in which the latest wins.
+/// A mailbox for a single thread; it keeps the latest patch only.
 #[derive(Debug, Clone)]
 pub struct Latest {
     current: Box<ContactPatch>,
@@ -16,7 +16,7 @@ pub struct Latest {
 }
 
 impl Latest {
-    /// With a patch that was never written.
+    /// A mailbox that holds an unwritten patch.
     pub fn new() -> Self {
         Self {
             current: Box::new(ContactPatch::EMPTY),
@@ -25,12 +25,12 @@ impl Latest {
         }
     }
 
-    /// Where the next patch is written; [`Latest::publish`] shows it.
+    /// Slot for the next patch; [`Latest::publish`] makes it visible.
     pub fn slot(&mut self) -> &mut ContactPatch {
         &mut self.next
     }
 
-    /// Shows what was written.
+    /// Makes the written patch visible to the reader.
     pub fn publish(&mut self) {
         self.is_newer = true;
     }
@@ -70,7 +70,7 @@ pub struct Trial {
     pub bed: BedParams,
     /// The path of the hand.
     pub path: Path,
-    /// Patches in a second, each one period late.
+    /// Patches per second; each arrives one period late.
     pub patch_rate: f64,
     /// Duration, s.
     pub duration: f64,
@@ -96,27 +96,27 @@ pub struct Sample {
 pub struct TrialReport {
     /// All ticks.
     pub samples: Vec<Sample>,
-    /// Root of the mean square of the force between 20 and 400 Hz over the last 2 s, N.
+    /// RMS of the force between 20 and 400 Hz over the last 2 s, N.
     pub rms: f64,
-    /// Largest deficit of energy at any time: given out beyond what was taken in, J, as true
-    /// positions have it.
+    /// Largest energy deficit at any time, J: energy given out beyond the energy taken in, computed
+    /// from the true positions.
     pub deficit: f64,
-    /// Largest change of force in a tick at which a patch came, N, while the force was fully let
-    /// through.
+    /// Largest change of force in a tick in which a patch arrived, N. Ticks during a ramp do not
+    /// count.
     pub arrival_step: f64,
     /// 99.9th percentile of the change in the other ticks, N.
     pub other_step: f64,
 }
 
 impl Trial {
-    /// Runs it.
+    /// Runs the trial.
     pub fn run(&self) -> TrialReport {
         let device = SimulatedDevice::new(self.device, self.grip, self.path.clone());
         self.run_with(device, SimulatedDevice::position, |_| 0.0)
     }
 
-    /// Runs it with another device, such as a faulty one; `position` says where it truly is, and
-    /// `hiccup` how long the loop stands still before a tick, s.
+    /// Runs the trial with another device, such as a faulty one. `position` returns the true
+    /// position of the device, m; `hiccup` returns how long the loop stands still before a tick, s.
     pub fn run_with<D: HapticDevice>(
         &self,
         mut device: D,
@@ -156,7 +156,8 @@ impl Trial {
             }
             last_position = Some(at);
             if clock >= next_patch {
-                // What was begun a period ago is done now, and the next begins at the present pose.
+                // The patch that was started one period ago is ready now. The next one starts at
+                // the present pose.
                 if working.id > 0 {
                     patches.slot().clone_from(&working);
                     patches.publish();
@@ -168,7 +169,7 @@ impl Trial {
             }
             let report = servo.tick(clock, &[state], &mut patches, &mut command);
             stretch = report.tools[0].stretch;
-            // A device that is gone takes no force; the trial goes on.
+            // A lost device accepts no force; the trial goes on.
             let _ = device.write(clock, &command[0]);
             samples.push(Sample {
                 time: clock,
@@ -216,8 +217,8 @@ fn steps(samples: &[Sample]) -> (f64, f64) {
     )
 }
 
-/// Root of the mean square, over a band of frequencies in Hz, of samples `dt` apart, less their
-/// straight line.
+/// RMS of samples within a band of frequencies, Hz. The samples are `dt` apart, s; their linear
+/// trend is removed first.
 pub fn band_rms(samples: &[Vec3], dt: f64, from: f64, to: f64) -> f64 {
     let n = samples.len();
     if n < 2 {
@@ -255,24 +256,24 @@ pub fn band_rms(samples: &[Vec3], dt: f64, from: f64, to: f64) -> f64 {
     power.sqrt()
 }
 
-/// One trial of the range in which a device in a hand is stable.
+/// Result of one trial of the range in which a device in a hand is stable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZWidthPoint {
     /// Stiffness of the wall, N/m.
     pub stiffness: f64,
-    /// Damping that is rendered in it, N s/m.
+    /// Rendered damping of the wall, N s/m.
     pub damping: f64,
-    /// Root of the mean square of the force between 20 and 400 Hz, N, with the hand's target still.
+    /// RMS of the force between 20 and 400 Hz, N, while the hand's target is still.
     pub rms: f64,
-    /// Whether that is below 0.02 N.
+    /// Whether `rms` is below 0.02 N.
     pub is_stable: bool,
 }
 
-/// The stable range of stiffness and damping: a wall of one vertex is pressed with the coupling
-/// off, for each pair.
+/// Tests which pairs of stiffness and damping are stable. For each pair, the device presses a wall
+/// of one vertex with the coupling off.
 ///
-/// With `guard` the energy observer is on, as it is in use; without, the device and the hand are on
-/// their own.
+/// With `guard` the energy observer is on, as in normal use. Without it, nothing but the device and
+/// the hand damps the motion.
 pub fn z_width(
     device: &DeviceModel,
     grip: &Grip,

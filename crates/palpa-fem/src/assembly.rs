@@ -7,17 +7,17 @@ use crate::element::{GroupResponse, PhaseAt, evaluate};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// Where the body is inverted.
+/// The place where the body is inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inverted {
     /// Middle of the group at rest, m.
     pub(crate) at: Vec3,
 }
 
-/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given. Forces
-/// are `∂W/∂u`.
+/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given. The
+/// forces are `∂W/∂u`.
 ///
-/// Groups are stored interval by interval, so that a run of them has one layer's material.
+/// Groups are stored interval by interval, so consecutive groups have the material of one layer.
 pub(crate) fn assemble(
     model: &Model,
     memory: &Memory,

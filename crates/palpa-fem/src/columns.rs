@@ -1,5 +1,5 @@
-//! The structure that all matrices of a body share: columns of nodes, in their order of elimination, and 3 × 3 blocks
-//! between nodes of one column or of two columns under a common group of triangles.
+//! The sparsity that all matrices of a body share: columns of nodes in elimination order, and 3 × 3
+//! blocks between nodes of one column, or of two columns under a common group of triangles.
 //!
 //! ```text
 //! blocks of a column v          (l, l) at base + 2 l,  (l + 1, l) at base + 2 l + 1
@@ -11,17 +11,17 @@ use palpa_mesh::Surface;
 use palpa_sparse::{NodePattern, Pattern, TooLarge, minimum_degree};
 
 use crate::Mat3;
-use crate::element::{N_BLOCKS, N_NODES, Shape};
+use crate::element::{GroupLayout, N_BLOCKS, N_NODES};
 use crate::pairing::Pairing;
 
-/// Two skin triangles that are evaluated together, or a single one, and where their blocks are.
+/// Two skin triangles that are evaluated together, or a single one, and the places of their blocks.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceGroup {
     /// Skin vertices in their order of elimination; the last is unused in a group of one.
     pub(crate) vertices: [u32; 4],
-    /// The skin triangles; one twice in a group of one.
+    /// The skin triangles; a group of one has its triangle twice.
     pub(crate) triangles: [u32; 2],
-    pub(crate) shape: Shape,
+    pub(crate) shape: GroupLayout,
     /// First block of each pair of local columns a ≥ b, at `a (a + 1)/2 + b`.
     bases: [u32; 10],
 }
@@ -37,27 +37,28 @@ impl SurfaceGroup {
     }
 }
 
-/// Which blocks there are, and where they stand in the factored matrix.
+/// The blocks, and their places in the factored matrix.
 #[derive(Debug)]
 pub(crate) struct Structure {
     pub(crate) groups: Vec<SurfaceGroup>,
     /// Levels with unknowns, from the skin down.
     pub(crate) n_free_levels: usize,
     n_levels: usize,
-    /// Place of each column in the order of elimination.
+    /// Place of each column in the elimination order.
     rank: Vec<u32>,
-    /// First block of each column's own.
+    /// First block of each column.
     own_bases: Vec<u32>,
-    /// Nodes (of the body) of the rows and columns of each block.
+    /// Nodes (of the body) for the rows and columns of each block.
     rows: Vec<u32>,
     columns: Vec<u32>,
     pattern: Pattern,
-    /// Entry of the first row of each column of each block; of a diagonal block the entry on the diagonal.
+    /// Entry of the first row of each column of each block; for a diagonal block, the entry on the
+    /// diagonal.
     entries: Vec<[u32; 3]>,
 }
 
 impl Structure {
-    /// The structure of a body whose deepest level has unknowns or not.
+    /// The structure of a body. The deepest level has unknowns or not.
     pub(crate) fn build(
         skin: &Surface,
         pairing: &Pairing,
@@ -137,7 +138,7 @@ impl Structure {
                 vec![l.checked_sub(1), Some(l), Some(l + 1).filter(|&k| k < n)]
             };
             for k in levels {
-                // A block that does not exist keeps its place, so that the index is a formula.
+                // A missing block keeps its place, so that the index stays a formula.
                 self.rows.push(k.map_or(u32::MAX, |k| node(later, k)));
                 self.columns.push(node(earlier, l));
             }
@@ -216,7 +217,7 @@ impl Structure {
         SurfaceGroup {
             vertices: std::array::from_fn(|i| vertices[i.min(vertices.len() - 1)]),
             triangles: [triangles[0], triangles[triangles.len() - 1]],
-            shape: Shape {
+            shape: GroupLayout {
                 wedges: [wedges[0], wedges[wedges.len() - 1]],
                 n_wedges: triangles.len() as u8,
             },
@@ -224,7 +225,7 @@ impl Structure {
         }
     }
 
-    /// Number of unknowns, held or not.
+    /// Number of unknowns, including held ones.
     pub(crate) fn n_dofs(&self) -> usize {
         3 * self.rank.len() * self.n_free_levels
     }
@@ -305,7 +306,8 @@ impl Structure {
         &self.pattern
     }
 
-    /// For every block that exists: its index, row node, column node and the entries of its columns.
+    /// For every block that exists: its index, row node, column node and the entries of its
+    /// columns.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (usize, usize, usize, [usize; 3])> + '_ {
         self.rows
             .iter()

@@ -35,7 +35,7 @@ pub(crate) struct Inertia {
     displacements: Vec<Vec3>,
     velocities: Vec<Vec3>,
     accelerations: Vec<Vec3>,
-    /// Stiffness at the beginning of the step, which damps during all of it; empty without such
+    /// Stiffness at the start of the step, used for damping throughout the step; empty without such
     /// damping.
     stiffness: Vec<Mat3>,
 }
@@ -54,7 +54,7 @@ impl Inertia {
             stiffness = vec![Mat3::zeros(); model.structure.n_blocks()];
             let mut forces = vec![Vec3::zeros(); model.n_nodes()];
             let u = &state.displacements;
-            // An inverted state ends the step at its first assembly.
+            // If the state is inverted, the first assembly ends the step.
             let _ = assemble(model, memory, u, &mut forces, Some(&mut stiffness));
         }
         Self {
@@ -67,7 +67,7 @@ impl Inertia {
         }
     }
 
-    /// Velocity and acceleration at the end of the step, for a displacement there.
+    /// Velocity and acceleration at the end of the step, for a given displacement there.
     fn motion(&self, node: usize, u: &Vec3) -> (Vec3, Vec3) {
         let dt = self.duration;
         let (v, a) = (&self.velocities[node], &self.accelerations[node]);
@@ -77,7 +77,7 @@ impl Inertia {
         (new_v, new_a)
     }
 
-    /// Adds forces of inertia and damping to `forces`, and their stiffness to `blocks`.
+    /// Adds the forces of inertia and damping to `forces`, and their stiffness to `blocks`.
     pub(crate) fn add(
         &self,
         model: &Model,

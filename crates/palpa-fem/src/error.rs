@@ -1,4 +1,4 @@
-//! Why a model is refused.
+//! Errors of a model.
 
 use palpa_sparse::TooLarge;
 
@@ -20,16 +20,17 @@ pub enum FemError {
         /// Its middle, m.
         at: [f64; 3],
     },
-    /// The stiffness at rest is not positive definite: the body cannot bear its own tension, or nothing holds it.
+    /// The stiffness at rest is not positive definite: the body is unstable under its own tension,
+    /// or nothing holds it.
     #[error(
         "the body is not stable at rest, near ({:.2}, {:.2}, {:.2}) mm; fix its base, or take less pre-stress",
         at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
     )]
     NoRest {
-        /// Where, m.
+        /// The place, m.
         at: [f64; 3],
     },
-    /// There is not one material for every layer.
+    /// The number of materials does not match the number of layers.
     #[error(
         "the body has {n_layers} layers, and {n_materials} of them have a material; give one for each"
     )]
@@ -39,34 +40,34 @@ pub enum FemError {
         /// Materials given for them.
         n_materials: usize,
     },
-    /// A layer or lump names a material that there is not.
-    #[error("material {material} is asked for, but there are only {n_materials}")]
+    /// A layer or lump names a material that does not exist.
+    #[error("material {material} does not exist; there are only {n_materials}")]
     NoSuchMaterial {
         /// The index.
         material: usize,
         /// Number of materials.
         n_materials: usize,
     },
-    /// A small-strain material beside others.
+    /// A small-strain material together with others.
     #[error(
         "material \"{linear}\" is linear (small strain) and \"{finite}\" is not; one body is either linear throughout or \
          not at all: give both the same kind of law"
     )]
     MixedKinematics {
-        /// A linear one.
+        /// Name of a linear material.
         linear: String,
-        /// One that is not.
+        /// Name of another material.
         finite: String,
     },
-    /// A lump whose law measures volume in another way than the layer round it.
+    /// A lump whose law measures volume differently from the layer around it.
     #[error(
         "lump material \"{lump}\" and layer material \"{layer}\" measure the change of volume differently; do not mix \
          St. Venant–Kirchhoff with other laws in one place"
     )]
     MixedVolume {
-        /// The lump's.
+        /// Material of the lump.
         lump: String,
-        /// The layer's.
+        /// Material of the layer.
         layer: String,
     },
     /// A material with impossible values.
@@ -74,10 +75,10 @@ pub enum FemError {
     Material {
         /// Its name.
         name: String,
-        /// What is wrong.
+        /// The error.
         source: crate::law::LawError,
     },
-    /// The stabiliser is off or beyond all.
+    /// `alpha` is out of range.
     #[error(
         "alpha is {alpha}, outside 0 to below 1; 0.8 is a good value, and 1 leaves hourglass modes"
     )]
@@ -85,12 +86,12 @@ pub enum FemError {
         /// The value given.
         alpha: f64,
     },
-    /// Too much memory for the factor.
+    /// The factor would need too much memory.
     #[error(
         "the factor of {n_dofs} unknowns would take more than 8 GiB; make the mesh coarser, with fewer levels, or cut out a part"
     )]
     TooLarge {
-        /// Unknowns.
+        /// Number of unknowns.
         n_dofs: usize,
     },
 }

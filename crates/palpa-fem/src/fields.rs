@@ -1,4 +1,4 @@
-//! What is looked at inside a pressed body: stress, stretch, energy, and the forces that layers hand on.
+//! Results inside a pressed body: stress, stretch, energy, and the forces between layers.
 
 use palpa_mesh::Vec3;
 
@@ -9,16 +9,17 @@ use crate::model::Model;
 use crate::state::{Memory, State};
 use crate::statics::Workspace;
 
-/// The state of one prism: means over its volume.
+/// The state of one prism, averaged over its volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrismField {
     /// Cauchy stress, Pa.
     pub cauchy: Mat3,
     /// Stretches along the principal directions, ascending.
     pub stretches: [f64; 3],
-    /// Volume as a multiple of that at rest.
+    /// Volume divided by the volume at rest.
     pub volume_ratio: f64,
-    /// Strain energy over volume at rest, J/m³; for a viscous material the elastic part of its present law.
+    /// Strain energy divided by the volume at rest, J/m³; for a viscous material, the elastic part
+    /// of its present law.
     pub energy: f64,
 }
 
@@ -37,12 +38,13 @@ impl PrismField {
 
 /// The state of every prism, prism (t, i) at `t (n_levels − 1) + i`. `[n_prisms]`
 ///
-/// `ws` is the one that solved the state last.
+/// `ws` must be the workspace that solved the state last.
 pub fn prism_fields(model: &Model, state: &State, ws: &Workspace) -> Vec<PrismField> {
     fields_with(model, &state.displacements, &ws.memory)
 }
 
-/// The state of every prism at these displacements in the long run: without what viscous materials still remember. `[n_prisms]`
+/// The state of every prism at these displacements after full relaxation, without the memory of
+/// viscous materials. `[n_prisms]`
 pub fn relaxed_fields(model: &Model, displacements: &[Vec3]) -> Vec<PrismField> {
     let mut memory = Memory::new(model);
     memory.begin(model, &State::new(model), f64::INFINITY);
@@ -88,9 +90,11 @@ fn fields_with(model: &Model, displacements: &[Vec3], memory: &Memory) -> Vec<Pr
     fields
 }
 
-/// For each level the force on it of the tissue below, N; at the deepest level that of the bone. `[n_levels]`
+/// For each level, the force of the tissue below on it, N; for the deepest level, that of the bone.
+/// `[n_levels]`
 ///
-/// In a body without cut faces that are held, all of them are the force of the tool: it is handed on from layer to layer.
+/// If the body has no held cut faces, all of them equal the force of the tool, which passes through
+/// all layers.
 pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
     let mut forces = vec![Vec3::zeros(); model.body.n_levels];
     let mut phases = Vec::with_capacity(4);

@@ -1,14 +1,14 @@
-//! GMRES, for systems of which the factor is only a guess: friction makes them unsymmetric, or the
-//! factor is an older one.
+//! GMRES, for systems whose factor is only approximate: friction makes the system unsymmetric, or
+//! the factor is an older one.
 
 use palpa_mesh::Vec3;
 
-/// What a solve came to.
+/// The result of a solve.
 #[derive(Debug)]
 pub(crate) struct Solution {
     /// `M x`.
     pub(crate) vector: Vec<Vec3>,
-    /// Norm of what is left of the right side, as a share of it.
+    /// Norm of the residual, relative to that of the right side.
     pub(crate) residual: f64,
 }
 
@@ -20,9 +20,9 @@ fn norm(a: &[Vec3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Solves `A x = b`, where `apply` is `A M⁻¹` of a good guess M of A, and gives `M x` (Saad &
-/// Schultz 1986). Stops when the residual is `tolerance` of `b`, or with what there is when the
-/// basis has `most` vectors or will not be enough with them.
+/// Solves `A x = b` (Saad & Schultz 1986). `apply` is `A M⁻¹` with an approximation M of A; the
+/// result is `M x`. Stops when the relative residual is `tolerance`, when the basis has `most`
+/// vectors, or when these would not be enough at the present rate.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,
@@ -71,7 +71,7 @@ pub(crate) fn gmres(
         right[j] *= c;
         columns.push(column);
         let residual = right[j + 1].abs() / size;
-        // As fast as in the first third, would there be enough vectors?
+        // Extrapolates the convergence so far to `most` vectors.
         let is_too_slow =
             3 * (j + 1) >= most && residual.powf(most as f64 / (j + 1) as f64) > tolerance;
         if residual <= tolerance || is_too_slow || rest <= f64::EPSILON * length {

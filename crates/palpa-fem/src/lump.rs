@@ -13,7 +13,8 @@ pub struct Lump {
     material: usize,
 }
 
-/// The form of a lump, in a frame of its own whose origin is the middle (of a mesh, the centroid of its volume).
+/// The shape of a lump, in its own frame. The origin is the middle; for a mesh, the centroid of its
+/// volume.
 #[derive(Debug)]
 pub enum LumpShape {
     /// A ball.
@@ -35,21 +36,21 @@ pub struct ClosedMesh {
     bounding_radius: f64,
 }
 
-/// Why a lump is refused.
+/// The reason why a lump is refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LumpError {
-    /// Its border is wider than itself, or no width at all.
+    /// The transition is wider than the lump, or negative or not a number.
     #[error(
         "lump: a transition of {transition} m is not possible; give 0 (sharp) to {limit} m, the width of the lump"
     )]
     Transition {
-        /// The value given. m
+        /// The given transition, m.
         transition: f64,
-        /// The widest that leaves something of the lump. m
+        /// The largest transition that leaves part of the lump, m.
         limit: f64,
     },
-    /// A surface with a hole has no inside.
+    /// The surface is not closed.
     #[error(
         "lump: the surface is open: {n_edges} edges have one triangle only, the first at ({:.6}, {:.6}, {:.6}) m; close \
          its holes, or join equal points if it was never joined", at.x, at.y, at.z
@@ -57,19 +58,19 @@ pub enum LumpError {
     Open {
         /// Number of edges without a second triangle.
         n_edges: usize,
-        /// The middle of the first. m
+        /// Midpoint of the first of them, m.
         at: Vec3,
     },
-    /// Triangles that do not agree on what is outside, or more than two at an edge.
+    /// Triangles with inconsistent orientation, or more than two at an edge.
     #[error(
         "lump: the triangles at the edge at ({:.6}, {:.6}, {:.6}) m do not agree on which side is outside, or are more \
          than two; orient and repair the surface", at.x, at.y, at.z
     )]
     Orientation {
-        /// The middle of the edge. m
+        /// Midpoint of the edge, m.
         at: Vec3,
     },
-    /// A surface that encloses nothing.
+    /// The surface encloses no volume.
     #[error(
         "lump: the surface has {n_triangles} triangles and encloses no volume; give a closed surface"
     )]
@@ -77,17 +78,17 @@ pub enum LumpError {
         /// Number of its triangles.
         n_triangles: usize,
     },
-    /// A point that is none.
+    /// A point with a coordinate that is not finite.
     #[error("lump: point {point} of the surface is not finite; mend the file")]
     NotFinite {
-        /// Its number in the surface.
+        /// Index of the point in the surface.
         point: usize,
     },
 }
 
 impl Lump {
-    /// A lump of the given `material` (a number of the caller's) at `pose`. The border is `transition` metres wide: half
-    /// of it lies inside the shape, half outside; 0 is sharp.
+    /// A lump of the given `material` (an index of the caller's) at `pose`. The border is
+    /// `transition` metres wide, half of it inside the shape and half outside; 0 is sharp.
     ///
     /// # Errors
     /// When the transition is negative, or wider than the lump is thick.
@@ -109,27 +110,27 @@ impl Lump {
         })
     }
 
-    /// Its form.
+    /// The shape.
     pub fn shape(&self) -> &LumpShape {
         &self.shape
     }
 
-    /// Where it is: from its own frame to the world's.
+    /// Pose: transformation from its own frame to the world's.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// Width of its border. m
+    /// Width of its border, m.
     pub fn transition(&self) -> f64 {
         self.transition
     }
 
-    /// The number of its material.
+    /// Index of its material.
     pub fn material(&self) -> usize {
         self.material
     }
 
-    /// Distance of `p` (world) from the lump's surface, negative inside. m
+    /// Distance of `p` (world) from the lump's surface, m; negative inside.
     pub fn signed_distance(&self, p: &Vec3) -> f64 {
         let from_middle = p - self.pose.translation.vector;
         let p = self.pose.rotation.inverse_transform_vector(&from_middle);
@@ -141,8 +142,8 @@ impl Lump {
         }
     }
 
-    /// How much of the material at `p` (world) is the lump's: 1 inside, 0 outside, and `3 t² − 2 t³` between, with `t`
-    /// rising from 0 to 1 over the width of the transition, ½ at the surface.
+    /// Share of the lump in the material at `p` (world): 1 inside, 0 outside, and `3 t² − 2 t³`
+    /// between. `t` rises from 0 to 1 over the width of the transition and is ½ at the surface.
     pub fn fraction(&self, p: &Vec3) -> f64 {
         let (middle, radius) = self.bounding_sphere();
         if (p - middle).norm_squared() > radius * radius {
@@ -156,7 +157,7 @@ impl Lump {
         t * t * (3.0 - 2.0 * t)
     }
 
-    /// Middle (world) and radius of a ball outside which the fraction is 0. m
+    /// Centre (world) and radius of a ball outside which the fraction is 0, m.
     pub fn bounding_sphere(&self) -> (Vec3, f64) {
         let radius = match &self.shape {
             LumpShape::Sphere(shape) => shape.radius(),
@@ -167,7 +168,7 @@ impl Lump {
         (self.pose.translation.vector, radius + 0.5 * self.transition)
     }
 
-    /// The volume inside its surface. m³
+    /// Volume inside its surface, m³.
     pub fn volume(&self) -> f64 {
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         match &self.shape {
@@ -183,21 +184,22 @@ impl Lump {
 }
 
 impl LumpShape {
-    /// The smallest width through the middle; beyond it the middle would not be the lump's. m
+    /// The smallest width through the middle, m. With a wider transition even the middle would not
+    /// be fully lump.
     fn widest_transition(&self) -> f64 {
         match self {
             Self::Sphere(shape) => 2.0 * shape.radius(),
             Self::Ellipsoid(shape) => 2.0 * shape.radii().min(),
             Self::Capsule(shape) => 2.0 * shape.radius(),
-            // A bent one may be thinner anywhere: its own size is all that is sure.
+            // A bent mesh may be thinner anywhere; only its overall size is known.
             Self::Mesh(shape) => 2.0 * shape.bounding_radius,
         }
     }
 }
 
 impl ClosedMesh {
-    /// Prepares the inside of `surface` (m). One whose triangles all face inward is turned inside out. That it does not
-    /// pass through itself is the caller's to check.
+    /// Prepares the inside of `surface` (m). If all its triangles face inward, it is turned inside
+    /// out. The caller must check that it does not intersect itself.
     ///
     /// # Errors
     /// When the surface is not closed, not consistently oriented, or without volume.
@@ -212,7 +214,7 @@ impl ClosedMesh {
         check_closed(surface)?;
         let (mut volume, mut moment) = (0.0, Vec3::zeros());
         let n_triangles = surface.triangles.len();
-        // Tetrahedra on a point nearby, since from the world's origin large parts would cancel.
+        // Tetrahedra from a nearby point: from the world's origin, large terms would cancel.
         let (lo, hi) = surface
             .bounds()
             .ok_or(LumpError::NoVolume { n_triangles })?;
@@ -223,7 +225,7 @@ impl ClosedMesh {
             volume += v;
             moment += (a + b + c) * (0.25 * v);
         }
-        // Rounding of the sum, for a flat closed surface.
+        // Tolerance for rounding, so that a flat closed surface is found.
         if volume.abs() <= 1e-12 * (hi - lo).norm().powi(3) {
             return Err(LumpError::NoVolume { n_triangles });
         }
@@ -249,8 +251,8 @@ impl ClosedMesh {
         })
     }
 
-    /// Where the centroid of the volume was in the surface's own coordinates: a pose with this translation puts the mesh
-    /// back to its place. m
+    /// The centroid of the volume in the surface's own coordinates, m. A pose with this translation
+    /// puts the mesh back in its place.
     pub fn centroid(&self) -> Vec3 {
         self.centroid
     }

@@ -1,20 +1,22 @@
-//! Which material is where: layers, lumps in them, and a field of stiffness over both.
+//! The material at each point of a body: layers, lumps in them, and a field of stiffness over both.
 //!
-//! Material is sampled where the element asks for it, so a lump need not follow the mesh. A place that is partly lump is
-//! given an energy between both materials' that is not their mean by volume: where one is much stiffer it is hardly
-//! strained itself, and the mean would feel it many times too strongly. The share c of the lump's energy is
+//! Material is sampled where the element asks for it, so a lump need not follow the mesh. A place
+//! that is partly lump is given an energy between both materials' that is not their mean by volume:
+//! where one is much stiffer it is hardly strained itself, and the mean would feel it many times
+//! too strongly. The share c of the lump's energy is
 //!
 //! ```text
 //! G = G_m + c (G_l − G_m),  c = φ / (1 + (1 − φ) β (G_l/G_m − 1))
 //! β = s β_E + (1 − s),      β_E = 2 (4 − 5 ν)/(15 (1 − ν))        s = V/(V + V_l)
 //! ```
-//! with φ the lump's share of volume, ν that of the layer; a place wholly inside has c = 1. With `β = β_E` the lump is a
-//! grain inside the group (Eshelby 1957, Mori & Tanaka 1973; for the bulk modulus `β_E = (1 + ν)/(3 (1 − ν))`), with β = 1
-//! both are in series: to a group that is small beside the lump its border is a plane, and the group's one strain is stiff
-//! enough as it is (a hard ball in a soft block adds 6 to 17 % too much stiffness as grains, at most 6 % in series, with
-//! three groups to its radius). The volumes of group and lump say which it is. A lump softer than its layer is a grain to
-//! all groups: in series a trace of it would take all their stiffness (a soft ball takes 7 % too little as grains, and
-//! would 14 % too much in series).
+//! with φ the lump's share of volume, ν that of the layer; a place wholly inside has c = 1. With
+//! `β = β_E` the lump is a grain inside the group (Eshelby 1957, Mori & Tanaka 1973; for the bulk
+//! modulus `β_E = (1 + ν)/(3 (1 − ν))`), with β = 1 both are in series: to a group that is small
+//! beside the lump its border is a plane, and the group's one strain is stiff enough as it is (a
+//! hard ball in a soft block adds 6 to 17 % too much stiffness as grains, at most 6 % in series,
+//! with three groups to its radius). The volumes of group and lump say which it is. A lump softer
+//! than its layer is a grain to all groups: in series a trace of it would take all their stiffness
+//! (a soft ball takes 7 % too little as grains, and would 14 % too much in series).
 
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -25,21 +27,22 @@ use crate::law::Law;
 use crate::lump::Lump;
 use crate::{Kinematics, Material};
 
-/// Samples along each side of a triangle, and over half the height of a prism, where a lump's border crosses it.
+/// Number of samples along each side of a triangle, and over half the height of a prism that a
+/// lump's border crosses.
 const IN_PLANE: usize = 8;
 const IN_DEPTH: usize = 6;
 
-/// A factor on the stiffness, by place at rest.
+/// A factor on the stiffness as a function of the position at rest.
 pub type StiffnessField = Box<dyn Fn(&Vec3) -> f64 + Send + Sync>;
 
 /// The materials of a body.
 #[derive(Default)]
 pub struct Materials {
-    /// Every material that occurs.
+    /// All materials of the body.
     pub materials: Vec<Material>,
-    /// For each layer its material. `[n_layers]`
+    /// Index of the material of each layer. `[n_layers]`
     pub layers: Vec<usize>,
-    /// Lumps; where they overlap the later one counts.
+    /// The lumps. Where they overlap, the later one counts.
     pub lumps: Vec<Lump>,
     /// Multiplies the stiffness everywhere; sampled over every half prism.
     pub stiffness: Option<StiffnessField>,
@@ -117,7 +120,7 @@ impl Materials {
         Ok(())
     }
 
-    /// Shares of each lump at a place, 1 together at most.
+    /// Shares of each lump at a point; their sum is at most 1.
     fn shares_at(&self, nearby: &[usize], p: &Vec3, shares: &mut [f64]) {
         let mut left = 1.0;
         for &lump in nearby.iter().rev() {
@@ -135,7 +138,7 @@ struct Half {
     stiffness: f64,
 }
 
-/// The phases of every group: what it is made of at each of its places.
+/// The phases of every group: its materials at each of its points.
 pub(crate) fn assign(
     body: &LayeredBody,
     structure: &Structure,
@@ -187,7 +190,7 @@ fn nearby(materials: &Materials, wedges: &[[Vec3; 6]]) -> Vec<usize> {
         .collect()
 }
 
-/// Means over the lower and the upper half of a wedge (the order of the depth points).
+/// Means over the lower and the upper half of a wedge, in the order of the depth points.
 fn sample(materials: &Materials, nearby: &[usize], corners: &[Vec3; 6]) -> [Half; 2] {
     let mut shares = vec![0.0; materials.lumps.len()];
     [-1.0, 1.0].map(|side| {
@@ -289,7 +292,7 @@ fn push_phases(
         }
         phases.push(phase);
     }
-    // A group wholly inside a lump keeps no trace of its layer.
+    // A group wholly inside a lump has no share of its layer.
     let is_left = matrix.volume > 1e-12 || matrix.points.iter().any(|&share| share > 1e-12);
     if is_left {
         phases.push(matrix);
@@ -310,7 +313,7 @@ fn volume_share(layer: &Law, lump: &Law, share: f64, grain: f64) -> f64 {
     concentrated(share, beta, ratio, grain)
 }
 
-/// c of the module's formula; `grain` is s.
+/// `c` of the formula in the module's documentation; `grain` is `s`.
 fn concentrated(share: f64, of_grain: f64, ratio: f64, grain: f64) -> f64 {
     let beta = if ratio > 1.0 {
         grain * of_grain + 1.0 - grain

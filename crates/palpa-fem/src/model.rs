@@ -1,4 +1,4 @@
-//! A body ready to be pressed: everything that does not change while it is pressed.
+//! A body ready to be pressed: all data that stays constant during a press.
 
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -10,17 +10,17 @@ use crate::materials::{Materials, assign};
 use crate::pairing::pair_triangles;
 use crate::system::Hold;
 
-/// Nodes that cannot move freely, whatever presses.
+/// Nodes whose movement is always restricted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Supports {
-    /// Nodes that stay where they are.
+    /// Fixed nodes.
     pub fixed: Vec<usize>,
-    /// Nodes that stay in a plane, given by its normal. A node may lie in several.
+    /// Nodes restricted to a plane, with its normal. A node may have several planes.
     pub planes: Vec<(usize, Vec3)>,
 }
 
 impl Supports {
-    /// The base of a body is fixed: the tissue hangs on its bone.
+    /// Supports of a body whose base is fixed to the bone.
     pub fn on_base(body: &LayeredBody) -> Self {
         Self {
             fixed: (0..body.n_nodes()).filter(|&n| body.is_base(n)).collect(),
@@ -29,11 +29,11 @@ impl Supports {
     }
 }
 
-/// Parameters of the element and of its surroundings.
+/// Parameters of the element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParams {
-    /// Share of the pair's mean deviator, 0 to below 1; the rest is each wedge's own. Near 1 single
-    /// nodes hourglass.
+    /// Share of the pair's mean deviator, 0 to below 1; the rest is the share of the single wedges.
+    /// Near 1, single nodes show hourglass modes.
     pub alpha: f64,
 }
 
@@ -43,7 +43,7 @@ impl Default for ModelParams {
     }
 }
 
-/// A layered body with its materials and supports, and everything that can be computed beforehand.
+/// A layered body with its materials and supports, and all data that is computed beforehand.
 #[derive(Debug)]
 pub struct Model {
     pub(crate) body: LayeredBody,
@@ -57,11 +57,11 @@ pub struct Model {
     pub(crate) supports: Vec<Hold>,
     /// Lumped mass of every node, kg.
     pub(crate) masses: Vec<f64>,
-    /// Area of skin that every skin vertex stands for, m².
+    /// Area of skin that each skin vertex stands for, m².
     pub(crate) skin_areas: Vec<f64>,
     pub(crate) params: ModelParams,
     n_singles: usize,
-    /// Whether any material relaxes or is under tension at rest.
+    /// Whether any material relaxes or has tension at rest.
     pub(crate) has_memory: bool,
 }
 
@@ -127,7 +127,7 @@ impl Model {
         &self.materials
     }
 
-    /// Number of nodes, held ones included.
+    /// Number of nodes, including fixed ones.
     pub fn n_nodes(&self) -> usize {
         self.body.n_nodes()
     }
@@ -137,13 +137,13 @@ impl Model {
         self.supports.iter().filter(|hold| hold.n < 3).count()
     }
 
-    /// Number of skin triangles without a partner; prisms under them are too stiff where tissue
-    /// keeps its volume.
+    /// Number of skin triangles without a partner. Prisms under them are too stiff if the tissue is
+    /// nearly incompressible.
     pub fn n_single_triangles(&self) -> usize {
         self.n_singles
     }
 
-    /// Area of skin that every skin vertex stands for at rest, m². `[n_vertices]`
+    /// Area of skin that each skin vertex stands for at rest, m². `[n_vertices]`
     pub fn skin_areas(&self) -> &[f64] {
         &self.skin_areas
     }
@@ -153,7 +153,7 @@ impl Model {
         self.structure.groups.len()
     }
 
-    /// The nodes of a group in interval `i`, as the element counts them.
+    /// The nodes of a group in interval `i`, in the element's order.
     pub(crate) fn group_nodes(&self, group: usize, i: usize) -> [usize; 8] {
         let vertices = &self.structure.groups[group].vertices;
         std::array::from_fn(|n| self.body.node(vertices[n / 2] as usize, i + n % 2))

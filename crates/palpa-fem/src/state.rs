@@ -10,26 +10,26 @@ use crate::model::Model;
 /// How a skin vertex touches a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Touch {
-    /// Not at all.
+    /// No contact.
     Open,
-    /// It slides, or may slide freely.
+    /// The vertex slides, or may slide freely.
     Slip {
         /// Which tool.
         tool: u32,
-        /// Where in the tool's frame it was at the end of the last step, m.
+        /// Its position in the tool's frame at the end of the last step, m.
         anchor: Vec3,
     },
-    /// Friction holds it.
+    /// Friction holds the vertex.
     Stick {
         /// Which tool.
         tool: u32,
-        /// Where in the tool's frame it is held, m.
+        /// The point in the tool's frame where it is held, m.
         anchor: Vec3,
     },
 }
 
 impl Touch {
-    /// The tool that is touched.
+    /// Index of the touched tool, if any.
     pub fn tool(&self) -> Option<usize> {
         match *self {
             Self::Open => None,
@@ -47,11 +47,11 @@ pub struct State {
     pub velocities: Vec<Vec3>,
     /// Acceleration of every node, in m/s². `[n_nodes]`
     pub accelerations: Vec<Vec3>,
-    /// How every skin vertex touches. `[n_vertices]`
+    /// Touch of every skin vertex. `[n_vertices]`
     pub touches: Vec<Touch>,
     /// Time, in s.
     pub time: f64,
-    /// For each phase of a viscous material the last elastic stress and the memories, point by
+    /// For each phase of a viscous material, the last elastic stress and the memories, point by
     /// point.
     pub(crate) history: Vec<PhaseHistory>,
 }
@@ -65,8 +65,8 @@ pub(crate) struct PhaseHistory {
 }
 
 impl PhaseHistory {
-    /// Takes over the memory of the phases of other pairs in which this pair's two wedges are;
-    /// `old` has for each wedge the phase, and which of its pair's two wedges.
+    /// Takes over the memory of other pairs' phases. `old` has, for each of this pair's two wedges,
+    /// the old phase and the index of the wedge in its pair.
     pub(crate) fn carry(&mut self, old: [(&Self, usize); 2]) {
         let n = self.points.len() / N_POINTS;
         let mean = |a: f64, b: f64| 0.5 * (a + b);
@@ -127,12 +127,12 @@ impl State {
     }
 }
 
-/// Factors and constant stresses of all materials in a step of a given duration.
+/// Factors and constant stresses of all materials in a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Memory {
-    /// For each material the factors of its deviatoric and volumetric part.
+    /// For each material, the factors of its deviatoric and volumetric part.
     pub(crate) scales: Vec<[f64; 2]>,
-    /// For each phase; empty when no material has any.
+    /// Constant stresses of each phase; empty if no material has any.
     pub(crate) overstress: Vec<Overstress>,
     steps: Vec<Option<PronyStep>>,
 }
@@ -210,12 +210,12 @@ impl Memory {
         }
     }
 
-    /// The step of a material, if it is viscous.
+    /// Relaxation factors of a material in this step, if it is viscous.
     pub(crate) fn step_of(&self, material: usize) -> Option<&PronyStep> {
         self.steps[material].as_ref()
     }
 
-    /// Ends the step: every point remembers.
+    /// Ends the step: updates the memory of every point.
     pub(crate) fn commit(&self, model: &Model, state: &mut State) {
         if self.steps.iter().all(Option::is_none) {
             return;
@@ -225,7 +225,7 @@ impl Memory {
         }
     }
 
-    /// Ends the step of a group.
+    /// Ends the step for one group.
     pub(crate) fn commit_group(&self, model: &Model, state: &mut State, g: usize) {
         let (i, group) = (g / model.n_groups(), g % model.n_groups());
         let nodes = model.group_nodes(group, i);
@@ -242,7 +242,7 @@ impl Memory {
                 &displacements,
                 &material.law,
             );
-            // A step that was accepted has no inverted point.
+            // An accepted step has no inverted point.
             let Some(stresses) = stresses else { continue };
             let history = &mut state.history[p];
             for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {

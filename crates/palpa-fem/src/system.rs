@@ -7,11 +7,11 @@ use palpa_sparse::{Factor, Singular};
 use crate::Mat3;
 use crate::columns::Structure;
 
-/// A pivot smaller than this, relative to the diagonal entry that it came from, is taken for zero.
+/// A pivot smaller than this, relative to its original diagonal entry, counts as zero.
 const SINGULAR_PIVOT: f64 = 1e-13;
 
-/// First shift of a matrix that is not positive definite, relative to its diagonal, its growth, and
-/// how often it may grow.
+/// First shift of a matrix that is not positive definite, relative to its diagonal; its growth
+/// factor; and the largest number of increases.
 const FIRST_SHIFT: f64 = 1e-3;
 const SHIFT_GROWTH: f64 = 4.0;
 const MOST_SHIFTS: usize = 9;
@@ -21,7 +21,7 @@ const MOST_SHIFTS: usize = 9;
 pub(crate) struct Hold {
     /// An orthonormal frame, its first `n` columns the directions that are held.
     pub(crate) frame: Mat3,
-    /// 0 (free) to 3.
+    /// Number of held directions, 0 (free) to 3.
     pub(crate) n: u8,
 }
 
@@ -40,9 +40,9 @@ impl Hold {
         }
     }
 
-    /// Holds one more direction; one that is held already changes nothing.
+    /// Holds one more direction. A direction that is already held changes nothing.
     pub(crate) fn and(self, direction: &Vec3) -> Self {
-        /// Sine of the smallest angle at which a direction is a new one.
+        /// Sine of the smallest angle at which a direction counts as new.
         const NEW: f64 = 1e-6;
         let n = usize::from(self.n);
         if n == 3 {
@@ -78,7 +78,7 @@ impl Hold {
         }
     }
 
-    /// The part of a vector in the directions that are free.
+    /// The part of a vector in the free directions.
     pub(crate) fn free_part(&self, vector: &Vec3) -> Vec3 {
         match self.n {
             0 => *vector,
@@ -95,7 +95,7 @@ impl Hold {
     }
 }
 
-/// The numbers of the system, in memory that is kept.
+/// The matrix and its factor, in memory that is reused.
 #[derive(Debug)]
 pub(crate) struct LinearSystem {
     /// Stiffness between nodes, in the order of [`Structure`].
@@ -105,9 +105,9 @@ pub(crate) struct LinearSystem {
     diagonal: Vec<usize>,
     right_side: Vec<f64>,
     factor: Factor,
-    /// The constraints it was factored under.
+    /// The constraints of the factor.
     holds: Vec<Hold>,
-    /// Whether there is a factor at all.
+    /// Whether there is a factor.
     pub(crate) is_factored: bool,
 }
 
@@ -127,8 +127,8 @@ impl LinearSystem {
         }
     }
 
-    /// Factors the blocks under constraints. A matrix that is not positive definite is shifted;
-    /// returns the shift, relative to the diagonal.
+    /// Factors the blocks under constraints. If the matrix is not positive definite, it is shifted.
+    /// Returns the shift, relative to the diagonal.
     pub(crate) fn refactor(
         &mut self,
         structure: &Structure,
@@ -178,8 +178,8 @@ impl LinearSystem {
             }
             let is_diagonal = row == column;
             if is_diagonal {
-                // Any positive number does for what is held; one of the matrix's size keeps pivots
-                // alike.
+                // Any positive number works for a held direction; one of the size of the matrix
+                // keeps pivots similar.
                 let size = self.blocks[i].trace().abs() / 3.0;
                 for r in 0..usize::from(row_hold.n) {
                     block[(r, r)] = if size > 0.0 { size } else { 1.0 };
@@ -197,9 +197,9 @@ impl LinearSystem {
         }
     }
 
-    /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A direction that was held
-    /// is a spring by itself, so that no force leads to no displacement there, and a factor from
-    /// before it was let go is still a guess.
+    /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A held direction is an
+    /// independent spring in the factor. So a force elsewhere gives no displacement there, and the
+    /// factor stays usable as an approximation after the direction is released.
     pub(crate) fn solve(
         &mut self,
         structure: &Structure,

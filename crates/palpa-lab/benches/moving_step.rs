@@ -1,4 +1,5 @@
-//! The moving step under a sphere that strokes to and fro, and its patch, wall time. `palpa bench` has rates with their errors.
+//! The moving step under a sphere that strokes to and fro, and its patch, wall time. `palpa bench`
+//! has rates with their errors.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The laboratory: how right and how fast the models are, and their problems in the words of other solvers.
+//! The laboratory: accuracy and speed of the models, and export of their problems to other solvers.
 
 pub mod bench;
 pub mod export;

@@ -1,4 +1,5 @@
-//! Force while moving: what the 1 kHz loop renders against the body's converged force at the same place.
+//! Force while moving: the force of the 1 kHz loop compared with the converged force of the body at
+//! the same place.
 
 use anyhow::bail;
 use palpa_device::{Path, Scripted};
@@ -12,31 +13,31 @@ use palpa_plot::{Axis, Chart, Picture, Series, panels};
 /// One moment of a trace. Forces along the device's z, out of the tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TraceRow {
-    /// Clock. s
+    /// Clock, s.
     pub time_s: f64,
-    /// How far the tip is below the first touch. mm
+    /// Depth of the tip below the first touch, mm.
     pub depth_mm: f64,
-    /// How far it is across the skin along the device's x. mm
+    /// Position across the skin, along the device's x, mm.
     pub across_mm: f64,
-    /// Speed of the device. mm/s
+    /// Speed of the device, mm/s.
     pub speed_mm_s: f64,
-    /// Force that the loop commands. N
+    /// Force that the loop commands, N.
     pub force_n: f64,
-    /// Force of the tissue's last step, at the pose of that step. N
+    /// Force of the tissue's last step, at the pose of that step, N.
     pub step_force_n: f64,
-    /// Converged quasi-static force at the device's pose. N
+    /// Converged quasi-static force at the device's pose, N.
     pub static_force_n: f64,
-    /// Distance of the two vectors, commanded and converged. N
+    /// Length of the difference between the commanded and the converged force vector, N.
     pub error_n: f64,
     /// Vertices that touch in the loop's contact problem.
     pub n_active: u32,
-    /// Sweeps over them, and the change of their forces in the last one, relative.
+    /// Sweeps over these vertices.
     pub sweeps: u32,
-    /// See `sweeps`.
+    /// Relative change of the contact forces in the last sweep.
     pub residual: f64,
-    /// Vertices that press in the tissue's last step, and its candidates.
+    /// Vertices that press in the tissue's last step.
     pub step_active: usize,
-    /// See `step_active`.
+    /// Candidates of the tissue's last step.
     pub step_candidates: usize,
 }
 
@@ -46,17 +47,19 @@ impl TraceRow {
         self.error_n / self.static_force_n.abs().max(1e-9)
     }
 
-    /// Whether the error is within a share of the converged force, or so many newtons.
+    /// Whether the error is at most this share of the converged force, or at most this many
+    /// newtons.
     pub fn is_within(&self, share: f64, newtons: f64) -> bool {
         self.error_n <= newtons || self.share() <= share
     }
 }
 
-/// Moves an ideal device along a path, and solves for the converged force at every `every`-th tick, in order, from the one
-/// before; above the first touch (`above` under the device's origin, m) there is none. The steps of the tissue take the time that `params` says.
+/// Moves an ideal device along a path and compares forces. At every `every`-th tick, solves for the
+/// converged force, each from the previous one. Above the first touch, which is `above` (m) under
+/// the device's origin, the force is zero. `params` gives the time that a step of the tissue takes.
 ///
 /// # Errors
-/// When the body cannot be factored, or no converged force is found.
+/// If the body cannot be factored, or no converged force is found.
 pub fn force_while_moving(
     live: &LiveScene,
     above: f64,
@@ -100,11 +103,12 @@ pub fn force_while_moving(
     Ok(rows)
 }
 
-/// Converged quasi-static forces on the tool at places of the device, each found from the one before; N, in the device's
-/// frame. Above the first touch (`above` under the device's origin, m) there is none.
+/// Converged quasi-static forces on the tool at places of the device, N, in the device's frame.
+/// Each is found from the previous one. Above the first touch, which is `above` (m) under the
+/// device's origin, the force is zero.
 ///
 /// # Errors
-/// When at a place no converged force is found.
+/// If no converged force is found at a place.
 pub fn converged_forces(
     live: &LiveScene,
     above: f64,
@@ -122,7 +126,7 @@ pub fn converged_forces(
     places.into_iter().map(force).collect()
 }
 
-/// The body's equilibria, one after the other.
+/// Solves for the body's equilibria, one after the other.
 struct Converged<'a> {
     live: &'a LiveScene,
     state: State,
@@ -140,7 +144,8 @@ impl<'a> Converged<'a> {
         }
     }
 
-    /// Back at rest: without a force there is none of which a share could be out of balance.
+    /// Returns the body to rest. No equilibrium is solved, because a relative residual is not
+    /// defined without forces.
     fn let_go(&mut self) {
         self.state = State::new(&self.live.model);
         self.before = self.live.posed(Vec3::zeros());
@@ -175,7 +180,7 @@ impl<'a> Converged<'a> {
     }
 }
 
-/// Force against time, and the error, of several traces.
+/// Plots force and error against time for several traces.
 pub fn trace_picture(title: &str, traces: &[(&str, Vec<TraceRow>)]) -> Picture {
     let mut charts = Vec::new();
     for (name, rows) in traces {

@@ -1,32 +1,35 @@
-//! How stiff and how damped a wall each simulated device renders without rattling.
+//! Largest stiffness and damping of a wall that each simulated device renders without rattling.
 //!
-//! A wall of one spring and a damper is pressed by 3 mm with the coupling off, in simulated time.
+//! In simulated time, the device presses 3 mm into a wall of one spring and one damper, with the
+//! coupling off.
 
 use palpa_device::{DeviceModel, Grip, z_width};
 use palpa_plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 use serde::Serialize;
 
-/// The hands that hold the devices.
+/// Names and grips of the hands that hold the devices.
 pub const GRIPS: [(&str, Grip); 3] = [
     ("soft", Grip::SOFT),
     ("medium", Grip::MEDIUM),
     ("stiff", Grip::STIFF),
 ];
-/// Least and largest stiffness that is tried, N/m, and the factor from one to the next.
+/// Smallest tested stiffness, N/m.
 const SOFTEST: f64 = 50.0;
+/// Largest tested stiffness, N/m.
 const STIFFEST: f64 = 51_200.0;
+/// Factor from one tested stiffness to the next.
 const FACTOR: f64 = std::f64::consts::SQRT_2;
-/// The border is then halved so often: to 2 %.
+/// Bisections of the last interval, which give the limit to 2 %.
 const HALVINGS: usize = 4;
-/// Dampings that are tried: from none, in shares of the largest that the law asks of the device.
+/// Tested dampings, as shares of the largest damping that the law uses on the device.
 const DAMPING_SHARES: [f64; 9] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0];
 
-/// What is written to `z_width.json`.
+/// Content of `z_width.json`.
 #[derive(Debug, Serialize)]
 pub struct Found {
-    /// Whether it was not interrupted.
+    /// Whether the study is complete; false after an interruption.
     pub is_complete: bool,
-    /// One for each device, hand, observer and damping.
+    /// One row for each combination of device, hand, observer setting and damping.
     pub rows: Vec<WallRow>,
 }
 
@@ -37,17 +40,17 @@ pub struct WallRow {
     pub device: &'static str,
     /// Name of the hand.
     pub grip: &'static str,
-    /// Whether the energy observer injects damping, as in use.
+    /// Whether the energy observer injects damping, as in normal use.
     pub has_observer: bool,
-    /// Damping that the wall has. N s/m
+    /// Damping of the wall, N s/m.
     pub damping: f64,
-    /// All walls that were tried up to this are stable; 0 if none is. N/m
+    /// Stiffness up to which all tested walls are stable, N/m; 0 if none is.
     pub stiffness: f64,
-    /// Whether the stiffest wall that is tried is stable, too.
+    /// Whether the stiffest tested wall is stable too, so that the true limit may be higher.
     pub is_open: bool,
 }
 
-/// Which devices and hands are tried.
+/// Devices and hands to test.
 #[derive(Debug, Clone, Default)]
 pub struct Study {
     /// Names of devices; all if empty.
@@ -67,12 +70,13 @@ impl Study {
         GRIPS.into_iter().filter(|g| is_asked(&self.grips, g.0))
     }
 
-    /// Number of rows that a whole run finds.
+    /// Number of rows of a complete run.
     pub fn n_rows(&self) -> usize {
         self.devices().count() * self.grips().count() * 2 * DAMPING_SHARES.len()
     }
 
-    /// Finds the rows one after the other, as long as `goes_on` says so after each.
+    /// Finds the rows one after the other. Stops when `goes_on`, called before each row, returns
+    /// false.
     pub fn run(&self, mut goes_on: impl FnMut() -> bool) -> Found {
         let mut rows = Vec::with_capacity(self.n_rows());
         'all: for (device, model) in self.devices() {
@@ -107,7 +111,8 @@ fn is_asked(asked: &[String], name: &str) -> bool {
     asked.is_empty() || asked.iter().any(|a| a == name)
 }
 
-/// The stiffness up to which all walls are stable, N/m, and whether that is the stiffest that is tried.
+/// The stiffness up to which all tested walls are stable, N/m, and whether it is the largest tested
+/// one.
 fn largest(model: &DeviceModel, grip: &Grip, damping: f64, has_observer: bool) -> (f64, bool) {
     let is_stable =
         |stiffness| z_width(model, grip, &[stiffness], &[damping], has_observer)[0].is_stable;
@@ -133,7 +138,7 @@ fn largest(model: &DeviceModel, grip: &Grip, damping: f64, has_observer: bool) -
     (stable, false)
 }
 
-/// A chart for each device: below its line a hand is safe.
+/// A chart for each device; walls below the line are stable.
 pub fn picture(rows: &[WallRow]) -> Picture {
     let stable = rows.iter().map(|row| row.stiffness.max(SOFTEST));
     let (low, high) = stable.fold((STIFFEST, SOFTEST), |(low, high), k| {
@@ -182,7 +187,7 @@ pub fn picture(rows: &[WallRow]) -> Picture {
     )
 }
 
-/// The name that a person knows a device by.
+/// Name of a device for people.
 fn title(device: &str) -> &'static str {
     match device {
         "falcon" => "Novint Falcon",

@@ -1,10 +1,10 @@
-//! The layered body: a surface triangulation times levels.
+//! The layered body: the triangulation of a surface, repeated on every level.
 
 use crate::{Surface, Vec3};
 
-/// A body of triangular prisms: every vertex of a skin surface carries a *column* of `n_levels` nodes, from the skin
-/// (level 0) down to the rigid base (the last level). Between two neighbouring levels, over every triangle, stands a
-/// prism; it belongs to the layer of its interval.
+/// A body of triangular prisms. Every vertex of a skin surface carries a *column* of `n_levels`
+/// nodes, from the skin (level 0) down to the rigid base (the last level). A prism fills the space
+/// between two neighbouring levels below a triangle. It belongs to the layer of its interval.
 ///
 /// ```text
 ///        v2                 node (v, l) has the index v * n_levels + l
@@ -19,7 +19,7 @@ use crate::{Surface, Vec3};
 pub struct LayeredBody {
     /// The skin at rest, oriented outward; its points are the nodes of level 0.
     pub skin: Surface,
-    /// Nodes at rest, node-major by column, in metres. `[n_vertices × n_levels]`
+    /// Node positions at rest, column by column, in metres. `[n_vertices × n_levels]`
     pub positions: Vec<Vec3>,
     /// Nodes per column, at least 2.
     pub n_levels: usize,
@@ -27,21 +27,23 @@ pub struct LayeredBody {
     pub interval_layer: Vec<usize>,
     /// Names of the layers, from the skin down.
     pub layer_names: Vec<String>,
-    /// The faces at which the body was cut from the rest: ends of a limb, sides of a block, the rim of a cut-out.
+    /// The cut faces, where the body was cut from the rest: ends of a limb, sides of a block, the
+    /// rim of a cut-out.
     pub cut_faces: Vec<CutFace>,
 }
 
 /// One face at which the body was cut from the rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutFace {
-    /// The skin vertices whose columns lie in the face, along the rim. A corner may belong to two faces.
+    /// The skin vertices whose columns lie in the face, along the rim. A corner may belong to two
+    /// faces.
     pub vertices: Vec<u32>,
-    /// Unit normal pointing out of the body (mean, where the face is not flat).
+    /// Unit normal that points out of the body (the mean normal if the face is not flat).
     pub normal: Vec3,
     /// A point on the face.
     pub point: Vec3,
-    /// Whether the face is a plane, in which the columns stay exactly. If not, it can be free or fixed, but it is no
-    /// plane of symmetry.
+    /// Whether the face is a plane. If so, the columns stay exactly in it. If not, the face can be
+    /// free or fixed, but it cannot be a plane of symmetry.
     pub is_flat: bool,
 }
 
@@ -67,7 +69,8 @@ impl LayeredBody {
         v * self.n_levels + l
     }
 
-    /// The six nodes of the prism under triangle `t` in interval `i`: the upper triangle, then the lower.
+    /// The six nodes of the prism under triangle `t` in interval `i`: the upper triangle, then the
+    /// lower.
     pub fn prism(&self, t: usize, i: usize) -> [usize; 6] {
         let [a, b, c] = self.skin.triangles[t].map(|v| self.node(v as usize, i));
         [a, b, c, a + 1, b + 1, c + 1]

@@ -1,16 +1,20 @@
-//! Distance from points to a surface, and where rays meet it, through an R-tree over the triangles.
+//! Distance from points to a surface, and intersections of rays with it. Both use an R-tree over
+//! the triangles.
 
 use rstar::{AABB, PointDistance, RTree, RTreeObject, SelectionFunction};
 
 use crate::{Surface, Vec3};
 
-/// A surface prepared for distance and ray queries. Building costs `n log n`, a query about `log n`.
+/// A surface prepared for distance and ray queries. Building costs `n log n`, a query about
+/// `log n`.
 #[derive(Debug)]
 pub struct SurfaceIndex {
     tree: RTree<IndexedTriangle>,
-    /// Normals of vertices, weighted by the angles of the triangles: they decide the side where a vertex is closest.
+    /// Vertex normals, weighted by the angles of the triangles. They decide the sign of the
+    /// distance if a vertex is closest.
     vertex_normals: Vec<Vec3>,
-    /// For each directed edge, ascending, the unit normal of its triangle; both of an edge decide the side beside it.
+    /// The unit normal of the triangle at each directed edge, sorted by edge. If an edge is
+    /// closest, the normals of both its directions decide the sign of the distance.
     edge_normals: Vec<([u32; 2], Vec3)>,
 }
 
@@ -19,11 +23,11 @@ pub struct SurfaceIndex {
 pub struct Closest {
     /// The point on the surface.
     pub point: Vec3,
-    /// The triangle that it lies on.
+    /// The triangle that the point lies on.
     pub triangle: u32,
-    /// Shares of its corners in the point.
+    /// Barycentric weights of the point in the triangle's corners.
     pub weights: [f64; 3],
-    /// Distance, negative on the inner side (where the surface is closed and oriented outward). m
+    /// Distance; negative on the inner side (if the surface is closed and oriented outward). m
     pub signed_distance: f64,
 }
 
@@ -50,7 +54,7 @@ impl PointDistance for IndexedTriangle {
 }
 
 impl SurfaceIndex {
-    /// Builds the index. Triangles with corners that are not finite are left out.
+    /// Builds the index. Triangles with a corner that is not finite are left out.
     pub fn build(surface: &Surface) -> Self {
         let triangles = (0..surface.triangles.len())
             .map(|t| IndexedTriangle {
@@ -88,8 +92,9 @@ impl SurfaceIndex {
         })
     }
 
-    /// The vector whose sign against the offset tells the side: the normal of the face, the sum of both faces' normals
-    /// at an edge, the angle-weighted sum at a vertex (Bærentzen and Aanæs 2005).
+    /// The pseudo-normal at the closest point. The sign of its product with the offset tells the
+    /// side. It is the normal of the face, the sum of both faces' normals at an edge, or the
+    /// angle-weighted sum at a vertex (Bærentzen and Aanæs 2005).
     fn pseudo_normal(&self, triangle: &IndexedTriangle, weights: [f64; 3]) -> Vec3 {
         let on: Vec<usize> = (0..3).filter(|&i| weights[i] > 1e-9).collect();
         match on[..] {
@@ -110,7 +115,8 @@ impl SurfaceIndex {
         }
     }
 
-    /// The nearest meeting of the ray `origin + s direction` with the surface at `s > s_min`: `(s, triangle)`.
+    /// The nearest intersection of the ray `origin + s direction` with the surface at `s > s_min`,
+    /// as `(s, triangle)`.
     pub fn ray(&self, origin: Vec3, direction: Vec3, s_min: f64) -> Option<(f64, u32)> {
         let along = RaySelection { origin, direction };
         self.tree
@@ -149,7 +155,7 @@ fn pseudo_normals(surface: &Surface) -> (Vec<Vec3>, Vec<([u32; 2], Vec3)>) {
     (at_vertices, at_edges)
 }
 
-/// Visits the boxes that a ray passes.
+/// Selects the boxes that a ray passes through.
 struct RaySelection {
     origin: Vec3,
     direction: Vec3,
@@ -162,7 +168,8 @@ impl RaySelection {
         for i in 0..3 {
             let (o, d) = (self.origin[i], self.direction[i]);
             if d == 0.0 {
-                // Along the slab: 0/0 on its faces would hide what the ray runs in.
+                // The ray runs parallel to the faces of the slab. 0/0 on a face would lose a box
+                // that the ray runs in.
                 if o < lo[i] || o > hi[i] {
                     return false;
                 }
@@ -172,7 +179,7 @@ impl RaySelection {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        // Rounding must not lose a box that the ray only grazes.
+        // A box that the ray only grazes must not be lost by rounding.
         enter <= leave + 1e-12 * (1.0 + leave.abs())
     }
 }
@@ -186,7 +193,8 @@ impl SelectionFunction<IndexedTriangle> for RaySelection {
     }
 }
 
-/// The point of a triangle closest to `p`, and its barycentric weights. By regions (Ericson 2005, §5.1.5).
+/// The point of a triangle closest to `p`, and its barycentric weights. The method distinguishes
+/// regions (Ericson 2005, §5.1.5).
 fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
@@ -220,17 +228,17 @@ fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, [f64; 3]) {
     }
     let sum = va + vb + vc;
     if sum == 0.0 {
-        return (a, [1.0, 0.0, 0.0]); // a triangle without area: any corner serves
+        return (a, [1.0, 0.0, 0.0]); // a triangle without area: any corner will do
     }
     let (v, w) = (vb / sum, vc / sum);
     (a + ab * v + ac * w, [1.0 - v - w, v, w])
 }
 
-/// How far beyond the edges, in barycentric coordinates, a ray still meets a triangle: through a shared edge or vertex
-/// it must not slip between two.
+/// A ray also meets a triangle if it passes this far outside its edges, in barycentric coordinates.
+/// So it cannot slip through a shared edge or vertex.
 const EDGE: f64 = 1e-6;
 
-/// Ray parameter at which `origin + s direction` passes a triangle (Möller and Trumbore 1997).
+/// Ray parameter at which `origin + s direction` meets a triangle (Möller and Trumbore 1997).
 fn ray_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     let (e1, e2) = (b - a, c - a);
     let h = direction.cross(&e2);
@@ -250,7 +258,8 @@ mod tests {
     use super::*;
     use crate::generate::cylinder;
 
-    /// A closed box with a grid of `n` cells a side, from 0 to 1; rays along an axis meet its vertices and edges.
+    /// A closed box from 0 to 1 with `n` × `n` cells on each face. Rays along an axis meet its
+    /// vertices and edges.
     fn gridded_box(n: u32) -> Surface {
         let mut surface = Surface::default();
         for side in 0..6_usize {
@@ -316,7 +325,7 @@ mod tests {
                 .fold(f64::INFINITY, f64::min);
             let found = index.closest(p).unwrap();
             assert!((found.signed_distance.abs() - nearest).abs() < 1e-15);
-            // The bone is a polygon of 20 sides and more in a circle of 15 mm.
+            // The bone is a polygon with 20 or more sides in a circle of 15 mm radius.
             let radial = p.yz().norm();
             if p.x > 0.002 && p.x < 0.098 && (radial - 0.015).abs() > 4e-4 {
                 assert_eq!(

@@ -1,7 +1,7 @@
-//! Surfaces in, and layered bodies of triangular prisms out.
+//! From surfaces to layered bodies of triangular prisms.
 //!
-//! The modules stand in the order in which data flows: a [`Surface`] is read, checked and repaired, and then grown
-//! inward into a [`LayeredBody`].
+//! The modules are listed in the order of the data flow: a [`Surface`] is read, checked and
+//! repaired, and then grown inward into a [`LayeredBody`].
 
 pub mod body;
 pub mod check;

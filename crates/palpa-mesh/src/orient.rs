@@ -1,30 +1,31 @@
-//! Orientation of triangles: one winding over each part, and outward.
+//! Orientation of triangles: a consistent winding in each part, facing outward.
 
 use serde::Serialize;
 
 use crate::topology::{Side, UnionFind, all_sides, by_edge, has_sides, sides};
 use crate::{Surface, Vec3};
 
-/// Volume under an open sheet, as a share of the volume of a ball of the same area, below which the sheet is
-/// too flat to tell which side is out. A cap of 10° opening is at 0.03; noise on a flat sheet is far below.
+/// Least volume under an open sheet, as a share of the volume of a ball of the same area. Below it,
+/// the sheet is too flat to tell which side is out. A cap of 10° opening is at 0.03; noise on a
+/// flat sheet is far below.
 const LEAST_BULGE: f64 = 1e-3;
 
-/// Triangles and parts that were turned, and those that could not be.
+/// Counts of triangles and parts that were turned, and of those that could not be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct OrientReport {
     /// Triangles that were turned to agree with their neighbours or to face outward.
     pub n_flipped: usize,
-    /// Closed parts that were inside out as a whole.
+    /// Closed parts that faced inward as a whole.
     pub n_inverted_closed: usize,
-    /// Open parts that faced the hollow side as a whole.
+    /// Open parts that faced their hollow side as a whole.
     pub n_inverted_open: usize,
-    /// Open parts too flat to tell which side is out; they were made consistent only.
+    /// Open parts that are too flat to tell which side is out; they were only made consistent.
     pub n_undecided: usize,
-    /// Parts that have but one side, as a Möbius strip has, and so no winding.
+    /// Parts with only one side, such as a Möbius strip; they have no consistent winding.
     pub n_one_sided: usize,
 }
 
-/// A part whose triangles meet pairwise over edges, and how each would have to be turned.
+/// A part whose triangles meet in pairs over edges, and which of its triangles must be turned.
 #[derive(Debug)]
 pub(crate) struct Patch {
     /// Triangles, ascending.
@@ -46,9 +47,9 @@ impl Patch {
     }
 }
 
-/// The patches of a surface: triangles joined over edges that exactly two of them share. Where three or more
-/// meet, nobody knows which two belong together, and no winding is carried across. Triangles without sides
-/// among these are left out.
+/// The patches of a surface: triangles joined over edges that exactly two of them share. If three
+/// or more share an edge, it is unknown which two belong together, so the winding does not carry
+/// over. Triangles that have no side in `sides` are left out.
 pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
     let n = surface.triangles.len();
     let has_sides = has_sides(surface, sides);
@@ -87,7 +88,7 @@ pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
                 .iter()
                 .map(|&t| is_odd[t as usize] == Some(true))
                 .collect();
-            // The majority is taken to be right, so that the fewest triangles turn.
+            // The majority counts as right, so that as few triangles as possible are turned.
             if 2 * is_odd.iter().filter(|&&odd| odd).count() > is_odd.len() {
                 for odd in &mut is_odd {
                     *odd = !*odd;
@@ -104,10 +105,11 @@ pub(crate) fn patches(surface: &Surface, sides: &[Side]) -> Vec<Patch> {
 
 /// Winds every part consistently and outward.
 ///
-/// A closed part is outward when its volume is positive. An open part is closed in thought by a fan over each
-/// of its boundary loops, from the centre of the loop: a limb cut at both ends becomes a limb with caps, and a
-/// sheet faces the side on which it bulges. That is the wrong side for a sheet cut from a hollow (an armpit),
-/// and unknown for a flat one; the report counts both.
+/// A closed part faces outward if its volume is positive. For an open part, the volume is computed
+/// as if each boundary loop were closed by a fan from the centre of the loop: a limb cut at both
+/// ends becomes a limb with caps, and a sheet faces the side on which it bulges. That is the wrong
+/// side for a sheet cut from a hollow (an armpit), and unknown for a flat sheet. The report counts
+/// open parts that were turned, and parts that are too flat.
 pub fn orient(surface: &mut Surface) -> OrientReport {
     let mut report = OrientReport::default();
     for patch in patches(surface, &all_sides(surface)) {
@@ -145,11 +147,11 @@ fn flip(surface: &mut Surface, t: u32) {
     surface.triangles[t as usize].swap(1, 2);
 }
 
-/// Volume and area of some consistently wound triangles, and whether they face outward; `None` where that
-/// is not clear. The triangles are the same afterwards.
+/// Volume and area of some consistently wound triangles, and whether they face outward; `None` if
+/// that is not clear. The triangles are flipped for a test and restored.
 ///
-/// Triangles face inward only if they face outward once they are turned. Where the volume is nothing but
-/// rounding error, both ways may look inward.
+/// Triangles face inward only if they face outward after they are flipped. If the volume is only
+/// rounding error, both windings may seem to face inward.
 pub(crate) fn facing(surface: &mut Surface, triangles: &[u32]) -> (Enclosed, Option<bool>) {
     let shape = Enclosed::of(surface, triangles);
     let mut facing = shape.facing();
@@ -166,15 +168,15 @@ pub(crate) fn facing(surface: &mut Surface, triangles: &[u32]) -> (Enclosed, Opt
     (shape, facing)
 }
 
-/// Volume and area of some triangles, with their boundary loops capped. Triangles that are not finite are left
-/// out.
+/// Volume and area of some triangles, with their boundary loops capped. Triangles with a corner
+/// that is not finite are left out.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Enclosed {
     /// Signed volume, positive when the triangles face outward. m³
     pub(crate) volume: f64,
     /// Area of the triangles, without caps. m²
     pub(crate) area: f64,
-    /// Whether there was nothing to cap.
+    /// Whether there is no boundary loop.
     pub(crate) is_closed: bool,
 }
 
@@ -186,7 +188,8 @@ impl Enclosed {
             .map(|&t| surface.corners(t as usize))
             .filter(is_finite)
             .collect();
-        // Volumes are taken about a point of the part: about a far origin they would be differences of huge numbers.
+        // Volumes are taken about a point of the part. About a far origin, they would be
+        // differences of huge numbers.
         let origin = finite
             .first()
             .map_or_else(Vec3::zeros, |corners| corners[0]);
@@ -213,7 +216,7 @@ impl Enclosed {
         }
     }
 
-    /// Whether the triangles face outward, or `None` where an open part is too flat to say.
+    /// Whether the triangles face outward, or `None` if an open part is too flat to tell.
     fn facing(&self) -> Option<bool> {
         let ball = self.area.powf(1.5) / (6.0 * std::f64::consts::PI.sqrt());
         let is_clear = self.is_closed || self.volume.abs() > LEAST_BULGE * ball;
@@ -221,7 +224,7 @@ impl Enclosed {
     }
 }
 
-/// The sides without a partner in the other direction.
+/// The sides without a partner in the opposite direction.
 pub(crate) fn boundary_sides(sides: &[Side]) -> Vec<Side> {
     by_edge(sides)
         .flat_map(|on_edge| {
@@ -238,8 +241,8 @@ pub(crate) fn boundary_sides(sides: &[Side]) -> Vec<Side> {
         .collect()
 }
 
-/// Boundary sides grouped by common vertices. At the rim of a fin, which ends at an edge of three triangles, a
-/// chain need not close.
+/// Groups boundary sides that are connected over common vertices. A chain need not be closed: the
+/// rim of a fin ends at an edge of three triangles.
 pub(crate) fn chains(boundary: &[Side]) -> Vec<Vec<Side>> {
     let mut at_vertex: Vec<(u32, u32)> = boundary
         .iter()

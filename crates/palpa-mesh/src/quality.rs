@@ -1,15 +1,17 @@
-//! Shape of prisms: Jacobian determinants at corners and quadrature points, and the scaled Jacobian.
+//! Shape of prisms: Jacobian determinants at corners and quadrature points, and the scaled
+//! Jacobian.
 //!
 //! ```text
 //! upper triangle v0 v1 v2 (ζ = 0, towards the skin), lower v3 v4 v5 (ζ = 1)
 //! x(ξ, η, ζ) = Σ N_a(ξ, η, ζ) x_a,  N_a = λ_i (1 − ζ) or λ_i ζ,  λ = (1 − ξ − η, ξ, η)
 //! ```
-//! Seen from outside the skin, v0 v1 v2 run counter-clockwise and ζ points inward, so `det ∂x/∂(ξ, η, ζ)` of a good
-//! prism is *negative*; everything here returns the orientation-corrected, positive value for a good prism.
+//! Seen from outside the skin, v0 v1 v2 run counter-clockwise and ζ points inward, so
+//! `det ∂x/∂(ξ, η, ζ)` of a good prism is *negative*. Everything in this module returns the
+//! sign-corrected value, which is positive for a good prism.
 
 use crate::{LayeredBody, Vec3};
 
-/// Points inside the triangle and in depth at which elements are integrated: 3 × 2.
+/// Quadrature points of an element: 3 in the triangle, times 2 in depth.
 const TRIANGLE_POINTS: [[f64; 2]; 3] = [
     [1.0 / 6.0, 1.0 / 6.0],
     [2.0 / 3.0, 1.0 / 6.0],
@@ -17,18 +19,19 @@ const TRIANGLE_POINTS: [[f64; 2]; 3] = [
 ];
 const DEPTH_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// What the checks say of one prism.
+/// The shape of one prism.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrismShape {
     /// Smallest Jacobian determinant at the six corners and six quadrature points. m³
     pub min_jacobian: f64,
-    /// Smallest scaled Jacobian of the six corners: the determinant divided by the lengths of the three edges that
-    /// meet there, times 2/√3, so that a right prism over an equilateral triangle has 1. Below 0: inverted.
+    /// Smallest scaled Jacobian of the six corners. It is the determinant divided by the lengths of
+    /// the three edges at the corner, times 2/√3, so that a right prism over an equilateral
+    /// triangle has 1. Below 0, the prism is inverted.
     pub scaled_jacobian: f64,
 }
 
 impl PrismShape {
-    /// Measures the prism with corners `x`: upper triangle, then lower.
+    /// Measures the prism with corners `x`: upper triangle, then lower triangle.
     pub fn of(x: &[Vec3; 6]) -> Self {
         let mut min_jacobian = f64::INFINITY;
         let mut scaled = f64::INFINITY;
@@ -51,27 +54,28 @@ impl PrismShape {
                 min_jacobian = min_jacobian.min(jacobian(x, xi, eta, zeta));
             }
         }
-        // The minimum drops NaN: a corner that is not finite must not look fine.
+        // The minimum ignores NaN. A corner that is not finite must not count as good.
         if !x.iter().all(|p| p.iter().all(|c| c.is_finite())) {
             return Self {
                 min_jacobian: f64::NAN,
                 scaled_jacobian: -1.0,
             };
         }
-        // A right prism over a flat triangle can exceed 1 by rounding or by an obtuse corner elsewhere.
+        // The value is limited to 1: a right prism over a flat triangle can exceed it, by rounding
+        // or by an obtuse corner.
         Self {
             min_jacobian,
             scaled_jacobian: scaled.clamp(-1.0, 1.0),
         }
     }
 
-    /// Whether every determinant is positive (NaN is not).
+    /// Whether every determinant is positive. NaN is not valid.
     pub fn is_valid(&self) -> bool {
         self.min_jacobian > 0.0
     }
 }
 
-/// Orientation-corrected determinant of the prism's map at a point.
+/// Sign-corrected determinant of the prism's map at a point.
 fn jacobian(x: &[Vec3; 6], xi: f64, eta: f64, zeta: f64) -> f64 {
     let lambda = [1.0 - xi - eta, xi, eta];
     let d_xi = (x[1] - x[0]) * (1.0 - zeta) + (x[4] - x[3]) * zeta;
@@ -80,7 +84,8 @@ fn jacobian(x: &[Vec3; 6], xi: f64, eta: f64, zeta: f64) -> f64 {
     -d_xi.cross(&d_eta).dot(&d_zeta)
 }
 
-/// The shapes of all prisms at the given node positions, triangle by triangle, intervals inside. `[n_prisms]`
+/// The shapes of all prisms at the given node positions, ordered by triangle, then by interval.
+/// `[n_prisms]`
 ///
 /// # Panics
 /// If `positions` does not hold one point per node.

@@ -1,4 +1,4 @@
-//! Repair of the defects that can be repaired without guessing. The others stay, for the check to report.
+//! Repair of defects that need no guessing. All other defects stay, and the check reports them.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -9,27 +9,28 @@ use crate::topology::{all_sides, by_edge, has_repeated_vertex};
 use crate::weld::weld_within;
 use crate::{Surface, Vec3};
 
-/// Default weld tolerance, as a share of the diagonal of the bounding box. It is 0.3 µm on a forearm: far
-/// below the detail of a skin and far above the rounding of coordinates written with seven digits.
+/// Default weld tolerance, as a share of the diagonal of the bounding box. It is 0.3 µm on a
+/// forearm: far below the detail of a skin, and far above the rounding of coordinates written with
+/// seven digits.
 pub const DEFAULT_WELD_TOLERANCE: f64 = 1e-6;
 
-/// Height of a triangle over its longest edge, as a share of that edge, below which it counts as flat. Its
-/// normal would be rounding error.
+/// Ratio of a triangle's height to its longest edge below which it counts as flat. Its normal would
+/// be rounding error.
 pub(crate) const FLAT_HEIGHT: f64 = 1e-9;
 
-/// Offset of the centre of the bounding box from the origin, as a share of the diagonal, up to which a
-/// surface counts as centred. Moving it by less would only round its coordinates.
+/// Largest offset of the bounding box's centre from the origin, as a share of the diagonal, at
+/// which a surface counts as centred. A smaller move would only round its coordinates.
 const CENTRED: f64 = 1e-9;
 
-/// Moves to the origin at most. Each but the first only makes up for the rounding of the one before,
-/// so two are enough for any coordinates that resolve the body.
+/// Largest number of moves to the origin. Each move after the first only corrects the rounding of
+/// the one before. Two are enough for any coordinates that resolve the body.
 const MAX_MOVES: usize = 8;
 
 /// Options of a repair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepairOptions {
-    /// Distance up to which vertices are welded, as a share of the diagonal of the bounding box. 0 welds
-    /// only vertices with exactly the same coordinates.
+    /// Distance up to which vertices are welded, as a share of the diagonal of the bounding box. 0
+    /// welds only vertices with exactly the same coordinates.
     pub weld_tolerance: f64,
     /// Whether to move the centre of the bounding box to the origin.
     pub recentre: bool,
@@ -47,15 +48,16 @@ impl Default for RepairOptions {
 /// Counts of the changes that a repair made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct RepairReport {
-    /// Vertices that were merged into another.
+    /// Number of vertices that were merged into another.
     pub n_welded: usize,
-    /// Triangles with a repeated vertex or without area that were dropped, or resolved by turning an edge.
+    /// Number of triangles with a repeated vertex or without area. They were dropped, or resolved
+    /// by flipping an edge.
     pub n_degenerate: usize,
-    /// Triangles dropped because another has the same three vertices.
+    /// Number of triangles dropped because another has the same three vertices.
     pub n_duplicate: usize,
-    /// Vertices dropped because no triangle uses them.
+    /// Number of vertices dropped because no triangle uses them.
     pub n_unused: usize,
-    /// Triangles and parts that were turned.
+    /// Changes of orientation.
     pub orientation: OrientReport,
     /// Vector added to every point, if the surface was recentred. m
     pub moved_by: Option<[f64; 3]>,
@@ -68,8 +70,8 @@ impl RepairReport {
         n + self.orientation.n_flipped > 0 || self.moved_by.is_some()
     }
 
-    /// Adds the changes of a later repair of the same surface. The parts that cannot be turned are those of
-    /// the later one.
+    /// Adds the changes of a later repair of the same surface. The counts of parts that cannot be
+    /// turned come from the later repair.
     fn add(&mut self, later: &Self) {
         self.n_welded += later.n_welded;
         self.n_degenerate += later.n_degenerate;
@@ -84,18 +86,18 @@ impl RepairReport {
     }
 }
 
-/// A repaired copy: vertices welded, duplicate triangles and triangles without area dropped, winding
-/// made consistent and outward (see [`orient`]), unused vertices dropped.
+/// A repaired copy: vertices welded, duplicate triangles and triangles without area dropped,
+/// winding made consistent and outward (see [`orient`]), unused vertices dropped.
 ///
-/// Holes, edges of three and more triangles, self-intersections and vertices that are not finite stay:
-/// whether to fill, cut or move is not for us to guess. So do the flat triangles that cannot be
+/// Holes, edges with three or more triangles, self-intersections and vertices that are not finite
+/// stay, because filling, cutting or moving would be a guess. Flat triangles stay if they cannot be
 /// resolved without damage to their neighbours.
 ///
-/// A repaired surface needs no second repair: `repair` gives it back as it is and reports no change.
+/// A repaired surface needs no second repair: `repair` returns it unchanged and reports no change.
 pub fn repair(surface: &Surface, options: &RepairOptions) -> (Surface, RepairReport) {
     let (mut surface, mut report) = mend(surface.clone(), options);
     if options.recentre {
-        // Moving rounds the coordinates. A triangle that was nearly flat may be flat afterwards.
+        // Moving rounds the coordinates. A nearly flat triangle may then be flat.
         for _ in 0..MAX_MOVES {
             let Some(shift) = recentre(&mut surface) else {
                 break;
@@ -110,14 +112,15 @@ pub fn repair(surface: &Surface, options: &RepairOptions) -> (Surface, RepairRep
     (surface, report)
 }
 
-/// The repair without the move. Each step leaves nothing to do for the steps before it, in this call and
-/// in the next one:
+/// The repair without the move. No step creates work for the steps before it, neither in this call
+/// nor in the next:
 ///
-/// - Unused vertices go before welding. Otherwise one of them could take the place of a used vertex,
-///   widen the bounding box, and with it the tolerance.
-/// - Duplicates go before flat triangles. Otherwise a flat triangle and its double would keep each other.
-/// - Resolving flat triangles makes no duplicates.
-/// - Which triangles are flat does not depend on how they are wound.
+/// - Unused vertices go before welding. Otherwise an unused vertex could replace a used one, or
+///   widen the bounding box and so the tolerance.
+/// - Duplicates go before flat triangles. Otherwise a flat triangle and its double would keep each
+///   other.
+/// - Resolving flat triangles creates no duplicates.
+/// - Whether a triangle is flat does not depend on its winding.
 fn mend(mut surface: Surface, options: &RepairOptions) -> (Surface, RepairReport) {
     let n_loose = drop_unused(&mut surface);
     let tolerance = options.weld_tolerance * used_bounds(&surface).map_or(0.0, diagonal);
@@ -143,7 +146,7 @@ fn mend(mut surface: Surface, options: &RepairOptions) -> (Surface, RepairReport
     (surface, report)
 }
 
-/// The diagonal of a box. Its square may overflow where the box itself does not.
+/// Length of the diagonal of a box. Its square may overflow even if the box itself does not.
 fn diagonal((lo, hi): (Vec3, Vec3)) -> f64 {
     let extent = hi - lo;
     let diagonal = extent.norm();
@@ -170,10 +173,10 @@ pub(crate) fn used_bounds(surface: &Surface) -> Option<(Vec3, Vec3)> {
     )
 }
 
-/// The way in which a triangle has no area.
+/// Why a triangle has no area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flaw {
-    /// A vertex stands in it twice.
+    /// The same vertex occurs twice.
     RepeatedVertex,
     /// Its corners lie on one line.
     Flat {
@@ -182,7 +185,8 @@ pub(crate) enum Flaw {
     },
 }
 
-/// The flaw of a triangle, if it has one. A triangle with a corner that is not finite has none of these.
+/// The flaw of a triangle, if it has one. A triangle with a corner that is not finite has neither
+/// flaw.
 pub(crate) fn flaw(surface: &Surface, t: usize) -> Option<Flaw> {
     if has_repeated_vertex(surface.triangles[t]) {
         return Some(Flaw::RepeatedVertex);
@@ -193,7 +197,7 @@ pub(crate) fn flaw(surface: &Surface, t: usize) -> Option<Flaw> {
         (c - b).norm_squared(),
         (a - c).norm_squared(),
     ];
-    // Sides of one length are told apart by their vertices, so that the winding makes no difference.
+    // Sides of equal length are ordered by their vertices, so that the winding makes no difference.
     let opposite = |side: usize| surface.triangles[t][(side + 2) % 3];
     let longest = (0..3).max_by(|&i, &j| {
         let by_length = length_sq[i].total_cmp(&length_sq[j]);
@@ -204,12 +208,12 @@ pub(crate) fn flaw(surface: &Surface, t: usize) -> Option<Flaw> {
     (is_flat && length_sq[longest].is_finite()).then_some(Flaw::Flat { longest })
 }
 
-/// Resolves flat triangles until no more can be; returns how many times it dropped or turned one.
-/// There must be no duplicates and no repeated vertices.
+/// Resolves flat triangles until none can be resolved any more. Returns how many times it dropped a
+/// triangle or flipped an edge. There must be no duplicates and no repeated vertices.
 ///
-/// A flat triangle that its neighbour over the longest side needs to stay connected to the rest is not
-/// dropped, which would leave a slit: the longest side is turned instead, so that the neighbour is split
-/// at the middle corner.
+/// A neighbour over the longest side may need a flat triangle to stay connected to the rest.
+/// Dropping the triangle would then leave a slit. Instead, the longest side is flipped, so that the
+/// neighbour is split at the middle corner.
 ///
 /// ```text
 ///        far                far
@@ -238,21 +242,21 @@ fn resolve_flat(surface: &mut Surface) -> usize {
     n
 }
 
-/// The triangles while flat ones are resolved.
+/// The state while flat triangles are resolved.
 ///
-/// It ends, because each change makes one of these less, and those before it no more: the number of
-/// triangles, the number of flat ones, the lengths of the sides that are turned.
+/// The process ends because each change reduces the first of these quantities that it changes: the
+/// number of triangles, the number of flat triangles, the lengths of the sides that are flipped.
 struct FlatTriangles<'a> {
     surface: &'a mut Surface,
     /// The triangles on each edge, smaller vertex first.
     on_edge: BTreeMap<[u32; 2], Vec<u32>>,
-    /// Whether each triangle is no longer there. `[n_triangles]`
+    /// Whether each triangle was dropped. `[n_triangles]`
     is_dropped: Vec<bool>,
-    /// Triangles to look at, first come first served.
+    /// Triangles to process, first in, first out.
     queue: VecDeque<u32>,
     /// Whether each triangle is in the queue. `[n_triangles]`
     is_queued: Vec<bool>,
-    /// Flat triangles that cannot be resolved while an edge is there.
+    /// Flat triangles that cannot be resolved while a certain edge exists, by that edge.
     waiting: BTreeMap<[u32; 2], Vec<u32>>,
 }
 
@@ -288,7 +292,8 @@ impl<'a> FlatTriangles<'a> {
         matches!(flaw(self.surface, t as usize), Some(Flaw::Flat { .. }))
     }
 
-    /// Drops or turns a triangle, if it is flat and can be; returns whether it did.
+    /// Drops a flat triangle or flips its longest side, if that is possible. Returns whether it
+    /// did.
     fn resolve(&mut self, t: u32) -> bool {
         if self.is_dropped[t as usize] {
             return false;
@@ -296,7 +301,7 @@ impl<'a> FlatTriangles<'a> {
         let Some(Flaw::Flat { longest }) = flaw(self.surface, t as usize) else {
             return false;
         };
-        // a → b is the longest side, m the corner between its ends.
+        // a → b is the longest side, and m the corner opposite it.
         let [a, b, m] = [0, 1, 2].map(|k| self.surface.triangles[t as usize][(longest + k) % 3]);
         let on_longest = &self.on_edge[&edge(a, b)];
         let &[first, second] = &on_longest[..] else {
@@ -319,11 +324,13 @@ impl<'a> FlatTriangles<'a> {
         self.turn([t, o], [a, b], [m, far])
     }
 
-    /// Turns the side a–b between a flat triangle `t` and its neighbour `o` into m–far, if that leaves fewer
-    /// flat triangles, or as many with a shorter side; returns whether it did.
+    /// Flips the side a–b between a flat triangle `t` and its neighbour `o` to m–far. It does so
+    /// only if this leaves fewer flat triangles, or the same number and a shorter side. Returns
+    /// whether it did.
     fn turn(&mut self, [t, o]: [u32; 2], [a, b]: [u32; 2], [m, far]: [u32; 2]) -> bool {
         let before = [t, o].map(|t| self.surface.triangles[t as usize]);
-        // The neighbour keeps its winding: each half is the neighbour with one end of the side moved to m.
+        // The neighbour keeps its winding: each half is the neighbour with one end of the side
+        // replaced by m.
         let moved = |from: u32| before[1].map(|v| if v == from { m } else { v });
         let after = [moved(b), moved(a)];
         self.put([t, o], after);
@@ -349,7 +356,7 @@ impl<'a> FlatTriangles<'a> {
         }
     }
 
-    /// Takes a triangle off its edges. All that this may help is to be looked at again.
+    /// Removes a triangle from its edges. All triangles that this may help are queued again.
     fn unlink(&mut self, t: u32) {
         for edge in edges(self.surface.triangles[t as usize]) {
             let Some(on_edge) = self.on_edge.get_mut(&edge) else {
@@ -367,7 +374,7 @@ impl<'a> FlatTriangles<'a> {
         }
     }
 
-    /// Puts a triangle on its edges, to be looked at with its neighbours.
+    /// Adds a triangle to its edges, and queues it and its neighbours.
     fn link(&mut self, t: u32) {
         for edge in edges(self.surface.triangles[t as usize]) {
             let on_edge = self.on_edge.entry(edge).or_default();
@@ -401,8 +408,8 @@ fn drop_duplicates(surface: &mut Surface) -> usize {
     doubles.len()
 }
 
-/// Triangles with the same three vertices as an earlier one, as pairs (the first, the double). Those with a repeated vertex are
-/// flawed already and left out.
+/// Triangles with the same three vertices as an earlier one, as pairs (the first, the double).
+/// Triangles with a repeated vertex have a flaw already and are left out.
 pub(crate) fn duplicates(surface: &Surface) -> Vec<(u32, u32)> {
     let mut keys: Vec<([u32; 3], u32)> = surface
         .triangles
@@ -424,7 +431,8 @@ pub(crate) fn duplicates(surface: &Surface) -> Vec<(u32, u32)> {
     doubles
 }
 
-/// Drops the vertices that no triangle uses; the others keep their order. Returns how many.
+/// Drops the vertices that no triangle uses. The others keep their order. Returns how many were
+/// dropped.
 pub(crate) fn drop_unused(surface: &mut Surface) -> usize {
     let is_used = crate::topology::is_used(surface);
     let mut n_kept = 0;
@@ -444,10 +452,11 @@ pub(crate) fn drop_unused(surface: &mut Surface) -> usize {
     n_unused
 }
 
-/// Moves the centre of the bounding box to the origin; `None` if it is there. m
+/// Moves the centre of the bounding box to the origin. Returns the shift, or `None` if the centre
+/// is already there. m
 fn recentre(surface: &mut Surface) -> Option<Vec3> {
     let (lo, hi) = used_bounds(surface)?;
-    // Halves are added, because the sum of two large coordinates may overflow.
+    // The halves are added because the sum of two large coordinates may overflow.
     let shift = -(lo * 0.5 + hi * 0.5);
     if shift.amax() <= CENTRED * diagonal((lo, hi)) {
         return None;

@@ -1,12 +1,13 @@
-//! A triangle surface: points and triangles, nothing more.
+//! A triangle surface: points and triangles only.
 
 use std::collections::BTreeMap;
 
 use crate::Vec3;
 
-/// A triangle mesh. Counter-clockwise triangles seen from outside make its normals point outward.
+/// A triangle mesh. The triangles are counter-clockwise seen from outside, so that the normals
+/// point outward.
 ///
-/// Nothing is promised about its topology: what is wrong with it, a check finds.
+/// The topology may have any defect; [`check_surface`](crate::check::check_surface) finds them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Surface {
     /// Vertices, in metres. `[n_vertices]`
@@ -21,15 +22,17 @@ impl Surface {
         self.triangles[t].map(|v| self.points[v as usize])
     }
 
-    /// The area vector of triangle `t`: half the cross product of its edges, along its outward normal. m²
+    /// The area vector of triangle `t`: half the cross product of its edges, along its outward
+    /// normal. m²
     pub fn area_vector(&self, t: usize) -> Vec3 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(&(c - a)) * 0.5
     }
 
-    /// Unit vertex normals, weighted by the area of the triangles around each vertex. `[n_vertices]`
+    /// Unit vertex normals, weighted by the area of the triangles around each vertex.
+    /// `[n_vertices]`
     ///
-    /// A vertex of no triangle, or one whose triangles cancel, gets the zero vector.
+    /// A vertex without triangles, or with triangles whose normals cancel, gets the zero vector.
     pub fn vertex_normals(&self) -> Vec<Vec3> {
         let mut normals = vec![Vec3::zeros(); self.points.len()];
         for (t, triangle) in self.triangles.iter().enumerate() {
@@ -46,7 +49,8 @@ impl Surface {
         normals
     }
 
-    /// Every edge once, as `(smaller, larger)` vertex pair in ascending order.
+    /// Every edge once, as a vertex pair with the smaller index first. The pairs are in ascending
+    /// order.
     pub fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges: Vec<[u32; 2]> = self
             .triangles
@@ -59,9 +63,11 @@ impl Surface {
         edges
     }
 
-    /// The directed edges that have no partner in the opposite direction, chained into closed loops of vertices.
+    /// Closed loops of vertices along the boundary. The boundary is the set of directed edges
+    /// without a partner in the opposite direction.
     ///
-    /// Loops run as their triangles do. Edges that do not close (at non-manifold vertices) are left out.
+    /// Loops have the direction of their triangles. Edges that form no closed loop (at non-manifold
+    /// vertices) are left out.
     pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
         let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         let mut directed: Vec<[u32; 2]> = self
@@ -100,7 +106,7 @@ impl Surface {
         loops
     }
 
-    /// A copy with every coordinate times `factor`, as from millimetres to metres by 0.001.
+    /// A copy with every coordinate multiplied by `factor`; 0.001 converts millimetres to metres.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
@@ -109,7 +115,7 @@ impl Surface {
         }
     }
 
-    /// Smallest and largest coordinates, or `None` without points.
+    /// Smallest and largest coordinates, or `None` if there are no points.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.points.first()?;
         Some(
@@ -119,7 +125,7 @@ impl Surface {
         )
     }
 
-    /// Mean edge length, in metres; 0 without edges.
+    /// Mean edge length, in metres; 0 if there are no edges.
     pub fn mean_edge_length(&self) -> f64 {
         let edges = self.edges();
         if edges.is_empty() {

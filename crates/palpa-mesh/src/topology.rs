@@ -1,4 +1,4 @@
-//! Who meets whom: edges with the triangles on them, connected parts.
+//! Connectivity: edges with the triangles on them, and connected parts.
 
 use crate::Surface;
 
@@ -7,22 +7,22 @@ use crate::Surface;
 pub(crate) struct Side {
     /// The edge, smaller vertex first.
     pub(crate) edge: [u32; 2],
-    /// The triangle it belongs to.
+    /// The triangle that it belongs to.
     pub(crate) triangle: u32,
-    /// Whether the triangle walks it from the smaller vertex to the larger.
+    /// Whether the triangle has it in the direction from the smaller vertex to the larger.
     pub(crate) is_forward: bool,
 }
 
 impl Side {
-    /// The vertices in the order in which the triangle walks them.
+    /// The vertices in the direction in which the triangle has them.
     pub(crate) fn directed(self) -> [u32; 2] {
         let [a, b] = self.edge;
         if self.is_forward { [a, b] } else { [b, a] }
     }
 }
 
-/// The sides of some triangles, sorted, so that the sides on one edge stand together. Triangles with a repeated vertex are
-/// left out: they have no inside to which a side could belong.
+/// The sides of some triangles, sorted so that the sides on one edge are consecutive. Triangles
+/// with a repeated vertex are left out, because they enclose no area.
 pub(crate) fn sides(surface: &Surface, triangles: impl Iterator<Item = u32>) -> Vec<Side> {
     let mut sides: Vec<Side> = triangles
         .filter(|&t| !has_repeated_vertex(surface.triangles[t as usize]))
@@ -39,7 +39,7 @@ pub(crate) fn sides(surface: &Surface, triangles: impl Iterator<Item = u32>) -> 
     sides
 }
 
-/// Whether a triangle names a vertex twice.
+/// Whether the same vertex occurs twice in a triangle.
 pub(crate) fn has_repeated_vertex([a, b, c]: [u32; 3]) -> bool {
     a == b || b == c || c == a
 }
@@ -49,12 +49,12 @@ pub(crate) fn all_sides(surface: &Surface) -> Vec<Side> {
     sides(surface, 0..surface.triangles.len() as u32)
 }
 
-/// The sides, edge by edge.
+/// The sides, grouped by edge.
 pub(crate) fn by_edge(sides: &[Side]) -> impl Iterator<Item = &[Side]> {
     sides.chunk_by(|a, b| a.edge == b.edge)
 }
 
-/// Sets of things numbered from 0, joined pair by pair.
+/// Disjoint sets of items numbered from 0, which can be joined in pairs.
 #[derive(Debug)]
 pub(crate) struct UnionFind {
     parent: Vec<u32>,
@@ -107,7 +107,7 @@ pub(crate) fn is_used(surface: &Surface) -> Vec<bool> {
     is_used
 }
 
-/// Whether each triangle has sides among these. `[n_triangles]`
+/// Whether each triangle has a side in `sides`. `[n_triangles]`
 pub(crate) fn has_sides(surface: &Surface, sides: &[Side]) -> Vec<bool> {
     let mut has_sides = vec![false; surface.triangles.len()];
     for side in sides {
@@ -116,7 +116,8 @@ pub(crate) fn has_sides(surface: &Surface, sides: &[Side]) -> Vec<bool> {
     has_sides
 }
 
-/// The triangles of each part that hangs together over edges. Triangles that have no sides among these are left out.
+/// The triangles of each connected part; triangles are connected over edges. Triangles without a
+/// side in `sides` are left out.
 pub(crate) fn components(surface: &Surface, sides: &[Side]) -> Vec<Vec<u32>> {
     let mut sets = UnionFind::new(surface.triangles.len());
     for on_edge in by_edge(sides) {

@@ -1,4 +1,4 @@
-//! Welding: vertices at one place become one vertex.
+//! Welding: vertices at the same place become one vertex.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -8,15 +8,17 @@ use crate::{Surface, Vec3};
 /// A welded surface, and the new index of each old vertex.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Welded {
-    /// The surface with one vertex per place; triangles keep their order and may have become degenerate.
+    /// The surface with one vertex per place. Triangles keep their order; some may be degenerate
+    /// now.
     pub surface: Surface,
     /// The new index of each old vertex. `[n_vertices before]`
     pub new_index: Vec<u32>,
 }
 
-/// Makes one vertex of those with exactly the same coordinates. It takes the place of the first in the order.
+/// Merges vertices with exactly the same coordinates. The first of them keeps its place in the
+/// order.
 ///
-/// Vertices that are not finite stay apart: their places are unknown.
+/// Vertices that are not finite are not merged, because their places are unknown.
 pub fn weld_exact(surface: &Surface) -> Welded {
     let mut seen: HashMap<[u64; 3], u32> = HashMap::with_capacity(surface.points.len());
     weld(surface, |p, candidate, _| {
@@ -24,7 +26,8 @@ pub fn weld_exact(surface: &Surface) -> Welded {
     })
 }
 
-/// The index of a point with exactly these coordinates, or `None` and `candidate` is put there.
+/// The index of the point with exactly these coordinates. If there is none, records `candidate` for
+/// them and returns `None`.
 fn at_same_place(seen: &mut HashMap<[u64; 3], u32>, p: &Vec3, candidate: u32) -> Option<u32> {
     match seen.entry(exact_key(p)) {
         Entry::Occupied(entry) => Some(*entry.get()),
@@ -35,24 +38,25 @@ fn at_same_place(seen: &mut HashMap<[u64; 3], u32>, p: &Vec3, candidate: u32) ->
     }
 }
 
-/// Tolerances from the origin up to which points are sorted into cells. A whole number beyond has no
-/// neighbours as `f64`.
+/// Largest distance from the origin, in tolerances, at which points are sorted into cells. Beyond
+/// it, an `f64` cannot represent neighbouring whole numbers.
 const END_OF_GRID: f64 = 9007199254740992.0;
 
-/// Makes one vertex of those within `tolerance` (in the unit of the points) of the first of them, which stays
-/// where it is. So no vertex moves by more than the tolerance, whatever chains there are, and the vertices that
-/// are kept are further apart than the tolerance.
+/// Merges each vertex with the first vertex within `tolerance` of it (in the unit of the points).
+/// The first vertex stays where it is. So no vertex moves by more than the tolerance, even in a
+/// chain of close vertices, and the remaining vertices are further apart than the tolerance.
 pub fn weld_within(surface: &Surface, tolerance: f64) -> Welded {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return weld_exact(surface);
     }
-    // Cells of two tolerances: all that is near lies in this cell or one of its 26 neighbours, even where
-    // dividing rounds by half a cell.
+    // Cells of two tolerances: all points within the tolerance lie in this cell or one of its 26
+    // neighbours, even if the division is off by half a cell.
     let cell_of = |p: &Vec3| p.map(|x| (x / tolerance / 2.0).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(surface.points.len());
     let mut far: HashMap<[u64; 3], u32> = HashMap::new();
     weld(surface, |p, candidate, kept| {
-        // Out there the tolerance is finer than the points are, and all of them would crowd into the last cell.
+        // So far out, the tolerance is finer than the spacing of `f64`, and all points would fall
+        // into the last cell.
         if p.amax() / tolerance > END_OF_GRID {
             return at_same_place(&mut far, p, candidate);
         }
@@ -72,7 +76,8 @@ pub fn weld_within(surface: &Surface, tolerance: f64) -> Welded {
     })
 }
 
-/// Walks the points in order and keeps each for which `find(point, its index if kept, points kept so far)` knows none.
+/// Visits the points in order. Keeps a point if
+/// `find(point, its index if kept, points kept so far)` returns `None`.
 fn weld(surface: &Surface, mut find: impl FnMut(&Vec3, u32, &[Vec3]) -> Option<u32>) -> Welded {
     let mut points: Vec<Vec3> = Vec::new();
     let new_index: Vec<u32> = surface
@@ -99,7 +104,7 @@ fn weld(surface: &Surface, mut find: impl FnMut(&Vec3, u32, &[Vec3]) -> Option<u
     }
 }
 
-/// The bits of the coordinates, with −0 as 0.
+/// The bits of the coordinates; −0 counts as 0.
 fn exact_key(p: &Vec3) -> [u64; 3] {
     [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())
 }
@@ -151,7 +156,7 @@ mod tests {
 
     #[test]
     fn far_points_do_not_crowd_into_one_cell() {
-        // Compared pair by pair these would take 10¹⁰ steps.
+        // Comparing these pair by pair would take 10¹⁰ steps.
         let points = (0..100_000).map(|i| Vec3::new(1e300 + 1e290 * f64::from(i), 0.0, 0.0));
         let surface = Surface {
             points: points.collect(),

@@ -1,4 +1,4 @@
-//! Surfaces out: OBJ, PLY, OFF and STL.
+//! Writing of surfaces: OBJ, PLY, OFF and STL.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -6,33 +6,35 @@ use std::path::{Path, PathBuf};
 
 use crate::{Format, Surface};
 
-/// Why a surface could not be written.
+/// Reason why a surface could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The extension names no format that is written.
+    /// The extension does not name a format that can be written.
     #[error("{}: surfaces are written as .obj, .ply, .off or .stl; choose one of these", path.display())]
     UnknownFormat {
-        /// What was named.
+        /// The path that was given.
         path: PathBuf,
     },
-    /// The folder is not there, or the disk is full, or the like.
+    /// For example, the folder does not exist or the disk is full.
     #[error("cannot write {}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
 }
 
-/// Writes a surface in the format of the extension: OBJ and OFF as text and PLY as binary, in `f64` and so without loss;
-/// STL as binary, which rounds to `f32` and repeats each vertex for each triangle.
+/// Writes a surface in the format of the extension. OBJ and OFF are written as text and PLY as
+/// binary, in `f64` and so without loss. STL is written as binary, which rounds to `f32` and
+/// repeats each vertex for each triangle.
 ///
-/// The file appears whole or not at all: it is written beside its place under another name, and then renamed.
+/// The file is either complete or absent: it is written under another name in the same folder, and
+/// then renamed.
 ///
 /// # Errors
-/// When the extension is none of these, or the file cannot be written.
+/// When the extension is none of these, or when the file cannot be written.
 pub fn write_surface(path: &Path, surface: &Surface) -> Result<(), WriteError> {
     let extension = path
         .extension()
@@ -51,12 +53,12 @@ pub fn write_surface(path: &Path, surface: &Surface) -> Result<(), WriteError> {
     })
 }
 
-/// Fills a new file beside `path` and puts it in its place. What was there before stays until then.
+/// Writes a new file beside `path` and renames it to `path`. An existing file stays until then.
 fn write_whole(path: &Path, fill: impl Fn(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let (file, beside) = create_beside(path)?;
     let written = fill_and_close(file, fill).and_then(|()| fs::rename(&beside, path));
     if written.is_err() {
-        // The reason for the failure matters more than a failure to tidy up after it.
+        // The original error matters more than an error while cleaning up.
         let _ = fs::remove_file(&beside);
     }
     written
@@ -70,7 +72,7 @@ fn fill_and_close(file: File, fill: impl Fn(&mut dyn Write) -> io::Result<()>) -
         .sync_all()
 }
 
-/// A new file whose name nobody else has, in the folder of `path`.
+/// Creates a new file with an unused name in the folder of `path`.
 fn create_beside(path: &Path) -> io::Result<(File, PathBuf)> {
     const TRIES: u32 = 100;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -91,7 +93,7 @@ fn create_beside(path: &Path) -> io::Result<(File, PathBuf)> {
 
 fn write_obj(surface: &Surface, out: &mut dyn Write) -> io::Result<()> {
     for p in &surface.points {
-        // The shortest digits that read back as the same number.
+        // `{}` writes the shortest digits that read back as the same number.
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
     }
     for t in &surface.triangles {

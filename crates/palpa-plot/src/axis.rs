@@ -1,4 +1,4 @@
-//! Axes: from values to places along them, and where the ticks are.
+//! Axes: they map values to places and choose the ticks.
 
 /// One axis of a chart.
 #[derive(Debug, Clone)]
@@ -10,7 +10,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis over the range of the data; write the unit into the label: `force [N]`.
+    /// A linear axis over the range of the data. Write the unit into the label: `force [N]`.
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -20,7 +20,7 @@ impl Axis {
         }
     }
 
-    /// A decimal logarithmic axis; values that are not positive are left out of the chart.
+    /// A decimal logarithmic axis. The chart leaves out values that are not positive.
     pub fn log(label: impl Into<String>) -> Self {
         Self {
             is_log: true,
@@ -28,26 +28,26 @@ impl Axis {
         }
     }
 
-    /// Shows exactly this range instead of that of the data.
+    /// Shows exactly this range instead of the range of the data.
     #[must_use]
     pub fn with_range(mut self, from: f64, to: f64) -> Self {
         self.range = Some([from, to]);
         self
     }
 
-    /// Shows 0 whatever the data (linear axes).
+    /// Always includes 0 in the range (linear axes only).
     #[must_use]
     pub fn with_zero(mut self) -> Self {
         self.includes_zero = true;
         self
     }
 
-    /// Whether a value has a place on this axis.
+    /// Whether this axis can show a value.
     pub(super) fn shows(&self, value: f64) -> bool {
         value.is_finite() && (!self.is_log || value > 0.0)
     }
 
-    /// Fits the axis to data. `is_loose` widens it to whole ticks.
+    /// Fits the axis to data. If `is_loose`, the range is widened to whole ticks.
     pub(super) fn fit(
         &self,
         values: impl Iterator<Item = f64>,
@@ -82,16 +82,17 @@ pub(super) struct Fit {
     lo: f64,
     hi: f64,
     is_log: bool,
-    /// Value and label.
+    /// Value and label of each tick.
     pub(super) ticks: Vec<(f64, String)>,
     /// Values of fainter grid lines (logarithmic axes).
     pub(super) minor: Vec<f64>,
-    /// The power of ten that all labels are to be multiplied by, 0 for none.
+    /// The common power of ten of all tick labels: a value is its label times 10 to this power. 0
+    /// for no common power.
     pub(super) exponent: i32,
 }
 
 impl Fit {
-    /// Where `value` lies between the ends, 0 to 1 inside.
+    /// Position of `value` between the ends of the axis: 0 to 1 inside the range.
     pub(super) fn place(&self, value: f64) -> f64 {
         if self.is_log {
             (value / self.lo).ln() / (self.hi / self.lo).ln()
@@ -101,7 +102,8 @@ impl Fit {
     }
 
     fn linear(mut lo: f64, mut hi: f64, n_ticks: f64, widen: bool) -> Self {
-        // A constant gets room on both sides; a range below rounding is a constant.
+        // Constant data get room on both sides. A range below the rounding error counts as
+        // constant.
         let size = lo.abs().max(hi.abs());
         if hi - lo <= 1e-12 * size || hi <= lo {
             let room = if size > 0.0 { 0.1 * size } else { 1.0 };
@@ -109,7 +111,8 @@ impl Fit {
         }
         let step = round_step((hi - lo) / n_ticks);
         if widen {
-            // Half a percent of slack: a curve that ends at 1.001 needs no new tick at 1.2.
+            // Half a percent of slack: a curve that ends at 1.001 does not need another tick at
+            // 1.2.
             let slack = 0.005 * (hi - lo) / step;
             lo = (lo / step + slack).floor() * step;
             hi = (hi / step - slack).ceil() * step;
@@ -134,7 +137,7 @@ impl Fit {
     }
 
     fn log(lo: f64, hi: f64) -> Self {
-        // Never less than a factor of 4, so that a 1, 2 or 5 is among the ticks.
+        // The range covers at least a factor of 4, so that it contains a tick at 1, 2 or 5.
         let room = (4.0 * lo / hi).sqrt().max(1.0);
         let [lo, hi] = [lo / room, hi * room];
         let first = lo.log10().floor() as i32;
@@ -145,7 +148,7 @@ impl Fit {
         } else {
             (lo * 0.8, hi * 1.25)
         };
-        // Many decades are labelled every second or third only.
+        // If there are many decades, only every second or third has a label.
         let stride = ((last - first) / 8 + 1).max(1);
         let mut ticks = Vec::new();
         let mut minor = Vec::new();
@@ -178,7 +181,7 @@ impl Fit {
     }
 }
 
-/// The nearest step of 1, 2 or 5 times a power of ten that is not below `rough`.
+/// The smallest step of 1, 2 or 5 times a power of ten that is at least `rough`.
 fn round_step(rough: f64) -> f64 {
     let power = 10.0_f64.powf(rough.log10().floor());
     let factor = [1.0, 2.0, 5.0, 10.0]
@@ -188,7 +191,7 @@ fn round_step(rough: f64) -> f64 {
     factor * power
 }
 
-/// Labels of very large or small numbers share a power of 1000.
+/// The common exponent of the labels: a multiple of 3 for very large or small numbers, else 0.
 fn shared_exponent(size: f64) -> i32 {
     let exponent = size.log10().floor() as i32;
     if (-2..5).contains(&exponent) {
@@ -208,7 +211,7 @@ fn log_label(digit: f64, decade: i32) -> String {
     }
 }
 
-/// `10` with its exponent raised.
+/// The text `10` with a superscript exponent.
 pub(super) fn power_of_ten(exponent: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let digits = exponent.to_string();
@@ -218,7 +221,7 @@ pub(super) fn power_of_ten(exponent: i32) -> String {
     "10".chars().chain(raised).collect()
 }
 
-/// A number with a true minus sign, and no minus before zero.
+/// A number with a typographic minus sign; zero has no sign.
 fn number(value: f64, decimals: i32) -> String {
     let decimals = decimals.max(0).unsigned_abs() as usize;
     let text = format!("{value:.decimals$}");

@@ -1,4 +1,4 @@
-//! The few SVG shapes that our pictures are made of.
+//! The few SVG shapes that the pictures are made of.
 
 use std::fmt::{self, Write as _};
 
@@ -7,7 +7,7 @@ use skrifa::{FontRef, MetadataProvider as _};
 
 use crate::picture::Picture;
 
-/// Inter, cut down to Latin, Greek and mathematical signs; its licence lies beside it.
+/// Inter, reduced to Latin, Greek and mathematical characters. Its licence is in the same folder.
 pub(crate) const FONTS: [&[u8]; 2] = [
     include_bytes!("../fonts/Inter-Regular.ttf"),
     include_bytes!("../fonts/Inter-SemiBold.ttf"),
@@ -28,13 +28,13 @@ impl Color {
         Self([r, g, b])
     }
 
-    /// This colour, mixed with white: `share` 0 is white, 1 the colour itself.
+    /// This colour mixed with white: `share` 0 gives white, 1 the colour itself.
     #[must_use]
     pub fn tint(self, share: f64) -> Self {
         WHITE.mixed(self, share)
     }
 
-    /// This colour with a share (0 to 1) of another.
+    /// This colour mixed with another, whose share is 0 to 1.
     #[must_use]
     pub fn mixed(self, other: Self, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
@@ -58,7 +58,7 @@ impl fmt::Display for Color {
 pub(crate) struct Stroke {
     pub(crate) color: Color,
     pub(crate) width: f64,
-    /// Lengths of dash and gap; empty for a full line.
+    /// Lengths of dash and gap; empty for a solid line.
     pub(crate) dashes: &'static str,
 }
 
@@ -79,7 +79,7 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// How text is set; `at` is the middle of its height.
+/// How text is set. The position of a text is the middle of its height.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Font {
     pub(crate) size: f64,
@@ -87,7 +87,7 @@ pub(crate) struct Font {
     pub(crate) color: Color,
     pub(crate) anchor: Anchor,
     pub(crate) is_upward: bool,
-    /// A white rim keeps text readable across lines.
+    /// Whether the text has a white outline, which keeps it readable across lines.
     pub(crate) has_rim: bool,
 }
 
@@ -126,7 +126,7 @@ impl Font {
     }
 }
 
-/// A rectangle of the picture, y downward.
+/// A rectangle of the picture; y points downward.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
     pub(crate) x: f64,
@@ -145,7 +145,7 @@ impl Frame {
     }
 }
 
-/// A white sheet that shapes are put on, in SVG units (96 to the inch), y downward.
+/// A white sheet to draw shapes on, in SVG units (96 to the inch); y points downward.
 #[derive(Debug)]
 pub(crate) struct Canvas {
     width: f64,
@@ -190,7 +190,7 @@ impl Canvas {
         );
     }
 
-    /// Closed rings filled together, by the even-odd rule.
+    /// Fills closed rings together, by the even-odd rule.
     pub(crate) fn polygon(&mut self, rings: &[&[[f64; 2]]], fill: Color, stroke: Option<Stroke>) {
         let d: String = rings.iter().map(|ring| path(ring, true)).collect();
         let edge = stroke.map_or_else(String::new, |s| {
@@ -205,7 +205,7 @@ impl Canvas {
         );
     }
 
-    /// A closed ring through which what lies behind is seen.
+    /// Fills a closed ring with a translucent colour.
     pub(crate) fn veil(&mut self, ring: &[[f64; 2]], fill: Color, opacity: f64) {
         let d = path(ring, true);
         put!(
@@ -269,7 +269,7 @@ impl Canvas {
         );
     }
 
-    /// What `draw` puts on the canvas is seen only inside `frame`.
+    /// Clips everything that `draw` draws to `frame`.
     pub(crate) fn clipped(&mut self, frame: Frame, draw: impl FnOnce(&mut Self)) {
         let id = self.n_clips;
         self.n_clips += 1;
@@ -317,7 +317,7 @@ fn path(points: &[[f64; 2]], is_closed: bool) -> String {
 }
 
 fn escaped(text: &str) -> String {
-    // Control characters are no XML.
+    // XML does not allow control characters.
     text.chars()
         .filter(|c| !c.is_control())
         .collect::<String>()

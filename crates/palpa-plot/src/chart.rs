@@ -1,4 +1,4 @@
-//! Line charts, single or several in one picture.
+//! Line charts: one, or several in one picture.
 
 use crate::axis::{Axis, Fit, power_of_ten};
 use crate::canvas::{Anchor, Canvas, Color, Font, Frame, GRID, INK, MUTED, Stroke, WHITE};
@@ -19,14 +19,14 @@ const GUIDE_LINE: Stroke = Stroke {
     dashes: "2 3",
 };
 const LINE_WIDTH: f64 = 2.0;
-/// Length of the piece of line before a series' name, and the gap around it.
+/// Length of the line sample before a series' name, and the gap around it.
 const SAMPLE: f64 = 20.0;
 const GAP: f64 = 7.0;
 const NAME_HEIGHT: f64 = 18.0;
-/// Two guides that lie closer than this have no room for a name between them.
+/// Between guides closer than this, there is no room for a name.
 const GUIDE_ROOM: f64 = 18.0;
 
-/// Values of the charts: `[x, y]`.
+/// A point of a chart: `[x, y]`.
 type Point = [f64; 2];
 
 /// A line through points, with its name.
@@ -43,7 +43,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// A full line; points that are not finite leave a gap. An empty name is not shown.
+    /// A solid line. Points that are not finite leave a gap. An empty name is not shown.
     pub fn new(name: impl Into<String>, points: Vec<Point>) -> Self {
         Self {
             name: name.into(),
@@ -56,7 +56,7 @@ impl Series {
         }
     }
 
-    /// Draws the line dashed: for a reference or a fit.
+    /// Draws a dashed line: for a reference or a fit.
     #[must_use]
     pub fn dashed(mut self) -> Self {
         self.dashes = "6 4";
@@ -101,7 +101,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// The range `from..to` of the x axis: the depth of a layer, for one.
+    /// The range `from..to` of the x axis, for example the depth of a layer.
     pub fn x(from: f64, to: f64, name: impl Into<String>, color: Color) -> Self {
         Self {
             range: [from, to],
@@ -139,7 +139,8 @@ impl Guide {
         }
     }
 
-    /// Puts the name of a horizontal line at its right end: for curves that fall through it from the left.
+    /// Puts the name of a horizontal line at its right end: for curves that cross the line at its
+    /// left end.
     #[must_use]
     pub fn named_right(mut self) -> Self {
         self.is_named_right = true;
@@ -182,14 +183,14 @@ impl Chart {
         self
     }
 
-    /// Sets the line under the title: of what body, under which conditions.
+    /// Sets the line under the title: the body and the conditions.
     #[must_use]
     pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
         self.subtitle = subtitle.into();
         self
     }
 
-    /// Adds a full line.
+    /// Adds a solid line.
     #[must_use]
     pub fn line(self, name: impl Into<String>, points: Vec<Point>) -> Self {
         self.series(Series::new(name, points))
@@ -236,7 +237,7 @@ impl Chart {
         canvas.finish()
     }
 
-    /// Margins left and right of the plot that its labels need.
+    /// The left and right margins that the labels of the plot need.
     fn margins(&self, frame: Frame) -> [f64; 2] {
         let y = self.y.fit(self.values(1), n_y_ticks(frame), true);
         let tick_width = widest(TICK, y.ticks.iter().map(|(_, label)| label.as_str()));
@@ -249,7 +250,7 @@ impl Chart {
         [22.0 + tick_width + 8.0, right]
     }
 
-    /// Draws with margins of at least so much.
+    /// Draws the chart with at least the margins `least`.
     fn draw_in(&self, canvas: &mut Canvas, frame: Frame, title: Font, least: [f64; 2]) {
         let header = self.draw_header(canvas, frame, title);
         let n_x = (frame.width / 100.0).max(3.0);
@@ -393,7 +394,7 @@ impl Chart {
                 } else {
                     (plot.x + 6.0, Anchor::Start)
                 };
-                // Above the line, or below it where the name would run into the next line above.
+                // The name goes above the line, or below it if it would touch the next line above.
                 let is_close = |other: &Guide| {
                     let above = y - view.y_of(other.at);
                     !other.is_vertical && above > 0.0 && above < GUIDE_ROOM
@@ -424,7 +425,8 @@ impl Chart {
                 let line: Vec<Point> = run.iter().map(|&point| view.point(point)).collect();
                 match line[..] {
                     [] => {}
-                    // A point between gaps has no line; a dot as wide as the line shows it.
+                    // A single point between gaps has no line, so a dot of the line's width shows
+                    // it.
                     [point] => canvas.circle(point, LINE_WIDTH / 2.0, color, stroke(series, color)),
                     _ => canvas.polyline(&line, stroke(series, color)),
                 }
@@ -456,13 +458,14 @@ impl Chart {
                 has_rim: true,
                 ..REMARK
             };
-            // Below the line on its right, above it on its left: clear of a rising curve.
+            // Below the line on its right, above it on its left: so the remark is clear of a rising
+            // curve.
             let drop = if is_late { -9.0 } else { 9.0 };
             canvas.text([x, y + drop], remark, font);
         }
     }
 
-    /// Names the series at the right, each at the height where its line ends.
+    /// Writes the names of the series at the right, each at the height where its line ends.
     fn draw_names(&self, canvas: &mut Canvas, view: &View<'_>) {
         let plot = view.plot;
         let mut names: Vec<(f64, &Series, Color)> = self
@@ -482,7 +485,8 @@ impl Chart {
             })
             .collect();
         names.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Downward so that none covers another, then upward so that the last is inside.
+        // First downward so that names do not overlap, then upward so that the last one stays
+        // inside.
         for i in 1..names.len() {
             names[i].0 = names[i].0.max(names[i - 1].0 + NAME_HEIGHT);
         }
@@ -551,7 +555,7 @@ pub fn panels(title: &str, charts: &[Chart], n_columns: usize) -> Picture {
     for (i, line) in lines.iter().enumerate() {
         canvas.text([MARGIN, MARGIN + 10.0 + i as f64 * LINE], line, font);
     }
-    // One above the other they share their axis of x.
+    // Charts in a single column get the same margins, so that their x axes line up.
     let least = match n_columns {
         1 => charts.iter().fold([0.0_f64; 2], |least, chart| {
             let own = chart.margins(Frame {
@@ -580,7 +584,7 @@ fn n_y_ticks(frame: Frame) -> f64 {
     (frame.height / 75.0).max(3.0)
 }
 
-/// Words in lines no wider than `width`, where no single word is.
+/// Splits text into lines no wider than `width`, unless a single word is wider.
 fn wrapped(text: &str, font: Font, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -593,7 +597,7 @@ fn wrapped(text: &str, font: Font, width: f64) -> Vec<String> {
     lines
 }
 
-/// Where values are drawn.
+/// The area in which values are drawn, with its axes.
 struct View<'a> {
     plot: Frame,
     x: &'a Fit,
@@ -609,7 +613,8 @@ impl View<'_> {
         self.plot.bottom() - self.y.place(value) * self.plot.height
     }
 
-    /// The place of a point; one far outside stays near, since it only shows where its line leaves the chart.
+    /// The place of a point. A point far outside is clamped: it only shows where its line leaves
+    /// the chart.
     fn point(&self, [x, y]: Point) -> Point {
         [self.x_of(x).clamp(-1e5, 1e5), self.y_of(y).clamp(-1e5, 1e5)]
     }
@@ -623,7 +628,7 @@ fn stroke(series: &Series, color: Color) -> Stroke {
     }
 }
 
-/// The axis label, with the power of ten that its tick labels share.
+/// The axis label, including the common power of ten of the tick labels.
 fn scaled(axis: &Axis, fit: &Fit) -> String {
     match fit.exponent {
         0 => axis.label.clone(),

@@ -1,5 +1,5 @@
-//! Pictures and files of results: charts, cross-sections of bodies, VTU for ParaView, and output folders whose files are
-//! whole or absent.
+//! Pictures and files of results: charts, cross-sections of bodies, VTU for ParaView, and output
+//! folders. Every output file is either complete or absent.
 
 mod axis;
 mod canvas;

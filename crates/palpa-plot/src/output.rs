@@ -1,4 +1,5 @@
-//! Result files that are whole or absent: written under a temporary name beside the target, then renamed.
+//! Result files that are either complete or absent. They are written under a temporary name beside
+//! the target, then renamed.
 
 use std::fmt;
 use std::fs;
@@ -11,17 +12,17 @@ use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use tempfile::{Builder, NamedTempFile};
 
-/// An output folder that exists and can be written to.
+/// An output folder that exists and is writable.
 #[derive(Debug)]
 pub struct OutDir {
     path: PathBuf,
 }
 
 impl OutDir {
-    /// Makes the folder if needed, and tries that files can be made in it.
+    /// Creates the folder if needed, and checks that files can be created in it.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to.
+    /// When the folder cannot be created or is not writable.
     pub fn create(path: PathBuf) -> anyhow::Result<Self> {
         let advice = || {
             format!(
@@ -34,15 +35,15 @@ impl OutDir {
         Ok(Self { path })
     }
 
-    /// Where the folder is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes the file `name` (a subfolder in it is made) and returns its path.
+    /// Writes the file `name` and returns its path. A subfolder in `name` is created.
     ///
     /// # Errors
-    /// When the file cannot be written; then an older file of that name stays as it was.
+    /// When the file cannot be written. An older file of that name then stays unchanged.
     pub fn write(&self, name: &str, bytes: &[u8]) -> anyhow::Result<PathBuf> {
         self.write_with(name, |w| w.write_all(bytes))
     }
@@ -50,7 +51,8 @@ impl OutDir {
     /// Like [`write`](Self::write), for content that is produced piece by piece.
     ///
     /// # Errors
-    /// When `content` fails or the file cannot be written; then an older file of that name stays as it was.
+    /// When `content` fails or the file cannot be written. An older file of that name then stays
+    /// unchanged.
     pub fn write_with(
         &self,
         name: &str,
@@ -81,15 +83,16 @@ impl OutDir {
     /// Begins a CSV table whose columns are the fields of `R`.
     ///
     /// # Errors
-    /// When the file cannot be made.
+    /// When the file cannot be created.
     pub fn table<R: Serialize>(&self, name: &str) -> anyhow::Result<CsvTable<R>> {
         self.begin_table(name, None)
     }
 
-    /// The same for rows whose last field is a list, with a name for each of its columns.
+    /// Like [`table`](Self::table), for rows whose last field is a list. `list` names the columns
+    /// of that list.
     ///
     /// # Errors
-    /// When the file cannot be made.
+    /// When the file cannot be created.
     pub fn table_with_list<R: Serialize>(
         &self,
         name: &str,
@@ -111,24 +114,24 @@ impl OutDir {
     }
 }
 
-/// A CSV table that grows row by row, and takes its name when it is [finished](Self::finish).
+/// A CSV table that is written row by row. It gets its name when it is [finished](Self::finish).
 ///
-/// Every row reaches the file whole, so that an interrupted command finishes the table with the rows it has. A table that
-/// is dropped unfinished leaves nothing.
+/// The file always holds complete rows, so that an interrupted command can finish the table with
+/// the rows it has. If a table is dropped unfinished, no file remains.
 #[derive(Debug)]
 pub struct CsvTable<R> {
     path: PathBuf,
     writer: csv::Writer<NamedTempFile>,
-    /// Names for the columns of a list at the end of the rows, until the header is written.
+    /// Names for the columns of the list at the end of the rows; `None` once the header is written.
     list: Option<Vec<String>>,
     row: PhantomData<R>,
 }
 
 impl<R: Serialize> CsvTable<R> {
-    /// Appends a row; the header comes from the field names of the first.
+    /// Appends a row. The header comes from the field names of the first row.
     ///
     /// # Errors
-    /// When the file cannot be written, the disk being full for one.
+    /// When the file cannot be written, for example because the disk is full.
     pub fn push(&mut self, row: &R) -> anyhow::Result<()> {
         if let Some(list) = self.list.take() {
             let mut header = field_names(row)?;
@@ -144,7 +147,7 @@ impl<R: Serialize> CsvTable<R> {
             .with_context(|| cannot_write(&self.path))
     }
 
-    /// Gives the table its name, and returns its path.
+    /// Gives the table its final name and returns its path.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -162,7 +165,7 @@ impl<R: Serialize> CsvTable<R> {
     }
 }
 
-/// Names of the fields of a row, in their order.
+/// Names of the fields of a row, in order.
 fn field_names(row: &impl Serialize) -> anyhow::Result<Vec<String>> {
     /// The keys of a JSON object; `serde_json::Value` would sort them.
     struct Keys(Vec<String>);
@@ -209,7 +212,8 @@ fn temporary_for(path: &Path) -> io::Result<NamedTempFile> {
 fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     builder.prefix(".palpa-").suffix(".partial");
-    // A temporary file is private by default; a result is as readable as any other file of this user.
+    // A temporary file is private by default. A result gets the same permissions as any other file
+    // of this user.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)

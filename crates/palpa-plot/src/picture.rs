@@ -1,8 +1,10 @@
-//! Pictures: drawn once, as SVG, and rendered to PNG from that, so that both show the same.
+//! Pictures. A picture is drawn once as SVG, and the PNG is rendered from that, so that both show
+//! the same.
 //!
-//! The SVG is our own and `resvg` renders it, with the two fonts that are compiled in: no font of the machine is needed.
-//! A chart library that draws both (plotters) was looked at: it rounds every point to a whole pixel, which makes steps
-//! of a smooth force curve.
+//! Our own code writes the SVG, and `resvg` renders it with the two fonts that are compiled in, so
+//! that no font of the machine is needed. The chart library plotters, which can write both formats,
+//! was considered and not used: it rounds every point to a whole pixel, so that a smooth force
+//! curve gets steps.
 //!
 //! ```
 //! use palpa_plot::{Axis, Chart};
@@ -22,8 +24,8 @@ use resvg::{tiny_skia, usvg};
 use crate::canvas::{self, Color};
 use crate::output::OutDir;
 
-/// Okabe and Ito's colours, told apart by colour-blind people too; the darker ones first. Yellow is left out: too
-/// pale for a line on white.
+/// The colours of Okabe and Ito, which colour-blind people can also tell apart; the darker ones
+/// come first. Yellow is left out because it is too pale for a line on white.
 pub const PALETTE: [Color; 7] = [
     Color::rgb(0x00, 0x72, 0xb2),
     Color::rgb(0xd5, 0x5e, 0x00),
@@ -34,7 +36,7 @@ pub const PALETTE: [Color; 7] = [
     Color::rgb(0x22, 0x22, 0x22),
 ];
 
-/// Pixels of the PNG per SVG unit: sharp on dense screens and in print.
+/// Pixels of the PNG per SVG unit. 2 is sharp on high-resolution screens and in print.
 const PNG_SCALE: f32 = 2.0;
 
 /// A finished picture.

@@ -1,9 +1,10 @@
-//! Cross-sections: where a plane cuts a layered body or a surface, and the picture of it.
+//! Cross-sections: the cut of a plane through a layered body or a surface, and the picture of it.
 //!
-//! A prism is cut along its faces: every face gives the segment between two cut edges, and the segments chain into the
-//! outline. Neighbours cut a shared face in the same segment, so the outlines tile the section without gaps or overlaps.
-//! A quad face counts as the surface that its cut edges suggest; where all its four edges are cut (a saddle), corners on
-//! the negative side of the plane are kept apart, which both neighbours see alike.
+//! A prism is cut face by face. Every face gives the segment between two cut edges, and the
+//! segments join into the outline. Neighbours cut a shared face in the same segment, so the
+//! outlines tile the section without gaps or overlaps. A quad face is taken as the surface that its
+//! cut edges suggest. If all its four edges are cut (a saddle), corners on the negative side of the
+//! plane are kept apart; both neighbours make the same choice.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ pub use draw::{Panel, Shades, ToolOutline, draw};
 /// A point in the plane, in metres along its axes.
 pub type Point2 = [f64; 2];
 
-/// A plane with axes in it.
+/// A plane with two axes in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     origin: Vec3,
@@ -26,10 +27,10 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The plane through `origin` normal to `normal`; `up`, as far as it lies in the plane, is its upward axis. Looking
-    /// against the normal, the first axis points right.
+    /// The plane through `origin` normal to `normal`. The projection of `up` onto the plane is the
+    /// upward axis. Looking against the normal, the first axis points right.
     ///
-    /// `None` if `normal` is zero or `up` is along it.
+    /// `None` if `normal` is zero or `up` is parallel to it.
     pub fn new(origin: Vec3, normal: Vec3, up: Vec3) -> Option<Self> {
         let normal = normal.try_normalize(f64::MIN_POSITIVE)?;
         let in_plane = up - normal * up.dot(&normal);
@@ -47,29 +48,31 @@ impl Plane {
         (point - self.origin).dot(&self.normal)
     }
 
-    /// The place in space of a point of the plane. m
+    /// The position in space of a point in the plane. m
     pub fn place(&self, [right, up]: Point2) -> Vec3 {
         self.origin + self.right * right + self.up * up
     }
 
-    /// A point, projected onto the plane.
+    /// Projects a point onto the plane.
     pub fn project(&self, point: &Vec3) -> Point2 {
         let p = point - self.origin;
         [p.dot(&self.right), p.dot(&self.up)]
     }
 }
 
-/// A cut body.
+/// The section of a body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Section {
-    /// The outlines of the cut prisms, each with its layer. Their vertices run either way round.
+    /// The outlines of the cut prisms, each with the index of its layer. Their vertices may run
+    /// either way round.
     pub cells: Vec<(usize, Vec<Point2>)>,
-    /// For each of them the prism it is cut from: that of triangle t in interval i is `t (n_levels − 1) + i`.
+    /// For each outline, the prism it is cut from: the prism of triangle t in interval i is
+    /// `t (n_levels − 1) + i`.
     pub prisms: Vec<usize>,
-    /// The lines where the section meets the skin and the borders between layers; the last point of a closed one is its
-    /// first.
+    /// The lines where the section meets the skin and the borders between layers. In a closed line,
+    /// the last point equals the first.
     pub borders: Vec<Vec<Point2>>,
-    /// The lines where the section meets the rigid base, likewise.
+    /// The lines where the section meets the rigid base, in the same form.
     pub base: Vec<Vec<Point2>>,
     /// Names of the layers, from the skin down.
     pub layer_names: Vec<String>,
@@ -95,7 +98,8 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
             if !cut.passes(&[a, b, c, d, e, f]) {
                 continue;
             }
-            // Every face runs counter-clockwise seen from outside, so that the segments follow each other.
+            // Every face runs counter-clockwise seen from outside, so that the segments follow each
+            // other.
             let mut segments = Vec::with_capacity(6);
             cut.face(&[a, b, c], &mut segments);
             if i == 0 || body.interval_layer[i - 1] != layer {
@@ -127,7 +131,7 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
     }
 }
 
-/// Cuts a surface: lines, whose last point is their first where they are closed.
+/// Cuts a surface. Returns lines; in a closed line, the last point equals the first.
 pub fn cut_surface(surface: &Surface, plane: &Plane) -> Vec<Vec<Point2>> {
     let cut = Cut::new(&surface.points, plane);
     let mut segments = Vec::new();
@@ -165,7 +169,7 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// A node in the plane counts as above it: no node is ever on both sides.
+    /// A node in the plane counts as above it, so that no node is on both sides.
     fn is_above(&self, node: usize) -> bool {
         self.heights[node] >= 0.0
     }
@@ -176,8 +180,8 @@ impl<'a> Cut<'a> {
             .any(|&n| self.is_above(n) != self.is_above(nodes[0]))
     }
 
-    /// Appends the segments in which the plane cuts a face: each from the edge where the rim goes down through the
-    /// plane to the edge where it next comes up.
+    /// Appends the segments in which the plane cuts a face. Each runs from the edge where the rim
+    /// goes down through the plane to the edge where it next comes up.
     fn face(&self, rim: &[usize], segments: &mut Vec<[Edge; 2]>) {
         let n = rim.len();
         let edge = |i: usize| {
@@ -195,7 +199,7 @@ impl<'a> Cut<'a> {
         edges.iter().map(|&edge| self.point(edge)).collect()
     }
 
-    /// The lines that segments join into, with the first point again at the end where they are closed.
+    /// The lines formed by the segments. In a closed line, the last point equals the first.
     fn lines(&self, segments: &[[Edge; 2]]) -> Vec<Vec<Point2>> {
         let line = |chain: Chain| {
             let mut points = self.points(&chain.edges);
@@ -215,13 +219,13 @@ impl<'a> Cut<'a> {
     }
 }
 
-/// Cut edges in the order of the line through them.
+/// Cut edges, in the order of the line through them.
 struct Chain {
     edges: Vec<Edge>,
     is_closed: bool,
 }
 
-/// Joins directed segments end to start, open lines first. A line ends where no segment goes on.
+/// Joins directed segments end to start, open lines first. A line ends where no segment follows.
 fn chains(segments: &[[Edge; 2]]) -> Vec<Chain> {
     let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
     let mut arrivals: BTreeMap<Edge, usize> = BTreeMap::new();
@@ -244,7 +248,7 @@ fn chains(segments: &[[Edge; 2]]) -> Vec<Chain> {
     chains
 }
 
-/// Takes the line from `start` out of `next`.
+/// Removes the line that begins at `start` from `next` and returns it.
 fn follow(next: &mut BTreeMap<Edge, Vec<Edge>>, start: Edge) -> Chain {
     let mut edges = vec![start];
     let mut at = start;

@@ -1,7 +1,9 @@
-//! VTK unstructured grids (`.vtu`) and their time series (`.pvd`), for ParaView, pyvista and meshio.
+//! VTK unstructured grids (`.vtu`) and their time series (`.pvd`), for ParaView, pyvista and
+//! meshio.
 //!
-//! Arrays are inline, base64-encoded binary. Appended raw data would be smaller, but is no XML and meshio refuses it; the
-//! `vtkio` crate is at a release candidate, so it only reads our files back in tests.
+//! Arrays are inline, as base64-encoded binary. Appended raw data would be smaller, but it is not
+//! XML, and meshio refuses it. The `vtkio` crate is only a release candidate, so we use it only in
+//! tests, to read our files back.
 //!
 //! ```text
 //!      5            VTK's manual wants the normal of 0 1 2 to point out of a wedge, but its own code (and
@@ -22,7 +24,7 @@ use palpa_mesh::{LayeredBody, Surface, Vec3};
 const VTK_TRIANGLE: u8 = 5;
 const VTK_WEDGE: u8 = 13;
 
-/// A grid of cells of one kind, with arrays over its points and cells.
+/// A grid of cells of one kind, with arrays over its points and over its cells.
 #[derive(Debug, Clone)]
 pub struct Grid {
     points: Vec<f64>,
@@ -50,8 +52,9 @@ enum Values {
 impl Grid {
     /// The prisms of `body` with its nodes at `positions`, in metres.
     ///
-    /// Point arrays: `level` (0 is the skin). Cell arrays: `layer` (from the skin down) and `scaled_jacobian` at
-    /// `positions` (1 is best, at 0 and below a prism is flat or inverted). Cells run triangle by triangle, intervals inside.
+    /// Point arrays: `level` (0 is the skin). Cell arrays: `layer` (from the skin down) and
+    /// `scaled_jacobian` at `positions` (1 is best; at 0 and below, a prism is flat or inverted).
+    /// Cells are ordered by triangle, then by interval.
     ///
     /// # Panics
     /// If `positions` does not hold one point per node.
@@ -92,7 +95,7 @@ impl Grid {
         }
     }
 
-    /// The triangles of a surface, a bone for one.
+    /// The triangles of a surface, for example of a bone.
     pub fn of_surface(surface: &Surface) -> Self {
         Self {
             points: flat(&surface.points),
@@ -105,7 +108,7 @@ impl Grid {
         }
     }
 
-    /// Adds a scalar per point; say the unit in the name where it is not SI.
+    /// Adds a scalar per point. If the unit is not SI, give it in the name.
     ///
     /// # Panics
     /// If there is not one value per point.
@@ -179,7 +182,7 @@ impl Grid {
     pub fn write(&self, w: &mut dyn Write) -> io::Result<()> {
         writeln!(w, r#"<?xml version="1.0"?>"#)?;
         if !self.comment.is_empty() {
-            // "--" would end an XML comment.
+            // "--" would end an XML comment early.
             writeln!(w, "<!-- {} -->", self.comment.replace("--", "- "))?;
         }
         writeln!(
@@ -241,7 +244,8 @@ impl Array {
     }
 }
 
-/// Writes the `.pvd` file that joins grids into a series: `(time in seconds, file name beside it)`.
+/// Writes the `.pvd` file that joins grids into a time series:
+/// `(time in seconds, file name in the same folder)`.
 ///
 /// # Errors
 /// When `w` fails.
@@ -269,7 +273,7 @@ fn write_floats(
     write_array(w, "Float64", name, n_components, bytes)
 }
 
-/// One array: its length in bytes as `UInt64`, then its values, as one base64 stream.
+/// Writes one array as one base64 stream: its length in bytes as `UInt64`, then its values.
 fn write_array<const N: usize>(
     w: &mut dyn Write,
     vtk_type: &str,

@@ -1,4 +1,4 @@
-//! Time: seconds since the engine's start, and waiting for a moment.
+//! Clocks: seconds since the engine's start, and waiting for a moment.
 
 use std::{
     sync::{
@@ -8,18 +8,18 @@ use std::{
     time::Duration,
 };
 
-/// Time that never goes back, s.
+/// A clock that never goes back, s.
 pub trait Clock: Clone + Send + 'static {
     /// Seconds since the clock was made.
     fn now(&self) -> f64;
-    /// Waits until a moment, s; comes back at once when it has passed. Never early.
+    /// Waits until a moment, s; returns at once if it has passed. Never returns early.
     fn wait_until(&self, moment: f64);
 }
 
 /// The machine's monotonic clock.
 ///
-/// Waiting sleeps until an absolute moment less `spin`, and spins for the rest: 0 leaves the core
-/// to others.
+/// A wait sleeps until `spin` seconds before the moment and spins for the rest. With 0 it never
+/// spins and leaves the core to other threads.
 #[derive(Debug, Clone, Copy)]
 pub struct RealClock {
     origin: origin::Origin,
@@ -27,7 +27,7 @@ pub struct RealClock {
 }
 
 impl RealClock {
-    /// Starts now. The last `spin` seconds of each wait are spent spinning.
+    /// A clock that starts now and spins for the last `spin` seconds of each wait.
     pub fn new(spin: f64) -> Self {
         Self {
             origin: origin::Origin::now(),
@@ -43,7 +43,7 @@ impl Clock for RealClock {
     }
 
     fn wait_until(&self, moment: f64) {
-        // Not finite: nothing that one can wait for.
+        // Nothing can wait for a moment that is not finite.
         if !moment.is_finite() {
             return;
         }
@@ -57,17 +57,18 @@ impl Clock for RealClock {
     }
 }
 
-/// A clock that stands still until it is told to move: for tests, and for loops that another owns.
+/// A clock that moves only when the program moves it: for tests, and for loops that other code
+/// drives.
 #[derive(Debug, Clone, Default)]
 pub struct ManualClock(Arc<AtomicU64>);
 
 impl ManualClock {
-    /// At zero.
+    /// A clock at zero.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Moves on by `seconds`; the clock does not go back.
+    /// Advances by `seconds`; negative values do not turn the clock back.
     pub fn advance(&self, seconds: f64) {
         let later = self.now() + seconds.max(0.0);
         self.0.store(later.to_bits(), Ordering::Release);
@@ -79,7 +80,7 @@ impl Clock for ManualClock {
         f64::from_bits(self.0.load(Ordering::Acquire))
     }
 
-    /// Jumps to the moment: whoever waits is the only one who moves time.
+    /// Jumps to the moment, since nothing else moves this clock during a wait.
     fn wait_until(&self, moment: f64) {
         self.advance(moment - self.now());
     }
@@ -88,7 +89,8 @@ impl Clock for ManualClock {
 /// CPU time that the calling thread has used, s.
 #[inline]
 pub fn thread_cpu() -> f64 {
-    // On Linux the clock itself: the same call as elsewhere, without a chance of a panic.
+    // On Linux, read the clock directly: the same system call as on other systems, but it cannot
+    // panic.
     #[cfg(target_os = "linux")]
     {
         let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -100,7 +102,7 @@ pub fn thread_cpu() -> f64 {
     }
 }
 
-/// Lets a thread that is no part of the 1 kHz path rest.
+/// Puts a thread outside the 1 kHz path to sleep.
 pub(crate) fn rest(duration: Duration) {
     std::thread::park_timeout(duration);
 }
@@ -125,15 +127,15 @@ mod origin {
             (t.tv_sec - self.0.tv_sec) as f64 + (t.tv_nsec - self.0.tv_nsec) as f64 * 1e-9
         }
 
-        /// Absolute, so that what happens between reading the clock and falling asleep adds
-        /// nothing.
+        /// An absolute moment, so a delay between reading the clock and falling asleep adds no
+        /// lateness.
         pub(super) fn sleep_until(self, moment: f64) {
             let ns = self.0.tv_nsec + (moment * 1e9) as i64;
             let at = Timespec {
                 tv_sec: self.0.tv_sec + ns.div_euclid(1_000_000_000),
                 tv_nsec: ns.rem_euclid(1_000_000_000),
             };
-            // Interrupted by a signal: the caller looks at the clock again.
+            // After an interruption by a signal, the caller reads the clock again.
             let _ = clock_nanosleep_absolute(ClockId::Monotonic, &at);
         }
     }

@@ -1,4 +1,4 @@
-//! The engine: threads, mailboxes and rings put together, started, watched and stopped.
+//! The engine: connects threads, mailboxes and rings, then starts, watches and stops them.
 
 mod params;
 mod report;
@@ -33,14 +33,15 @@ use std::{
     thread::{self, JoinHandle, Thread},
 };
 
-/// Room in the rings to the recorder, in ticks and steps: eight seconds at 1 kHz.
+/// Capacity of the rings to the recorder, in ticks and steps: eight seconds at 1 kHz.
 const RING: usize = 8192;
 const EVENT_RING: usize = 1024;
-/// Solvers may put small matrices on the stack.
+/// Stack of the tissue's thread, bytes: solvers may put small matrices on it.
 const TISSUE_STACK: usize = 16 << 20;
 const SMALL_STACK: usize = 2 << 20;
 
-/// A running engine. Dropping it stops it: forces ramp down, devices are let go, the log is closed.
+/// A running engine. Dropping it stops it: the forces ramp down, the devices are released, and the
+/// log is closed.
 #[derive(Debug)]
 pub struct Engine {
     clock: RealClock,
@@ -53,8 +54,8 @@ pub struct Engine {
     tick_view: Reader<TickEntry>,
     step_view: Reader<StepRecord>,
     log: Option<PathBuf>,
-    /// In the order of their start: recorder, background, tissue, loop. Stopped from the last to
-    /// the first, so that whoever is spoken to outlives who speaks.
+    /// The threads in the order of their start: recorder, background, tissue, loop. They are
+    /// stopped in reverse order, so that a receiver always outlives its senders.
     threads: Vec<Running>,
     panicked: Vec<&'static str>,
 }
@@ -66,7 +67,7 @@ struct Running {
     handle: JoinHandle<()>,
 }
 
-/// The ends of the recorder's rings that the others push into.
+/// The writing ends of the recorder's rings, for the other threads.
 struct Rings {
     ticks: Producer<TickEntry>,
     steps: Producer<StepRecord>,
@@ -78,7 +79,7 @@ impl Engine {
     /// Starts all threads.
     ///
     /// # Errors
-    /// [`StartError`]; then nothing runs.
+    /// [`StartError`]; in that case no thread runs.
     pub fn start<T: Tissue + 'static>(
         tissue: T,
         devices: Vec<Box<dyn HapticDevice>>,
@@ -93,11 +94,11 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Starts all threads but that of the loop: whoever gets the [`ServoLoop`] calls it, as from a
+    /// Starts all threads except the loop's. The caller runs the [`ServoLoop`], for example from a
     /// vendor's callback, with times of [`Engine::now`].
     ///
     /// # Errors
-    /// [`StartError`]; then nothing runs.
+    /// [`StartError`]; in that case no thread runs.
     pub fn start_driven<T: Tissue + 'static>(
         tissue: T,
         devices: Vec<Box<dyn HapticDevice>>,
@@ -166,7 +167,7 @@ impl Engine {
             speaker: rings.servo,
             stats: engine.loop_stats.clone(),
         };
-        // Last: what was made above is locked too.
+        // Locked last, so that the memory allocated above is included.
         if params.lock_memory {
             engine.memory_locked = lock_memory();
         }
@@ -268,7 +269,7 @@ impl Engine {
         }
     }
 
-    /// Switches for faults on purpose.
+    /// Switches that cause faults on purpose.
     pub fn faults(&self) -> &FaultHooks {
         &self.faults
     }
@@ -283,20 +284,20 @@ impl Engine {
         &self.tissue_stats
     }
 
-    /// What the system granted the threads.
+    /// Scheduling that the system granted to each thread.
     pub fn granted(&self) -> &[Granted] {
         &self.granted
     }
 
-    /// Threads that ended by themselves: without the tissue's there is no force any more, and the
-    /// engine is to be started anew.
+    /// Names of the threads that ended by themselves. Without the tissue's thread there is no force
+    /// any more; the engine must be started again.
     pub fn ended(&self) -> Vec<&'static str> {
         let is_over = |running: &&Running| running.handle.is_finished();
         (self.threads.iter().filter(is_over).map(|r| r.name)).collect()
     }
 
-    /// Stops: forces ramp down, devices are let go, what is in the rings is written, the log is
-    /// closed.
+    /// Stops the engine: the forces ramp down, the devices are released, the rings are written to
+    /// the log, and the log is closed.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.report()
@@ -355,7 +356,8 @@ impl Engine {
             .name(name.to_owned())
             .stack_size(stack);
         let handle = builder.spawn(move || {
-            // Only the thread itself can ask. Nobody listens any more: then nobody wants to know.
+            // Only the thread itself can request this. A send error means that the receiver is gone
+            // and does not need the answer.
             let _ = tell.send(wish.ask(name));
             body(&its_stop);
         })?;

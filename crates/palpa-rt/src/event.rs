@@ -1,4 +1,4 @@
-//! Events: fixed-size records that cross a ring and become text elsewhere.
+//! Events: fixed-size records that cross a ring; the recorder turns them into text.
 
 use palpa_servo::Faults;
 use rtrb::Producer;
@@ -11,7 +11,7 @@ pub enum Level {
     Info,
     /// Forces may be worse than they should be.
     Warning,
-    /// Forces are off, or data is lost.
+    /// Forces are zero, or data is lost.
     Error,
 }
 
@@ -21,54 +21,55 @@ pub enum Level {
 pub enum Happening {
     /// The 1 kHz loop began.
     LoopStarted,
-    /// It ended, with this many ticks done.
+    /// The 1 kHz loop ended after this many ticks.
     LoopStopped(u64),
     /// A device could not be read.
     DeviceLost(u32, &'static str),
-    /// It can be read again; it was away for so many ticks.
+    /// A device can be read again; it was away for this many ticks.
     DeviceBack(u32, u64),
-    /// A device did not take its command.
+    /// A device did not accept its command.
     WriteFailed(u32, &'static str),
-    /// Ticks were left out because one took too long, s.
+    /// Ticks were skipped because one took too long.
     DeadlineMissed {
-        /// How many were left out since this was said last.
+        /// Number of ticks skipped since the last such event.
         skipped: u64,
-        /// The longest time between two ticks in that while, s.
+        /// Longest time between two ticks since the last such event, s.
         longest: f64,
     },
-    /// The law's faults are others than before: none when they are over.
+    /// The law's faults changed; empty when they are over.
     LawFaults(Faults),
     /// The tissue thread began.
     TissueStarted,
-    /// It ended, with this many steps done.
+    /// The tissue thread ended after this many steps.
     TissueStopped(u64),
-    /// The tissue's steps go otherwise than before.
+    /// The status of the tissue's steps changed: step number and new status.
     StepStatus(u64, &'static str),
     /// The tissue panicked in a step; its thread is gone.
     TissuePanicked(u64),
-    /// The tissue was told less time than went by, s in all since this was said last.
+    /// The tissue was moved on by less time than passed; total difference since the last such
+    /// event, s.
     TimeLost(f64),
-    /// A background job panicked; the tissue goes on with what it has.
+    /// A background job panicked; the tissue continues without its result.
     JobPanicked,
-    /// Fault hooks were used: what is done on purpose is said too.
+    /// A fault hook caused a fault on purpose.
     Injected(&'static str),
-    /// A ring was full: so many records of this kind were lost.
+    /// A ring was full; this many records of this kind were lost.
     RecordsLost(&'static str, u64),
-    /// The file could not be written; what is recorded from here on is lost.
+    /// The file could not be written; all later records are lost.
     FileFailed,
 }
 
-/// Something that happened at a time.
+/// An event with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// When, s.
+    /// Time, s.
     pub time: f64,
-    /// What.
+    /// The event.
     pub what: Happening,
 }
 
 impl Happening {
-    /// How grave it is.
+    /// Severity of the event.
     pub fn level(&self) -> Level {
         match self {
             Self::LoopStarted
@@ -141,7 +142,7 @@ impl fmt::Display for Happening {
     }
 }
 
-/// One thread's way to say what happened.
+/// The sending end of one thread's events.
 #[derive(Debug)]
 pub(crate) struct Speaker {
     ring: Producer<Event>,
@@ -153,7 +154,8 @@ impl Speaker {
         Self { ring, lost: 0 }
     }
 
-    /// Says it; counts it as lost when the ring is full, and says that as soon as there is room.
+    /// Sends an event. If the ring is full, counts the event as lost and reports the number as soon
+    /// as there is room.
     #[inline]
     pub(crate) fn say(&mut self, time: f64, what: Happening) {
         if self.lost > 0 {

@@ -1,4 +1,4 @@
-//! Logs as tables: one file per channel, a column per number.
+//! Export of logs as tables: one file per channel, one column per number.
 
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -20,7 +20,7 @@ use std::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Table {
-    /// Comma-separated text; reals with as many digits as it takes to read the same bits.
+    /// Comma-separated text; real numbers have enough digits to be read back bit for bit.
     Csv,
     /// Apache Parquet, compressed with Snappy. Needs the feature `parquet`.
     #[cfg(feature = "parquet")]
@@ -39,23 +39,23 @@ pub enum ExportError {
     Write {
         /// The table.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }
 
-/// Tables of a log.
+/// The exported tables of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Exported {
-    /// Ticks, steps, a table for each device, and what happened.
+    /// The files: ticks, steps, a table for each device, and events.
     pub files: Vec<PathBuf>,
-    /// How the log ended, and the tables with it.
+    /// How the log, and with it the tables, ended.
     pub ending: Ending,
 }
 
-/// Writes a log as tables `ticks`, `device0`…, `steps` and, always as text, `events.csv` into a
-/// folder, which is made if need be. The log is read as it goes; memory does not grow with its
-/// length. Returns the files.
+/// Writes a log as tables `ticks`, `device0`…, `steps` and `events.csv` (always text) into a
+/// folder. The folder is created if needed. The log is read in parts, so memory does not grow with
+/// its length. Returns the files.
 ///
 /// # Errors
 /// [`ExportError`]

@@ -2,30 +2,30 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-/// Switches that the threads look at. Each use is an event in the log.
+/// Switches that the threads check. Each use is an event in the log.
 #[derive(Debug, Default)]
 pub struct FaultHooks {
     is_paused: AtomicBool,
     panics: AtomicBool,
     to_spoil: AtomicU32,
-    /// Bits of a time, s; the thread that it concerns takes it.
+    /// Bits of a time, s; the affected thread takes it once.
     tissue_delay: AtomicU64,
     loop_delay: AtomicU64,
 }
 
 impl FaultHooks {
-    /// The tissue thread makes no steps while this holds.
+    /// While `pause` is true, the tissue thread makes no steps.
     pub fn pause_tissue(&self, pause: bool) {
         self.is_paused.store(pause, Ordering::Relaxed);
     }
 
-    /// The tissue's next patch comes `seconds` late.
+    /// The tissue's next patch arrives `seconds` late.
     pub fn delay_tissue(&self, seconds: f64) {
         self.tissue_delay
             .store(seconds.to_bits(), Ordering::Relaxed);
     }
 
-    /// The next `n` patches hold NaN in a force and in the compliance when they are published.
+    /// The next `n` patches are published with NaN in a force and in the compliance.
     pub fn spoil_patches(&self, n: u32) {
         self.to_spoil.store(n, Ordering::Relaxed);
     }
@@ -49,8 +49,8 @@ impl FaultHooks {
     }
 
     pub(crate) fn take_spoil(&self) -> bool {
-        // Only the tissue thread takes; a new order meanwhile wins or is counted down by one, both
-        // harmless.
+        // Only the tissue thread takes from this counter. A new value stored meanwhile either wins
+        // or is counted down by one; both are harmless.
         let n = self.to_spoil.load(Ordering::Relaxed);
         if n > 0 {
             self.to_spoil.store(n - 1, Ordering::Relaxed);

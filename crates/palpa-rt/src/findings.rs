@@ -1,4 +1,4 @@
-//! Results of the recorder so far, which anyone may read.
+//! Results of the recorder so far, readable from any thread.
 #![expect(
     clippy::disallowed_types,
     reason = "shared by the recorder and those who ask it; no thread of the 1 kHz path knows of it"
@@ -15,12 +15,12 @@ pub(crate) struct Findings {
     pub(crate) has_file_failed: bool,
 }
 
-/// The place where they are kept.
+/// Shared storage of the findings.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Board(Arc<Mutex<Findings>>);
 
 impl Board {
-    /// Whoever held it and panicked left only whole values behind.
+    /// Ignores poisoning: a thread that panicked with the lock left only complete values behind.
     pub(crate) fn lock(&self) -> MutexGuard<'_, Findings> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

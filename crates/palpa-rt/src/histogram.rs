@@ -1,11 +1,11 @@
-//! Counts of durations in buckets of fixed relative width, written by one thread and read by any.
+//! Counts of durations in buckets of fixed relative width. One thread writes, any thread reads.
 
 use std::{
     fmt,
     sync::atomic::{AtomicU64, Ordering},
 };
 
-/// Buckets per doubling: a bucket is at most 1/32 of its value wide.
+/// Buckets per doubling: the width of a bucket is at most 1/32 of its value.
 const SUB: usize = 32;
 const SUB_BITS: u32 = SUB.trailing_zeros();
 /// Doublings past the linear part: the last bucket ends at 2⁴² ns, more than an hour.
@@ -25,25 +25,25 @@ pub struct Histogram {
     sum: AtomicU64,
 }
 
-/// What a histogram says in short; durations in seconds. All zero for an empty one.
+/// Summary of a histogram; durations in seconds. All zero if the histogram is empty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quantiles {
     /// Number of values.
     pub count: u64,
-    /// Their mean.
+    /// Mean.
     pub mean: f64,
     /// Median.
     pub p50: f64,
-    /// 99 of 100 are below.
+    /// 99 of 100 values are below.
     pub p99: f64,
-    /// 999 of 1000 are below.
+    /// 999 of 1000 values are below.
     pub p999: f64,
-    /// The largest, exactly.
+    /// The largest value, exact.
     pub max: f64,
 }
 
 impl Histogram {
-    /// An empty one, all memory there.
+    /// An empty histogram with all its memory allocated.
     pub fn new() -> Self {
         Self {
             buckets: (0..N_BUCKETS).map(|_| AtomicU64::new(0)).collect(),
@@ -57,7 +57,8 @@ impl Histogram {
     #[inline]
     pub fn add(&self, seconds: f64) {
         let ns = (seconds * 1e9) as u64; // saturates, and NaN becomes 0
-        // One writer: plain loads and stores do, without the cost of an atomic sum.
+        // There is one writer, so plain loads and stores suffice, without the cost of an atomic
+        // addition.
         let bump = |cell: &AtomicU64, by: u64| {
             cell.store(
                 cell.load(Ordering::Relaxed).wrapping_add(by),
@@ -74,13 +75,12 @@ impl Histogram {
         }
     }
 
-    /// How many values were counted.
+    /// Number of values counted.
     pub fn count(&self) -> u64 {
         self.count.load(Ordering::Relaxed)
     }
 
-    /// The duration, s, below which a share `q` in 0…1 of all lie: the upper end of its bucket, at
-    /// most the maximum.
+    /// The quantile for `q` from 0 to 1, s: the upper end of its bucket, at most the maximum.
     pub fn quantile(&self, q: f64) -> f64 {
         let counts: Vec<u64> = self
             .buckets
@@ -117,7 +117,7 @@ impl Histogram {
         }
     }
 
-    /// Filled buckets in order: lower end, upper end (s) and count. For pictures.
+    /// Filled buckets in order: lower end, upper end (s) and count. For plots.
     pub fn filled(&self) -> Vec<(f64, f64, u64)> {
         let lower = |b: usize| if b == 0 { 0 } else { upper_end(b - 1) };
         (self.buckets.iter().enumerate())

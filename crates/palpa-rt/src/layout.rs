@@ -1,31 +1,31 @@
 //! The layout of a record in a log: fixed size, packed, little-endian, in the order of its fields.
 //!
-//! The layout is that of ROS 1 messages, which MCAP knows by name: the schema in the file is the
-//! list of fields, and tools that know nothing of us (Foxglove, the `mcap` packages) read and plot
-//! the channels.
+//! It is the layout of ROS 1 messages, which MCAP knows by name. The schema in the file is the list
+//! of fields, so other tools (Foxglove, the `mcap` packages) can read and plot the channels without
+//! Palpa.
 
-/// A number as it stands in a table.
+/// A number in a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
     /// A real number.
     F64(f64),
     /// A count or an identifier.
     U64(u64),
-    /// Yes or no.
+    /// A truth value.
     Bool(bool),
 }
 
 /// A type that a record can hold.
 pub trait Field: Sized {
-    /// Its name in a schema.
+    /// Name of the type in a schema.
     const TYPE: &'static str;
-    /// Of how many numbers it is made.
+    /// Number of numbers in a value.
     const WIDTH: usize;
-    /// Appends it to `out`.
+    /// Appends the value to `out`.
     fn put(&self, out: &mut Vec<u8>);
-    /// Takes it off the front of `bytes`; `None` when they end too early.
+    /// Takes a value from the front of `bytes`; `None` if they end too early.
     fn get(bytes: &mut &[u8]) -> Option<Self>;
-    /// Its numbers, in order.
+    /// The numbers of the value, in order.
     fn values(&self, out: &mut Vec<Value>);
 }
 
@@ -68,7 +68,7 @@ impl Field for bool {
     }
 }
 
-/// Only reals come in arrays: positions, quaternions and the like.
+/// Arrays hold real numbers only: positions, quaternions and the like.
 impl<const N: usize> Field for [f64; N] {
     const TYPE: &'static str = "float64";
     const WIDTH: usize = N;
@@ -91,15 +91,15 @@ impl<const N: usize> Field for [f64; N] {
 
 /// A row of a log's table.
 pub trait Record: Sized + Default + Copy + Send + 'static {
-    /// Its name, also of its schema.
+    /// Name of the record and of its schema.
     const NAME: &'static str;
-    /// Its fields: name, type, number of numbers.
+    /// The fields: name, type, and count of numbers.
     const FIELDS: &'static [(&'static str, &'static str, usize)];
-    /// Appends it to `out`.
+    /// Appends the value to `out`.
     fn encode(&self, out: &mut Vec<u8>);
-    /// Reads it from `bytes`; `None` when they end too early.
+    /// Reads a record from `bytes`; `None` if they end too early.
     fn decode(bytes: &[u8]) -> Option<Self>;
-    /// Its numbers, field by field.
+    /// The numbers of the record, field by field.
     fn values(&self, out: &mut Vec<Value>);
 
     /// The schema, as text.
@@ -132,7 +132,7 @@ pub trait Record: Sized + Default + Copy + Send + 'static {
     }
 }
 
-/// Makes a struct with its fields' documentation, and its [`Record`].
+/// Defines a documented struct and its [`Record`] implementation.
 macro_rules! record {
     ($(#[$doc:meta])* $name:ident as $label:literal { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* }) => {
         $(#[$doc])*

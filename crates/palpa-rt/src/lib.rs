@@ -1,4 +1,4 @@
-//! What runs Palpa in real time: threads, clock, hand-over, recorder, replay and statistics.
+//! Runs Palpa in real time: threads, clock, hand-over, recorder, replay and statistics.
 //!
 //! ```text
 //!  palpa-servo       1 kHz: devices → law → devices            ServoLoop
@@ -9,12 +9,12 @@
 //!
 //!  palpa-recorder    ticks, steps, events ◄── rings ── all     MCAP file, statistics
 //! ```
-//! Nothing that is slow can hold what is fast: a mailbox keeps the latest, a full ring counts what
-//! it lost. A log holds all that both layers were told, so [`replay`] runs them again in one thread
-//! and compares to the bit.
+//! A slow thread never blocks a fast one: a mailbox keeps the latest value only, and a full ring
+//! counts the records that it loses. A log holds all inputs of both layers, so [`replay`] can run
+//! them again in one thread and compare the results bit for bit.
 //!
 //! # Example
-//! A tissue that lets everything through, under a hand that stands still:
+//! A tissue without resistance, under a hand that stands still:
 //! ```
 //! use palpa_device::{DeviceFault, HapticDevice};
 //! use palpa_rt::{Engine, EngineParams, RecorderParams, Tissue, TissueInput, TissueStep};
@@ -57,11 +57,8 @@
 //! - Loom runs all interleavings of the mailbox:
 //!   `RUSTFLAGS="--cfg loom" cargo test -p palpa-rt --release --lib --target-dir target/loom proof`
 //! - The real-time sanitizer watches the loop's body:
-//!   ```text
-//!   RTSAN_ENABLE=1 RTSAN_LIB_PATH=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/lib/librustc-stable_rt.rtsan.a \
-//!   cargo test -p palpa-rt --features rtsan --target-dir target/rtsan --test it realtime
-//!   ```
-//! - Ordinary tests run the body under an allocator that aborts, and the mailbox under load.
+//!   ```text RTSAN_ENABLE=1 RTSAN_LIB_PATH=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/lib/librustc-stable_rt.rtsan.a \ cargo test -p palpa-rt --features rtsan --target-dir target/rtsan --test it realtime ```
+//! - Ordinary tests run the loop's body under an allocator that aborts, and the mailbox under load.
 
 mod clock;
 mod fault;

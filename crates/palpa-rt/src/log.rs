@@ -37,12 +37,12 @@ pub enum LogError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It is no MCAP file, or damaged before anything was recorded.
-    #[error("{}: no log that can be read: {reason}; logs are MCAP files as `palpa loop-report` writes them", path.display())]
+    /// The file is not an MCAP file, or it is damaged before the first record.
+    #[error("{}: cannot be read as a log: {reason}; logs are MCAP files as `palpa loop-report` writes them", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is damaged.
         reason: String,
     },
 }
@@ -50,19 +50,19 @@ pub enum LogError {
 /// A row of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Row {
-    /// What the log was made with.
+    /// Header of the log.
     Header(Header),
-    /// A device and what it can do.
+    /// A device and its limits.
     Spec(SpecRecord),
     /// Settings of the law.
     Servo(ServoRecord),
     /// A tick.
     Tick(TickRecord),
-    /// A device in the tick just before.
+    /// A device in the preceding tick.
     Device(usize, DeviceRecord),
     /// A step of the tissue.
     Step(StepRecord),
-    /// Something that happened.
+    /// An event.
     Event(EventRow),
 }
 
@@ -71,7 +71,8 @@ pub enum Row {
 pub struct Header {
     /// Version of palpa.
     pub palpa: String,
-    /// Features of the processor; on others a replay need not agree to the bit.
+    /// Features of the processor. On a processor with other features, a replay may differ in the
+    /// last bits.
     pub cpu: String,
     /// Period of the loop, s.
     pub period: f64,
@@ -81,7 +82,7 @@ pub struct Header {
     pub notes: BTreeMap<String, String>,
 }
 
-/// The rows of a log, in the order in which they were written, read as they are asked for.
+/// The rows of a log, in the order in which they were written; each is read when requested.
 pub struct Rows {
     path: PathBuf,
     file: File,
@@ -94,31 +95,31 @@ pub struct Rows {
 /// How a log ends.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Ending {
-    /// It was closed properly.
+    /// The log was closed properly.
     Whole,
-    /// It reaches to the last chunk that was written whole, as after a crash.
+    /// The log ends with its last complete chunk, as after a crash.
     #[default]
     CutOff,
-    /// What comes next cannot be read, though there is more.
+    /// There is more, but it cannot be read; holds the reason.
     Damaged(String),
 }
 
 /// A whole log in memory.
 #[derive(Debug, Clone, Default)]
 pub struct Log {
-    /// What it was made with.
+    /// Header of the log.
     pub header: Header,
-    /// Its devices.
+    /// Limits of each device.
     pub specs: Vec<DeviceSpec>,
     /// Settings of the law.
     pub servo: ServoParams,
-    /// Its ticks with their devices.
+    /// The ticks with their devices.
     pub ticks: Vec<TickEntry>,
     /// The tissue's steps.
     pub steps: Vec<StepRecord>,
-    /// What happened.
+    /// The events.
     pub events: Vec<EventRow>,
-    /// How it ends.
+    /// How the log ends.
     pub ending: Ending,
 }
 
@@ -138,7 +139,7 @@ impl Log {
     /// Reads a log into memory: about 0.5 MB per second of recording.
     ///
     /// # Errors
-    /// [`LogError`]; a log that ends too early is none.
+    /// [`LogError`]; a log that ends too early is not an error.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
         let mut log = Self::default();
         let mut rows = Rows::open(path)?;
@@ -191,7 +192,8 @@ impl Rows {
             path: path.clone(),
             source,
         })?;
-        // A chunk is checked before any of it is used: one that was cut off is left out whole.
+        // A chunk is checked before any of it is used, so an incomplete chunk is left out as a
+        // whole.
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(1 << 30);
@@ -205,7 +207,7 @@ impl Rows {
         })
     }
 
-    /// How the log ends, once its rows are.
+    /// How the log ends; known after the last row was read.
     pub fn ending(&self) -> &Ending {
         &self.ending
     }
@@ -229,7 +231,7 @@ impl Rows {
                     if self.topics.is_empty() {
                         return Err(self.broken(error.to_string()));
                     }
-                    // What comes before it is good.
+                    // The rows before the damage are good.
                     self.ending = Ending::Damaged(error.to_string());
                     return Ok(None);
                 }

@@ -1,12 +1,12 @@
-//! Latest value from one thread to another: three slots, none of which is ever moved.
+//! Passes the latest value from one thread to another, through three slots that never move.
 //!
 //! ```text
 //! writer's slot  ──publish──►  middle slot  ──take──►  reader's slot
 //! ```
-//! Publishing and taking each swap an index with the middle one: a single atomic exchange, so
-//! neither side ever waits or retries, and a value of any size crosses without a copy. What is
-//! overwritten before it was taken is lost: that is what "latest" means. Proved under loom; the
-//! command is in the crate's documentation.
+//! Publishing and taking each swap an index with the middle one in a single atomic exchange. So
+//! neither side ever waits or retries, and a value of any size crosses without a copy. A value that
+//! is overwritten before it was taken is lost. Proved under loom; the command is in the
+//! documentation of the crate.
 
 #[cfg(loom)]
 use loom::{
@@ -20,7 +20,7 @@ use std::{
 };
 use std::{fmt, sync::atomic::Ordering};
 
-/// Set beside the middle index while what lies there has not been taken.
+/// Flag on the middle index: the value in that slot has not been taken yet.
 const NEW: u8 = 4;
 const INDEX: u8 = 3;
 
@@ -41,11 +41,11 @@ pub struct Reader<T> {
     slot: u8,
 }
 
-/// Makes a mailbox of three slots; what they hold at first is what the reader sees until something
-/// is published.
+/// Makes a mailbox of three slots. Until something is published, the reader sees their initial
+/// value.
 ///
-/// The boxes have been written when they come here, so their pages are there: no first touch on
-/// either thread.
+/// The boxes were written before, so their memory pages exist and neither thread touches one for
+/// the first time.
 pub fn mailbox<T: Send>(slots: [Box<T>; 3]) -> (Writer<T>, Reader<T>) {
     let shared = Arc::new(Shared {
         slots: slots.map(UnsafeCell::new),
@@ -61,14 +61,14 @@ pub fn mailbox<T: Send>(slots: [Box<T>; 3]) -> (Writer<T>, Reader<T>) {
 }
 
 impl<T> Writer<T> {
-    /// The slot to write to. It holds what was published two or three times ago: overwrite all that
-    /// counts.
+    /// The slot to write to. It holds the value of two or three publications ago: overwrite
+    /// everything that the reader uses.
     #[inline]
     pub fn slot(&mut self) -> &mut T {
         self.shared.get_mut(self.slot)
     }
 
-    /// Makes the slot the latest value, and takes another to write to.
+    /// Makes the slot the latest value, and takes another slot for the next one.
     #[inline]
     pub fn publish(&mut self) {
         let old = self.shared.middle.swap(self.slot | NEW, Ordering::AcqRel);
@@ -83,7 +83,7 @@ impl<T> Reader<T> {
         self.shared.middle.load(Ordering::Relaxed) & NEW != 0
     }
 
-    /// Makes the latest value the current one. Says whether it is another than before.
+    /// Makes the latest value the current one. Returns whether there was a newer one.
     #[inline]
     pub fn take(&mut self) -> bool {
         if !self.is_newer() {
@@ -94,7 +94,7 @@ impl<T> Reader<T> {
         true
     }
 
-    /// What was taken last.
+    /// The value that was taken last.
     #[inline]
     pub fn current(&self) -> &T {
         self.shared.get(self.slot)
@@ -113,7 +113,8 @@ impl<T> fmt::Debug for Reader<T> {
     }
 }
 
-/// The only unsafe code of this crate: each slot belongs to the writer, to the reader or to nobody.
+/// The only unsafe code of this crate. Each slot belongs to the writer, to the reader, or to
+/// neither.
 #[expect(
     unsafe_code,
     reason = "a slot is shared between two threads; who holds it is in an atomic index"
@@ -178,8 +179,8 @@ mod proof {
     use super::mailbox;
     use loom::thread;
 
-    /// All interleavings of three publications with three takes: what is read is whole, never older
-    /// than before, and the last value arrives once the writer is done.
+    /// Tests all interleavings of three publications with three takes: each value read is complete
+    /// and never older than the one before, and the last value arrives once the writer is done.
     #[test]
     fn what_is_taken_is_whole_and_never_older() {
         loom::model(|| {

@@ -8,39 +8,41 @@ record! {
     TickRecord as "palpa/Tick" {
         /// Counts ticks from 1.
         tick: u64,
-        /// Time at which it began, s; the law's clock.
+        /// Time at which the tick began, s, on the law's clock.
         now: f64,
-        /// Lateness, s: time from when it was due; more than a period if ticks were left out.
+        /// Lateness, s: time from the due moment to the start; more than a period if ticks were
+        /// skipped.
         lateness: f64,
-        /// CPU time that it took, s.
+        /// CPU time of the tick, s.
         cpu: f64,
-        /// Ticks left out for that lateness: they were due after it was, and before it began.
+        /// Ticks skipped because of that lateness: those due after this tick was due and before it
+        /// began.
         skipped: u32,
-        /// Whether a newer patch was there when it began.
+        /// Whether a newer patch was available when the tick began.
         offered: bool,
-        /// Whether the law took it.
+        /// Whether the law took the newer patch.
         taken: bool,
-        /// The patch that it used, counted as the tissue's steps; 0 is none.
+        /// The patch that the law used, by the number of the tissue's step; 0 if none.
         patch: u64,
         /// Time since that patch's poses were taken, s.
         patch_age: f64,
         /// Vertices that touch.
         n_active: u32,
-        /// Of these, those that slide.
+        /// Touching vertices that slide.
         n_sliding: u32,
         /// Sweeps over the contacts.
         sweeps: u32,
         /// Change of the contact forces in the last sweep, relative.
         residual: f64,
-        /// Share of the force that is let through: below 1 after a fault.
+        /// Share of the force that the ramp lets through; below 1 after a fault.
         gain: f64,
-        /// Energy that may be given out beyond what was taken in, J.
+        /// Energy budget, J: energy that the loop may give out beyond the energy it took in.
         energy_budget: f64,
         /// Faults: bits of `palpa_servo::Faults`.
         faults: u32,
         /// Limits that were met: bits of `palpa_servo::Limits`.
         limits: u32,
-        /// How many devices there were.
+        /// Number of devices.
         n_devices: u32,
     }
 }
@@ -48,11 +50,11 @@ record! {
 record! {
     /// One device in one tick.
     DeviceRecord as "palpa/Device" {
-        /// Which tick.
+        /// Number of the tick.
         tick: u64,
-        /// Whether it could be read; if not, the state means nothing.
+        /// Whether the device could be read; if not, its state is not valid.
         is_there: bool,
-        /// When its state was read, s.
+        /// Time at which the state of the device was read, s.
         time: f64,
         /// Position, m.
         position: [f64; 3],
@@ -66,15 +68,15 @@ record! {
         force: [f64; 3],
         /// Commanded moment, N m.
         torque: [f64; 3],
-        /// Whether it took the command.
+        /// Whether the device accepted the command.
         is_written: bool,
-        /// Force of the tissue by the local model, before anything is done to it, N.
+        /// Force of the tissue by the local model, before transfer, ramp, damping and limits, N.
         tissue_force: [f64; 3],
-        /// Transfer from the patch before, N; part of the force.
+        /// Transfer from the previous patch, N; part of the force.
         transfer: [f64; 3],
         /// Stiffness of the tissue against the tool, N/m.
         stiffness: f64,
-        /// Distance of the tool from the device by the coupling, m.
+        /// Distance between tool and device caused by the coupling, m.
         stretch: f64,
         /// Share of the tissue's stiffness that the coupling takes away.
         softening: f64,
@@ -84,7 +86,7 @@ record! {
         energy_in: f64,
         /// Energy given to the hand since the start, J.
         energy_out: f64,
-        /// Bank of the energy observer, J; negative is energy generated.
+        /// Bank of the energy observer, J; negative if energy was generated.
         bank: f64,
         /// Faults of this device: bits of `palpa_servo::Faults`.
         faults: u32,
@@ -96,45 +98,45 @@ record! {
 record! {
     /// One step of the tissue.
     StepRecord as "palpa/Step" {
-        /// Counts steps from 1; also the number of the patch that it made.
+        /// Counts steps from 1; also the number of the patch that the step made.
         step: u64,
         /// The tick at which the poses were taken.
         tick: u64,
-        /// When they were taken, s.
+        /// Time at which the poses were taken, s.
         sampled_at: f64,
         /// When the step began, s.
         now: f64,
-        /// Time that the tissue was moved on, s: capped.
+        /// Time by which the tissue was moved on, s; capped.
         dt: f64,
-        /// Time beyond that cap, s: lost.
+        /// Time beyond that cap, s; it is lost.
         lost: f64,
-        /// Time from patch to patch that was expected, s.
+        /// Expected time from patch to patch, s.
         period: f64,
-        /// How many tools there were.
+        /// Number of tools.
         n_tools: u32,
-        /// Their positions, m, one after the other.
+        /// Positions of the tools, m, one after the other.
         positions: [f64; 3 * palpa_servo::MAX_TOOLS],
-        /// Their orientations, i, j, k, w, one after the other.
+        /// Orientations of the tools, quaternions i, j, k, w, one after the other.
         orientations: [f64; 4 * palpa_servo::MAX_TOOLS],
-        /// Whether the result of a background job was installed before it.
+        /// Whether the result of a background job was installed before the step.
         installed: bool,
-        /// Whether a background job was taken after it.
+        /// Whether a background job was taken after the step.
         job_taken: bool,
-        /// How it went, as a number; the order is that of `StepStatus`.
+        /// Status of the step as a number, in the order of `StepStatus`.
         status: u8,
         /// Whether its patch was published.
         published: bool,
-        /// Whether its patch was spoilt on purpose: 1 with NaN.
+        /// Whether its patch was spoilt on purpose: 1 if NaN was written into it.
         spoilt: u8,
-        /// Iterations.
+        /// Solver iterations of the step.
         iterations: u32,
-        /// Residual at its end, relative.
+        /// Relative residual at the end of the step.
         residual: f64,
-        /// Which factor of the exterior it used.
+        /// Number of the factor of the exterior that the step used.
         factor: u64,
-        /// Which zone.
+        /// Number of the zone.
         zone: u64,
-        /// Which mesh, counted from 1.
+        /// Number of the mesh, from 1.
         mesh: u64,
         /// Stored energy of the tissue, J.
         energy: f64,
@@ -142,9 +144,9 @@ record! {
         n_contacts: u32,
         /// Hash of the patch.
         hash: u64,
-        /// CPU time it took, s.
+        /// CPU time of the step, s.
         cpu: f64,
-        /// Wall time it took, s.
+        /// Wall time of the step, s.
         wall: f64,
     }
 }
@@ -152,17 +154,17 @@ record! {
 record! {
     /// Limits of a device, at the start of the log.
     SpecRecord as "palpa/DeviceSpec" {
-        /// Which device.
+        /// Number of the device, from 0.
         device: u32,
         /// Largest force, N.
         max_force: f64,
         /// Largest moment, N m.
         max_torque: f64,
-        /// Largest change of force in time, N/s.
+        /// Largest rate of change of the force, N/s.
         max_slew: f64,
-        /// Stiffness up to which it is stable in any hand, N/m.
+        /// Stiffness up to which the device is stable in any hand, N/m.
         max_stiffness: f64,
-        /// Largest damping that it renders stably, N s/m.
+        /// Largest damping that the device renders stably, N s/m.
         max_damping: f64,
     }
 }
@@ -172,33 +174,35 @@ record! {
     ServoRecord as "palpa/ServoParams" {
         /// Period that the loop aims at, s.
         period: f64,
-        /// Relative change of forces in a sweep below which contact is solved.
+        /// Relative change of the forces in a sweep below which the contact problem counts as
+        /// solved.
         tolerance: f64,
         /// Largest number of sweeps.
         max_sweeps: u32,
         /// Linearisations of the gaps in a tick.
         passes: u32,
-        /// Time to take over to a new patch, patch periods.
+        /// Time in which a new patch takes over, in patch periods.
         transfer_periods: f64,
-        /// Largest difference bridged, of the largest force.
+        /// Largest difference in force that the transfer bridges, as a share of the device's
+        /// largest force.
         max_transfer: f64,
-        /// Age at which a patch is stale, patch periods.
+        /// Age at which a patch is stale, in patch periods.
         stale_periods: f64,
-        /// Shortest such age, s.
+        /// Smallest age at which a patch can count as stale, s.
         stale_after: f64,
-        /// Time between ticks that is a missed deadline, s.
+        /// Time between two ticks beyond which the deadline counts as missed, s.
         late_after: f64,
-        /// Time of equal readings that is a stall, s.
+        /// Time of equal readings beyond which a device counts as stalled, s.
         stall_after: f64,
-        /// Speed that counts as a jump, m/s.
+        /// Speed beyond which a change of position counts as a jump, m/s.
         max_speed: f64,
-        /// Time to fall to zero, s.
+        /// Time in which the force falls to zero after a fault, s.
         ramp_down: f64,
-        /// Time to come back, s.
+        /// Time in which the force returns after a fault, s.
         ramp_up: f64,
-        /// Energy given out beyond what was taken in, J.
+        /// Energy budget, J.
         energy_budget: f64,
-        /// Time in which the observer forgets, s.
+        /// Time in which the energy observer forgets a surplus, s.
         bank_time: f64,
         /// Step of the position sensor, m.
         resolution: f64,
@@ -209,7 +213,8 @@ record! {
 
 impl From<&ServoParams> for ServoRecord {
     fn from(p: &ServoParams) -> Self {
-        // Taken apart field by field: a setting that is new in the law must be recorded too.
+        // Destructured field by field, so that a new setting of the law cannot be left out of the
+        // record.
         let ServoParams {
             period,
             tolerance,

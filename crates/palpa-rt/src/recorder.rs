@@ -1,8 +1,8 @@
-//! The recorder: drains the rings into an MCAP file and keeps the statistics that need every tick.
+//! The recorder: writes the records of the rings to an MCAP file and computes the statistics that
+//! need every tick.
 //!
-//! Chunks are finished and handed to the system at least every quarter of a second: a killed
-//! process loses no more than what was recorded since. Memory is bounded by the rings and one
-//! chunk.
+//! Chunks are finished and handed to the system at least every quarter of a second, so a killed
+//! process loses no more than that. Memory is bounded by the rings and one chunk.
 
 use crate::{
     clock::rest,
@@ -37,13 +37,13 @@ pub(crate) const TOPIC_EVENT: &str = "/event";
 
 const FLUSH_EVERY: Duration = Duration::from_millis(250);
 const DRAIN_EVERY: Duration = Duration::from_millis(10);
-/// Events kept for the report; later ones are only in the file.
+/// Largest number of events kept for the report; later ones are in the file only.
 const MAX_EVENTS: usize = 10_000;
 
 /// The file of a recording, and its header.
 #[derive(Debug, Clone, Default)]
 pub struct RecorderParams {
-    /// The file; none records nothing but still keeps statistics and events.
+    /// The file. With `None` nothing is recorded, but statistics and events are still kept.
     pub path: Option<PathBuf>,
     /// The scene, as text: with it a replay can build the same body.
     pub scene: String,
@@ -51,7 +51,7 @@ pub struct RecorderParams {
     pub notes: BTreeMap<String, String>,
 }
 
-/// An event in words.
+/// An event as text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EventRow {
     /// Time, s.
@@ -62,7 +62,7 @@ pub struct EventRow {
     pub text: String,
 }
 
-/// All that the recorder thread holds.
+/// The state of the recorder thread.
 pub(crate) struct Recorder {
     pub(crate) ticks: Consumer<TickEntry>,
     pub(crate) steps: Consumer<StepRecord>,
@@ -76,11 +76,11 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// Records until told to stop, and then what is left in the rings.
+    /// Records until `stop` is set, then records the rest of the rings.
     pub(crate) fn run(mut self, stop: &AtomicBool) {
         let mut flushed = Instant::now();
         loop {
-            // Asked before draining: all that was pushed before the stop is drained after it.
+            // Read before draining, so that records pushed before the stop are still drained.
             let is_last = stop.load(Ordering::Acquire);
             self.drain();
             if is_last {
@@ -152,7 +152,7 @@ impl Recorder {
         self.findings.lock().forces = reports;
     }
 
-    /// Does something with the file, if there is one; after a failure there is none.
+    /// Runs `act` on the file, if there is one; after a failure the file is dropped.
     fn try_file(&mut self, act: impl FnOnce(&mut LogFile) -> McapResult<()>) {
         let Some(file) = &mut self.file else { return };
         if let Err(error) = act(file) {
@@ -186,7 +186,7 @@ pub(crate) struct LogFile {
 }
 
 impl LogFile {
-    /// Creates it with its header, which is on disk when this returns.
+    /// Creates the file with its header. The header is on disk when this returns.
     pub(crate) fn create(
         params: &RecorderParams,
         path: &PathBuf,
@@ -198,8 +198,8 @@ impl LogFile {
         let options = WriteOptions::new()
             .compression(None)
             .chunk_size(None)
-            // A chunk is put together in memory and written whole: no header is patched in what is
-            // there already.
+            // A chunk is put together in memory and written as a whole, so no header must be
+            // changed in bytes already written.
             .disable_seeking(true)
             .library(format!("palpa {}", env!("CARGO_PKG_VERSION")));
         let mut writer = options.create(file)?;
@@ -293,7 +293,8 @@ impl LogFile {
 
     fn close(mut self) -> McapResult<()> {
         self.writer.finish()?;
-        // Finishing leaves the last bytes in the buffer, and dropping that would swallow an error.
+        // `finish` leaves the last bytes in the buffer; dropping the buffer would hide a write
+        // error.
         Ok(self.writer.into_inner().flush()?)
     }
 }
@@ -318,7 +319,7 @@ impl SpecRecord {
         }
     }
 
-    /// As the law wants it.
+    /// The limits in the form of the law.
     pub fn spec(&self) -> DeviceSpec {
         DeviceSpec {
             max_force: self.max_force,

@@ -1,4 +1,5 @@
-//! Running a log again: both layers in one thread, from what was logged, compared to the bit.
+//! Replay of a log: runs both layers in one thread from the logged inputs and compares the results
+//! bit for bit.
 
 use crate::{
     log::Log,
@@ -11,36 +12,36 @@ use crate::{
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use palpa_servo::{ContactPatch, DeviceState, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo};
 
-/// How a replay compares.
+/// Settings of the comparison in a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReplayParams {
-    /// Largest difference of a force that is accepted on another processor, N. On the same one it
-    /// is none.
+    /// Largest accepted difference of a force on another processor, N. On the same processor no
+    /// difference is accepted.
     pub tolerance: f64,
 }
 
 impl Default for ReplayParams {
     fn default() -> Self {
-        // A thousandth of what a hand can tell: other instructions round otherwise, and contact
-        // amplifies that.
+        // A thousandth of the smallest force that a hand can feel. Other instructions round
+        // differently, and contact amplifies the difference.
         Self { tolerance: 1e-4 }
     }
 }
 
-/// How a replay came out.
+/// Result of a replay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// Every force and every patch is the same to the bit.
+    /// Every force and every patch is equal bit for bit.
     Same,
-    /// Made on a processor with other features; forces agree within the tolerance.
+    /// The log was made on a processor with other features; forces agree within the tolerance.
     WithinTolerance,
-    /// They differ.
+    /// Forces or patches differ.
     Different,
-    /// The log lacks what a replay needs, and what could be compared does not differ.
+    /// The log lacks data that a replay needs; everything that could be compared agrees.
     Incomplete,
 }
 
-/// What a replay found.
+/// Report of a replay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplayReport {
     /// The outcome.
@@ -65,25 +66,27 @@ pub struct ReplayReport {
     pub stopped: Option<String>,
 }
 
-/// A force that came out otherwise.
+/// A force that differs from the logged one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceDifference {
-    /// The tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// The device.
+    /// Number of the device.
     pub device: usize,
-    /// As logged, N.
+    /// Logged force, N.
     pub logged: [f64; 3],
-    /// As it came out now, N.
+    /// Force of the replay, N.
     pub replayed: [f64; 3],
 }
 
-/// Runs a log again with a tissue as it was when the log began; the law is made from the log.
+/// Runs a log again. `tissue` must be in its state at the start of the log; the law is built from
+/// the settings in the log.
 pub fn replay<T: Tissue>(log: &Log, tissue: T, params: &ReplayParams) -> ReplayReport {
     replay_watched(log, tissue, params, |_| true)
 }
 
-/// The same; `goes_on` is told before each tick how many were run, and says whether to go on.
+/// Like [`replay`], but calls `goes_on` before each tick with the number of ticks run so far, and
+/// stops when it returns false.
 pub fn replay_watched<T: Tissue>(
     log: &Log,
     tissue: T,
@@ -167,7 +170,7 @@ impl<T: Tissue> Run<'_, T> {
         Ok(())
     }
 
-    /// Runs steps until the patch of that step is the next one.
+    /// Runs steps of the tissue until the patch of step `patch` is the next one.
     fn run_until(&mut self, patch: u64) -> Result<(), String> {
         while let Some(step) = self.steps.next_if(|s| s.step <= patch) {
             self.step(step)?;
@@ -241,7 +244,7 @@ impl<T: Tissue> Run<'_, T> {
                 .map(|i| (again[0][i] - logged[0][i]).powi(2))
                 .sum::<f64>()
                 .sqrt();
-            // A NaN stays: it is never "within".
+            // A NaN is kept, so that it never counts as within the tolerance.
             if difference.is_nan() || difference > self.report.max_force_difference {
                 self.report.max_force_difference = difference;
             }
@@ -256,7 +259,7 @@ impl<T: Tissue> Run<'_, T> {
     }
 }
 
-/// Patches as they came when the log was made.
+/// The patches in their order of arrival in the log.
 struct Patches {
     current: Box<ContactPatch>,
     next: Box<ContactPatch>,
@@ -281,7 +284,7 @@ impl PatchSource for Patches {
 }
 
 impl StepRecord {
-    /// What the step was made from.
+    /// Input of the step.
     pub fn input(&self) -> TissueInput {
         TissueInput {
             step: self.step,
@@ -303,7 +306,7 @@ impl StepRecord {
 }
 
 impl DeviceRecord {
-    /// What the law was told of the device; nothing while it could not be read.
+    /// State of the device that the law got; `None` if the device could not be read.
     pub fn state(&self) -> Option<DeviceState> {
         self.is_there.then(|| DeviceState {
             time: self.time,
@@ -314,7 +317,7 @@ impl DeviceRecord {
     }
 }
 
-/// The very bits: no normalisation.
+/// A pose with exactly the logged bits, without normalisation.
 fn pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
     Pose::from_parts(
         Translation3::from(position),

@@ -1,4 +1,4 @@
-//! The 1 kHz loop: read the devices, ask the law, write the devices, leave a record.
+//! The 1 kHz loop: reads the devices, runs the law, writes the devices, and records the tick.
 
 mod entry;
 
@@ -27,9 +27,9 @@ use std::{
     },
 };
 
-/// Largest number of ticks in which forces ramp down before the devices are let go.
+/// Largest number of ticks in which the forces ramp down before the devices are released.
 const LAST_TICKS: u32 = 200;
-/// Least time between two events of missed deadlines, s.
+/// Smallest time between two events about missed deadlines, s.
 const SAY_EVERY: f64 = 0.1;
 
 /// Statistics of the loop; any thread may read them at any time.
@@ -41,14 +41,14 @@ pub struct LoopStats {
     pub lateness: Histogram,
     /// Ticks done.
     pub ticks: AtomicU64,
-    /// Ticks left out because the one before them took too long or the thread was woken too late.
+    /// Ticks skipped because the previous tick took too long or the thread woke up too late.
     pub skipped: AtomicU64,
     /// Ticks not recorded because the ring was full.
     pub lost_records: AtomicU64,
 }
 
-/// The 1 kHz loop without its thread: whoever owns the moment of a tick, we or a vendor's callback,
-/// calls [`ServoLoop::tick_once`]. Dropping it writes zero to the devices.
+/// The 1 kHz loop without its thread. The engine or a vendor's callback decides when a tick begins
+/// and calls [`ServoLoop::tick_once`]. Dropping the loop writes zero force to the devices.
 pub struct ServoLoop {
     pub(crate) servo: Box<Servo>,
     pub(crate) devices: Vec<Box<dyn HapticDevice>>,
@@ -61,16 +61,16 @@ pub struct ServoLoop {
     pub(crate) now: Now,
 }
 
-/// Memory from tick to tick.
+/// State from tick to tick.
 pub(crate) struct Now {
     tick: u64,
     time: f64,
     sample: PoseSample,
     states: [Option<DeviceState>; MAX_TOOLS],
     commands: [ForceCommand; MAX_TOOLS],
-    /// How far each tool stood off its device in the last tick, m.
+    /// Displacement of each tool from its device in the last tick, m.
     stretch: [Vec3; MAX_TOOLS],
-    /// For how many ticks a device has been away.
+    /// Number of ticks for which each device has been away.
     away: [u64; MAX_TOOLS],
     is_written: [bool; MAX_TOOLS],
     faults: Faults,
@@ -104,11 +104,11 @@ impl Now {
 }
 
 impl ServoLoop {
-    /// One tick. `now` is the moment it begins, s; `lateness` how much that is past the moment it
-    /// was due, s; `skipped` how many ticks are left out for that lateness.
+    /// Runs one tick. `now` is the moment at which it begins, s; `lateness` is the time since it
+    /// was due, s; `skipped` is the number of ticks skipped because of that lateness.
     ///
-    /// Does not allocate, wait or panic, whatever the devices and the tissue say; a device's driver
-    /// has its own rules.
+    /// Does not allocate, wait or panic, whatever the devices and the tissue send. This does not
+    /// cover the code of a device's driver.
     #[cfg_attr(feature = "rtsan", rtsan_standalone::nonblocking)]
     pub fn tick_once(&mut self, now: f64, lateness: f64, skipped: u32) {
         let cpu_t0 = thread_cpu();
@@ -152,10 +152,10 @@ impl ServoLoop {
         }
     }
 
-    /// Ticks every `period` seconds until told to stop, then ramps down.
+    /// Ticks every `period` seconds until `stop` is set, then ramps down.
     ///
-    /// A tick that comes too late for the next ones leaves them out: it never makes up for them in
-    /// a burst.
+    /// If a tick is so late that the next ones are due already, those are skipped; the loop never
+    /// catches up in a burst.
     pub(crate) fn run(
         &mut self,
         clock: &impl Clock,
@@ -181,7 +181,7 @@ impl ServoLoop {
                 clock.wait_until(due + delay);
             }
             let now = clock.now();
-            // Saturates; never negative, as a wait is never early.
+            // The cast saturates. The value is never negative, because a wait never returns early.
             let skipped = ((now - due) / period) as u64;
             slot += skipped;
             self.tick_once(now, now - due, u32::try_from(skipped).unwrap_or(u32::MAX));
@@ -191,7 +191,7 @@ impl ServoLoop {
         self.speaker.say(clock.now(), Happening::LoopStopped(ticks));
     }
 
-    /// From here on no device is read: the law ramps all forces down.
+    /// Stops reading the devices, so that the law ramps all forces down.
     fn let_go(&mut self) {
         self.now.is_letting_go = true;
     }
@@ -252,8 +252,8 @@ impl ServoLoop {
         }
     }
 
-    /// Tells the tissue where the tools are; one that is away or says nonsense stays where it was
-    /// last.
+    /// Sends the poses of the tools to the tissue. If a device is away or gives an invalid reading,
+    /// its tool keeps its last pose.
     fn post_poses(&mut self, now: f64) {
         let n = &mut self.now;
         n.sample.tick = n.tick;
@@ -289,7 +289,7 @@ impl ServoLoop {
     }
 
     fn notice(&mut self, now: f64, report: &TickReport) {
-        // Letting go is no fault, though the law is told as if all devices were gone.
+        // Releasing the devices is not a fault, though the law then sees all devices as lost.
         if report.faults != self.now.faults && !self.now.is_letting_go {
             self.now.faults = report.faults;
             self.speaker.say(now, Happening::LawFaults(report.faults));
@@ -311,10 +311,10 @@ impl ServoLoop {
         }
     }
 
-    /// Writes zero, whatever the law said last.
+    /// Writes zero force to all devices, whatever the last command was.
     fn disarm(&mut self, now: f64) {
         for device in &mut self.devices {
-            // A device that is gone cannot be told; its own watchdog has to do.
+            // A lost device cannot get the command; its own watchdog must stop it.
             let _ = device.write(now, &ForceCommand::ZERO);
         }
     }
@@ -334,8 +334,8 @@ impl fmt::Debug for ServoLoop {
     }
 }
 
-/// A mailbox seen by the law during one tick: what is offered is decided when the tick begins, so
-/// that the log can say all there is to know of it.
+/// The law's view of the mailbox during one tick. Whether a newer patch is offered is decided when
+/// the tick begins, so that the log can record it completely.
 struct Arrival<'a> {
     patches: &'a mut Reader<ContactPatch>,
     offered: bool,
@@ -373,7 +373,7 @@ fn is_finite(pose: &Pose) -> bool {
         && pose.rotation.coords.iter().all(|v| v.is_finite())
 }
 
-/// In words that live as long as an event.
+/// The fault as static text, for an event.
 fn reason(fault: DeviceFault) -> &'static str {
     match fault {
         DeviceFault::Unplugged => "not connected",

@@ -1,15 +1,15 @@
-//! How smooth the forces are and what energy they give: from ticks, as they come or from a log.
+//! Smoothness and energy of the forces, computed from ticks, live or from a log.
 
 use crate::{histogram::Histogram, record::DeviceRecord, servo_loop::TickEntry};
 use std::collections::VecDeque;
 
 /// The band in which hands feel vibration, Hz.
 const BAND: [f64; 2] = [20.0, 400.0];
-/// The RMS is taken over so many seconds.
+/// Window of the RMS, s.
 const WINDOW: f64 = 2.0;
 
-/// Smoothness and energy of one device's force. Changes of force are counted in [`Histogram`]s with
-/// newtons for seconds.
+/// Computes the smoothness and energy of one device's force. Changes of force are counted in
+/// [`Histogram`]s, with newtons in place of seconds.
 #[derive(Debug)]
 pub struct ForceStats {
     period: f64,
@@ -23,44 +23,44 @@ pub struct ForceStats {
     others: Histogram,
     max_force: f64,
     work: f64,
-    /// Since the last ramp.
+    /// Work done on the hand since the last ramp, J.
     ledger: f64,
     max_work: f64,
 }
 
-/// What [`ForceStats`] found.
+/// Results of [`ForceStats`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ForceReport {
     /// RMS of the force between 20 and 400 Hz over the last 2 s, N.
     pub rms_band: f64,
     /// The largest such RMS over any 2 s, N.
     pub rms_band_worst: f64,
-    /// Largest change of force from one tick to the next where a patch arrived, N; as all changes
-    /// here, without those of ramps.
+    /// Largest change of force between two ticks where a patch arrived, N. No figure for changes of
+    /// force includes ramps.
     pub arrival_max: f64,
-    /// The change that 999 of 1000 such ticks stay below, N.
+    /// 99.9th percentile of the change at such ticks, N.
     pub arrival_p999: f64,
-    /// Largest change at such a tick beyond what the device's own displacement makes with the
-    /// tissue's stiffness, N.
+    /// Largest change at such a tick beyond the change that the device's own displacement causes
+    /// through the tissue's stiffness, N.
     pub arrival_alone_max: f64,
-    /// The change that 999 of 1000 other ticks stay below, N.
+    /// 99.9th percentile of the change at other ticks, N.
     pub other_p999: f64,
     /// Largest change at other ticks, N.
     pub other_max: f64,
     /// Largest force, N.
     pub max_force: f64,
-    /// Work done on the hand in all, J: positive if the device gave more than it took.
+    /// Total work done on the hand, J: positive if the device gave out more energy than it took in.
     pub work: f64,
-    /// The most that this work ever was since the last fault, J: a ramp takes energy and gives it
-    /// on purpose.
+    /// Largest value of this work since the last fault, J. It restarts at a fault because a ramp
+    /// takes and gives energy on purpose.
     pub max_work: f64,
 }
 
 impl ForceStats {
-    /// For a loop of this period, s.
+    /// Statistics for a loop of this period, s.
     pub fn new(period: f64) -> Self {
         let [low, high] = BAND;
-        // The upper edge cannot lie beyond half the rate.
+        // The upper edge must lie below half the sampling rate.
         let high = high.min(0.49 / period);
         let pair = [
             Biquad::high_pass(low * period),
@@ -82,7 +82,7 @@ impl ForceStats {
         }
     }
 
-    /// Takes in a tick of device `k`.
+    /// Adds a tick of device `k`.
     pub fn add(&mut self, entry: &TickEntry, k: usize) {
         let Some(device) = entry.devices.get(k) else {
             return;
@@ -120,7 +120,7 @@ impl ForceStats {
                 self.arrivals_alone.add((norm(step) - own).max(0.0));
             }
             if device.is_there && last.is_there {
-                // The force of the last tick acted while the hand moved to here.
+                // The force of the last tick acted while the hand moved to its present position.
                 let work: f64 = (0..3)
                     .map(|i| last.force[i] * (device.position[i] - last.position[i]))
                     .sum();
@@ -134,7 +134,7 @@ impl ForceStats {
         self.last = Some(*device);
     }
 
-    /// What was found so far.
+    /// The results so far.
     pub fn report(&self) -> ForceReport {
         let mean = |sum: f64| (sum / self.squares.len().max(1) as f64).sqrt();
         let now: f64 = self.squares.iter().sum();
@@ -240,7 +240,8 @@ mod tests {
 
     #[test]
     fn the_band_lets_through_what_hands_feel_as_vibration() {
-        // Gain of both filters in a row, from their formula, warped as the bilinear transform does.
+        // Gain of both filters in series by formula, with the frequency warping of the bilinear
+        // transform.
         let warp = |f: f64| (std::f64::consts::PI * f * 1e-3).tan();
         let gain = |f: f64| {
             let low = 1.0 / (1.0 + (warp(f) / warp(400.0)).powi(4)).sqrt();
@@ -279,8 +280,8 @@ mod tests {
     #[test]
     fn what_a_ramp_does_is_no_jump_and_begins_the_count_of_energy_anew() {
         let mut stats = ForceStats::new(1e-3);
-        // Pushed away by 1 mm with 1 N, then let go and taken back within a ramp, then pushed
-        // again.
+        // The device pushes the hand away by 1 mm with 1 N. Then the hand returns without force
+        // during a ramp, and the push repeats.
         let place = |t: f64| if (0.1..0.3).contains(&t) { 1e-3 } else { 0.0 };
         let force = |t: f64| if (0.2..0.4).contains(&t) { 0.0 } else { 1.0 };
         let gain = |tick: u64| {
@@ -302,7 +303,8 @@ mod tests {
         let x = |t: f64| 1e-3 * (std::f64::consts::TAU * 10.0 * t).sin();
         feed(&mut stats, 1000, |_| false, |t| (x(t), -100.0 * x(t)));
         let spring = stats.report();
-        // Held from tick to tick, a spring gives ½ K T v² per tick: π² K X² f T per cycle of ten.
+        // With its force held from tick to tick, a spring gives out ½ K T v² per tick: π² K X² f T
+        // per cycle of ten.
         let want = std::f64::consts::PI.powi(2) * 100.0 * 1e-6 * 2.0 * 10.0 * 10.0 * 1e-3 / 2.0;
         assert!(
             (spring.work / want - 1.0).abs() < 0.02,

@@ -1,48 +1,49 @@
-//! What a thread asks of the system at its start, and what it got.
+//! Scheduling that a thread requests from the system at its start, and the result.
 
 use std::fmt;
 
-/// How a thread wishes to be scheduled.
+/// Scheduling priority of a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Priority {
-    /// First in, first out, before all ordinary threads; 1 to 99.
+    /// Real-time, first in, first out: before all ordinary threads; 1 to 99.
     RealTime(u8),
     /// Ordinary.
     Normal,
-    /// Ordinary, behind the others, 1 to 19, or before them, -1 to -20.
+    /// Ordinary, with a niceness: 1 to 19 is after other threads, -1 to -20 before them.
     Nice(i8),
 }
 
-/// What a thread wishes for.
+/// Scheduling that a thread requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wish {
-    /// How it is scheduled.
+    /// Priority of the thread.
     pub priority: Priority,
-    /// The only core that it shall run on.
+    /// The only core on which the thread may run; `None` for any core.
     pub core: Option<usize>,
 }
 
-/// What a thread was granted. A wish that was refused is no error: the machine's owner decides.
+/// The result of a request. A refusal is not an error, since the owner of the machine decides.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Granted {
     /// The thread's name.
     pub thread: &'static str,
-    /// What it had wished for.
+    /// The request.
     pub wish: Wish,
-    /// Whether it is scheduled as wished, or why not.
+    /// Whether the priority was granted, or the reason if not.
     pub priority: Result<(), String>,
-    /// Whether it is bound to its core, or why not; granted when there was no wish.
+    /// Whether the thread is bound to its core, or the reason if not; `Ok` if no core was
+    /// requested.
     pub pinned: Result<(), String>,
 }
 
 impl Wish {
-    /// Nothing special.
+    /// No special request.
     pub const NORMAL: Self = Self {
         priority: Priority::Normal,
         core: None,
     };
 
-    /// Asks for it, for the thread that calls.
+    /// Requests this scheduling for the calling thread.
     pub fn ask(self, thread: &'static str) -> Granted {
         Granted {
             thread,
@@ -53,8 +54,8 @@ impl Wish {
     }
 }
 
-/// Keeps the memory of the process in RAM: what it has now, and, where the system sets no limit,
-/// what is to come.
+/// Locks the memory of the process in RAM: the present memory and, if the system sets no limit,
+/// future allocations too.
 ///
 /// # Errors
 /// The system's reason.
@@ -98,8 +99,8 @@ mod system {
     pub(super) fn schedule(priority: Priority) -> Result<(), String> {
         match priority {
             Priority::RealTime(p) => {
-                // Without the privilege, at least the sleep of an ordinary thread shall end on
-                // time.
+                // Without the privilege for real-time scheduling, this at least lets the sleep of
+                // an ordinary thread end on time.
                 let _ = set_current_timer_slack(NonZeroU64::new(1));
                 let value = ThreadPriorityValue::try_from(p)?;
                 let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -111,7 +112,7 @@ mod system {
                 .map_err(|e| e.to_string())
             }
             Priority::Normal => Ok(()),
-            // On Linux niceness is the thread's, whatever the call is named.
+            // On Linux niceness belongs to a thread, despite the name of the call.
             Priority::Nice(n) => {
                 setpriority_process(Some(gettid()), i32::from(n)).map_err(|e| e.to_string())
             }
@@ -130,8 +131,8 @@ mod system {
     }
 
     pub(super) fn lock_memory() -> Result<(), String> {
-        // With a limit, memory to come must not be locked: past the limit the allocation itself
-        // would fail.
+        // With a limit, future allocations must not be locked: beyond the limit the allocation
+        // itself would fail.
         let is_unlimited = getrlimit(Resource::Memlock).current.is_none();
         let flags = if is_unlimited {
             MlockAllFlags::CURRENT | MlockAllFlags::FUTURE

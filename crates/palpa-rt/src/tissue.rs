@@ -1,55 +1,58 @@
-//! What the engine asks of a tissue, and how its patches are hashed.
+//! The interface between the engine and a tissue, and the hash of its patches.
 
 use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
 
-/// What a step of the tissue is made from; together with the jobs installed before it, everything
-/// it depends on.
+/// Input of a step of the tissue. A step depends on nothing but this input and the jobs installed
+/// before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueInput {
     /// Counts steps from 1.
     pub step: u64,
     /// The tick at which the poses were taken.
     pub tick: u64,
-    /// When they were taken, s.
+    /// Time at which the poses were taken, s.
     pub sampled_at: f64,
     /// When the step begins, s.
     pub now: f64,
-    /// Time since the step before, s, capped: what viscous history is to be moved on by.
+    /// Time since the previous step, s, capped. The viscous history advances by it.
     pub dt: f64,
-    /// Time from patch to patch to be expected, s.
+    /// Expected time from patch to patch, s.
     pub period: f64,
-    /// Where the tools are; those past `n_tools` mean nothing.
+    /// Poses of the tools; entries from `n_tools` on are not used.
     pub poses: [Pose; MAX_TOOLS],
-    /// How many tools there are.
+    /// Number of tools.
     pub n_tools: usize,
 }
 
-/// How a step went.
+/// Status of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum StepStatus {
-    /// Within its tolerance.
+    /// The step converged within its tolerance.
     #[default]
     Converged = 0,
-    /// Not within its tolerance, but usable: the next steps go on from here.
+    /// The residual is above the tolerance, but the state is usable; the next steps continue from
+    /// it.
     Unfinished = 1,
-    /// It did not come as far as the tools: the patch is of the place that it reached.
+    /// The step did not reach the poses of the tools; the patch belongs to the poses that it
+    /// reached.
     Behind = 2,
-    /// Not fit to be felt yet, as after a change of zone: the patch is not published.
+    /// The forces are not fit to be felt yet, as after a change of zone; the patch is not
+    /// published.
     Settling = 3,
-    /// There is no usable state: the patch is not published.
+    /// There is no usable state; the patch is not published.
     Failed = 4,
 }
 
 impl StepStatus {
-    /// Whether the patch of such a step is given to the 1 kHz loop.
+    /// Whether the patch of such a step is sent to the 1 kHz loop.
     pub fn is_published(self) -> bool {
         matches!(self, Self::Converged | Self::Unfinished | Self::Behind)
     }
 
-    /// In a word.
+    /// Name of the status.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -61,21 +64,21 @@ impl StepStatus {
     }
 }
 
-/// What a step says of itself; goes to the log, and must not depend on anything that a replay does
-/// not have (no times).
+/// Report of a step. It goes to the log and must not depend on anything that a replay does not
+/// have, such as times.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TissueStep {
-    /// How it went.
+    /// Status of the step.
     pub status: StepStatus,
-    /// Iterations.
+    /// Solver iterations.
     pub iterations: u32,
-    /// Residual at its end, relative.
+    /// Relative residual at the end of the step.
     pub residual: f64,
-    /// Which factor of the exterior it used.
+    /// Number of the factor of the exterior that the step used.
     pub factor: u64,
-    /// Which zone.
+    /// Number of the zone.
     pub zone: u64,
-    /// Which mesh, counted from 1.
+    /// Number of the mesh, from 1.
     pub mesh: u64,
     /// Stored energy, J.
     pub energy: f64,
@@ -83,35 +86,35 @@ pub struct TissueStep {
 
 /// A body under tools, as seen by the engine.
 ///
-/// The same inputs, jobs and installations in the same order give the same patches to the bit:
-/// replay rests on it.
+/// The same inputs, jobs and installations in the same order must give the same patches bit for
+/// bit. Replay relies on it.
 pub trait Tissue: Send {
-    /// Work for the background, with all that it needs: it shares nothing with the tissue.
+    /// Work for the background thread. It owns all its data and shares nothing with the tissue.
     type Job: Send + 'static;
-    /// What came of it.
+    /// Result of a job.
     type Done: Send + 'static;
 
-    /// Called once on the tissue thread before the first step: touches memory and warms up what is
-    /// per thread.
+    /// Called once on the tissue thread before the first step, to touch memory and warm up
+    /// per-thread data.
     fn prepare(&mut self) {}
 
-    /// Moves the tissue on and writes the patch in place, all of it that counts: the slot holds an
-    /// older one.
+    /// Moves the tissue on and writes the patch in place. It must write every part that is used,
+    /// because the slot holds an older patch.
     ///
     /// The engine stamps the patch's `id`, `sampled_at` and `period` afterwards.
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep;
 
-    /// Background work that is wanted after this step. Asked only while no other job is under way.
+    /// Background work needed after this step. Called only while no other job is running.
     fn take_job(&mut self) -> Option<Self::Job>;
 
-    /// Does it, on the background thread.
+    /// Runs a job on the background thread.
     fn run(job: Self::Job) -> Self::Done;
 
-    /// Takes in what came of the last job; called between steps.
+    /// Installs the result of the last job; called between steps.
     fn install(&mut self, done: Self::Done);
 }
 
-/// A patch that was never written, `id` 0: its slot and its memory are there.
+/// A boxed patch that was never written (`id` 0); its memory is allocated and touched.
 #[expect(
     clippy::large_stack_arrays,
     reason = "260 KB, at start, on threads with megabytes of stack"
@@ -136,7 +139,7 @@ pub fn empty_patch() -> Box<ContactPatch> {
     })
 }
 
-/// A hash of all bits of a patch that mean something, its stamps included. Not against malice.
+/// A hash of all used bits of a patch, its stamps included. Not cryptographic.
 pub fn patch_hash(patch: &ContactPatch) -> u64 {
     let n_tools = patch.n_tools.min(MAX_TOOLS);
     let n_contacts = patch.n_contacts.min(MAX_CONTACTS);
@@ -167,7 +170,7 @@ pub fn patch_hash(patch: &ContactPatch) -> u64 {
     h.finish()
 }
 
-/// Four hashes side by side, because one alone waits for its own multiplication.
+/// Four hashes side by side, because a single hash waits for each of its multiplications.
 struct Lanes([u64; 4]);
 
 impl Lanes {

@@ -24,10 +24,10 @@ use std::{
 /// Settings of the tissue thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueParams {
-    /// Steps are at least this far apart, s: no more than the device can feel, and a core that
-    /// others may use too.
+    /// Smallest time between the starts of two steps, s. More steps could not be felt, and other
+    /// threads can use the core meanwhile.
     pub min_period: f64,
-    /// Cap on the time that the tissue is moved on by in a step, s. Beyond it a stall would inject
+    /// Largest time by which one step moves the tissue on, s. Without the cap, a stall would cause
     /// a jump.
     pub max_dt: f64,
 }
@@ -41,7 +41,7 @@ impl Default for TissueParams {
     }
 }
 
-/// Where the tools were at a tick.
+/// Poses of the tools at a tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PoseSample {
     pub(crate) tick: u64,
@@ -64,11 +64,11 @@ impl PoseSample {
 /// Statistics of the tissue thread; any thread may read them at any time.
 #[derive(Debug, Default)]
 pub struct TissueStats {
-    /// CPU time of steps.
+    /// CPU time of steps, s.
     pub cpu: Histogram,
-    /// Wall time of steps.
+    /// Wall time of steps, s.
     pub wall: Histogram,
-    /// CPU time of background jobs.
+    /// CPU time of background jobs, s.
     pub background: Histogram,
     /// Steps whose patch was not published.
     pub held_back: AtomicU64,
@@ -76,7 +76,7 @@ pub struct TissueStats {
     pub lost_records: AtomicU64,
 }
 
-/// All that the tissue thread holds.
+/// The state of the tissue thread.
 pub(crate) struct TissueThread<T: Tissue, C: Clock> {
     pub(crate) tissue: T,
     pub(crate) clock: C,
@@ -94,14 +94,14 @@ pub(crate) struct TissueThread<T: Tissue, C: Clock> {
 /// The tissue thread's side of the background.
 pub(crate) struct Background<T: Tissue> {
     pub(crate) jobs: Producer<T::Job>,
-    /// What came of a job; nothing if it panicked.
+    /// Result of a job; `None` if it panicked.
     pub(crate) done: Consumer<Option<T::Done>>,
     pub(crate) thread: Thread,
     pub(crate) is_busy: bool,
 }
 
 impl<T: Tissue, C: Clock> TissueThread<T, C> {
-    /// Steps until it is told to stop or the tissue panics.
+    /// Makes steps until `stop` is set or the tissue panics.
     pub(crate) fn run(mut self, stop: &AtomicBool) {
         if catch_unwind(AssertUnwindSafe(|| self.tissue.prepare())).is_err() {
             self.speaker
@@ -109,7 +109,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             return;
         }
         self.speaker.say(self.clock.now(), Happening::TissueStarted);
-        // Before the first pose there is nothing to press.
+        // There is nothing to press before the first pose.
         while !self.poses.take() && !stop.load(Ordering::Relaxed) {
             rest(Duration::from_micros(200));
         }
@@ -126,7 +126,8 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             }
             self.clock.wait_until(due);
             let now = self.clock.now();
-            // On a grid while steps are short enough for it; late steps are not made up for.
+            // Steps keep a fixed grid while they are short enough; the thread does not catch up
+            // after a late step.
             due = (due + self.params.min_period).max(now);
             let elapsed = now - last_start;
             last_start = now;
@@ -134,8 +135,8 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             period += 0.1 * (elapsed.min(self.params.max_dt) - period);
             lost.add(elapsed - self.params.max_dt, now, &mut self.speaker);
             step += 1;
-            // Its state may be half changed after a panic, so there is no going on; the loop ramps
-            // down as patches age.
+            // After a panic the state of the tissue may be half changed, so the thread ends. The
+            // loop ramps down when the patch is stale.
             let result = catch_unwind(AssertUnwindSafe(|| self.step(step, now, elapsed, period)));
             let Ok((new_status, record)) = result else {
                 self.speaker
@@ -155,7 +156,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             .say(self.clock.now(), Happening::TissueStopped(step));
     }
 
-    /// One step with all round it.
+    /// One step with its hand-over, hash and record.
     fn step(&mut self, step: u64, now: f64, elapsed: f64, period: f64) -> (StepStatus, StepRecord) {
         let cpu_t0 = thread_cpu();
         let installed = self.install();
@@ -232,7 +233,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         let Some(job) = self.tissue.take_job() else {
             return false;
         };
-        // Never full: one job at a time.
+        // The ring is never full, because there is one job at a time.
         self.background.is_busy = self.background.jobs.push(job).is_ok();
         self.background.thread.unpark();
         self.background.is_busy
@@ -249,7 +250,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
     }
 }
 
-/// Runs jobs until it is told to stop and none is left.
+/// Runs jobs until `stop` is set and no job is left.
 pub(crate) fn run_background<T: Tissue>(
     jobs: &mut Consumer<T::Job>,
     done: &mut Producer<Option<T::Done>>,
@@ -261,26 +262,26 @@ pub(crate) fn run_background<T: Tissue>(
             let t0 = thread_cpu();
             let result = catch_unwind(AssertUnwindSafe(|| T::run(job))).ok();
             stats.background.add(thread_cpu() - t0);
-            // As many places as jobs that may be under way; and if the tissue is gone, nobody wants
-            // it.
+            // The ring has room for every job that can be running. If the tissue thread is gone,
+            // the result is not needed.
             let _ = done.push(result);
         } else if stop.load(Ordering::Relaxed) {
             return;
         } else {
-            // Woken by whoever hands out a job; the time only bounds how long stopping takes.
+            // The sender of a job wakes this thread; the time only bounds how long stopping takes.
             rest(Duration::from_millis(20));
         }
     }
 }
 
-/// What the engine knows of a patch and the tissue does not.
+/// Writes the stamps that the engine knows and the tissue does not.
 pub(crate) fn stamp(patch: &mut ContactPatch, input: &TissueInput) {
     patch.id = input.step;
     patch.sampled_at = input.sampled_at;
     patch.period = input.period;
 }
 
-/// The fault that [`FaultHooks::spoil_patches`] asks for.
+/// Causes the fault of [`FaultHooks::spoil_patches`].
 pub(crate) fn spoil(patch: &mut ContactPatch) {
     for tool in &mut patch.tools {
         tool.force.x = f64::NAN;
@@ -289,7 +290,7 @@ pub(crate) fn spoil(patch: &mut ContactPatch) {
     patch.compliance[0] = f64::NAN;
 }
 
-/// What is known of a step once its patch is made; the rest is filled in by who runs it.
+/// The part of the record that is known once the patch is made; the caller fills in the rest.
 pub(crate) fn step_record(
     input: &TissueInput,
     result: &TissueStep,
@@ -322,7 +323,7 @@ pub(crate) fn step_record(
     record
 }
 
-/// Time that the cap on steps took from the tissue; said at most ten times a second.
+/// Time lost to the cap on steps; reported at most ten times a second.
 #[derive(Default)]
 struct Lost {
     sum: f64,

@@ -1,4 +1,4 @@
-//! The tissues that a scene can name, with the source of every number.
+//! The catalogue of tissues that a scene can name, with the source of every number.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -11,7 +11,7 @@ use crate::resolve::law::Parts;
 use crate::units::{Density, Pressure, Time};
 use crate::{Moduli, Prony, PronyTerm, Sourced, Status, Tissue};
 
-/// Every tissue that a scene can name.
+/// Every tissue of the catalogue.
 pub fn catalogue() -> &'static [Tissue] {
     static CATALOGUE: LazyLock<Vec<Tissue>> = LazyLock::new(|| {
         read(include_str!("../data/tissues.toml"))
@@ -113,7 +113,7 @@ impl<T> Written<T> {
 }
 
 impl WrittenProny {
-    /// The moduli of the catalogue are those at rest.
+    /// The moduli in the catalogue are long-term moduli.
     fn prony(self) -> Prony {
         let term = |term: &WrittenTerm| PronyTerm {
             g: term.g,

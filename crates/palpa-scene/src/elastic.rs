@@ -1,4 +1,4 @@
-//! Elastic laws with their moduli, whichever of them were given.
+//! Elastic laws and their moduli.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,20 +6,21 @@ use serde::{Deserialize, Serialize};
 use crate::parameters::Numbers;
 use crate::{Energy, Sourced};
 
-/// An isotropic elastic law: a strain energy whose deviatoric part and volumetric part are given apart.
+/// An isotropic elastic law: a strain energy with separate deviatoric and volumetric parts.
 ///
 /// ```text
 /// W(F) = W_d(F) + U(v)        [J/m³],   U from `resistance` and `volume`
 /// ```
-/// The parameters are kept as they were given; [`shear`](Self::shear), [`c10`](Self::c10), [`bulk`](Self::bulk),
-/// [`young`](Self::young) and [`poisson`](Self::poisson) are the moduli at small strain, whichever were given.
+/// The parameters are kept as they were given. [`shear`](Self::shear), [`c10`](Self::c10),
+/// [`bulk`](Self::bulk), [`young`](Self::young) and [`poisson`](Self::poisson) compute the moduli
+/// at small strain from them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Elastic {
     /// The deviatoric part.
     pub energy: Energy,
-    /// How the volume resists.
+    /// Resistance to a change of volume.
     pub resistance: Resistance,
-    /// How the volumetric part grows.
+    /// Form of the volumetric part.
     pub volume: Volume,
 }
 
@@ -35,7 +36,7 @@ pub enum Stiffness {
     C10(Sourced),
 }
 
-/// How a change of volume is resisted, as it was given.
+/// Resistance to a change of volume, as it was given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Resistance {
@@ -45,19 +46,19 @@ pub enum Resistance {
     Bulk(Sourced),
 }
 
-/// How the volumetric part of an energy grows with the volume ratio `v`, which is `det F` but in the linear law (its
-/// small-strain likeness `1 + tr ε`) and in St. Venant–Kirchhoff's (`1 + tr E`).
+/// Form of the volumetric energy as a function of the volume ratio `v`. `v` is `det F`, except in
+/// the linear law (`1 + tr ε`) and in St. Venant–Kirchhoff's (`1 + tr E`).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Volume {
     /// K/2 (v − 1)².
     #[default]
     Quadratic,
-    /// K/2 (ln v)²: without end as the volume vanishes.
+    /// K/2 (ln v)²: grows without limit as the volume vanishes.
     Logarithmic,
 }
 
-/// The stiffness that was given, in pascals.
+/// The stiffness modulus that was given, in pascals.
 enum GivenModulus {
     Young(f64),
     Shear(f64),
@@ -100,7 +101,7 @@ impl Resistance {
 }
 
 impl Energy {
-    /// The number that gives the stiffness: of Ogden's energy, that of its first term.
+    /// The number that determines the stiffness; for Ogden's energy, that of the first term.
     pub(crate) fn given(&self) -> &Sourced {
         match self.stiffness() {
             Some(stiffness) => stiffness.sourced(),
@@ -110,7 +111,7 @@ impl Energy {
 }
 
 impl Elastic {
-    /// Its parameters by their keys; Ogden's terms are not among them.
+    /// The parameters by their keys, without Ogden's terms.
     pub(crate) fn numbers(&self) -> Numbers<&Sourced> {
         let mut numbers = self.energy.own();
         if let Some(stiffness) = self.energy.stiffness() {
@@ -141,7 +142,7 @@ impl Elastic {
         }
     }
 
-    /// `C10` in pascals: half the shear modulus, less what a second invariant takes of it.
+    /// `C10` in pascals: half the shear modulus minus the part of the second invariant.
     pub fn c10(&self) -> f64 {
         match self.given() {
             GivenModulus::C10(c10) => c10,

@@ -1,4 +1,4 @@
-//! What is wrong with a scene file, and where.
+//! Errors in a scene file, and their place.
 
 use std::fmt;
 use std::ops::Range;
@@ -9,7 +9,8 @@ use toml::de::{DeTable, DeValue};
 use crate::limits::Limits;
 use crate::units::shortened;
 
-/// Why a scene file is refused. Every message names the place, what was found and what to do.
+/// The reason why a scene file is refused. Every message names the place, the text found and the
+/// remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -18,63 +19,64 @@ pub enum SceneError {
     Io {
         /// The scene file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The scene is larger than any scene needs to be.
+    /// The scene is larger than the limit.
     #[error(
         "{place}: is larger than {limit} bytes; a scene is a short text, so this is probably another file"
     )]
     TooLarge {
         /// The scene.
         place: Box<Place>,
-        /// What is allowed, in bytes.
+        /// The limit, in bytes.
         limit: u64,
     },
-    /// The text is no TOML.
+    /// The text is not TOML.
     #[error("{place}: is not valid TOML: {message}")]
     Syntax {
-        /// Where.
+        /// The place.
         place: Box<Place>,
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
-    /// A key that no scene has here, or a word that a key does not take.
+    /// An unknown key, or a word that a key does not accept.
     #[error("{place}: unknown {what} `{found}`; {}", advice(nearest.as_deref(), allowed))]
     Unknown {
-        /// Where.
+        /// The place.
         place: Box<Place>,
         /// `key`, `value` or `tissue`.
         what: &'static str,
-        /// What was found.
+        /// The unknown word.
         found: String,
-        /// The nearest of what is allowed, when it is near.
+        /// The nearest allowed word, if one is near.
         nearest: Option<String>,
-        /// What is allowed here.
+        /// The allowed words.
         allowed: Vec<String>,
     },
     /// A value outside the range of its key.
     #[error("{place}: {found} is outside the allowed range {allowed}; check the number{}", if found.starts_with('"') { " and its unit" } else { "" })]
     OutOfRange {
-        /// Where.
+        /// The place.
         place: Box<Place>,
         /// The value as written.
         found: String,
         /// The range.
         allowed: String,
     },
-    /// A value of the wrong kind, a missing key, or keys that do not go together.
+    /// A value of the wrong kind, a missing key, or keys that exclude each other.
     #[error("{place}: {message}")]
     Invalid {
-        /// Where.
+        /// The place.
         place: Box<Place>,
-        /// What was found, what was expected and what to do.
+        /// The message: text found, text expected, and remedy.
         message: String,
     },
 }
 
 impl SceneError {
-    /// The same by key alone, without line and column: for a text that a program made and nobody saw.
+    /// The same error with the key only, without line and column: for a text that a program made
+    /// and no user has seen.
     #[must_use]
     pub fn by_key(mut self) -> Self {
         match &mut self {
@@ -128,7 +130,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// The text of a scene, in which errors find their place.
+/// The text of a scene, for finding the place of an error.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Document<'a> {
     pub(crate) text: &'a str,
@@ -142,7 +144,7 @@ enum Step {
     Index(usize),
 }
 
-/// A key of the scene: where its value's errors are reported.
+/// A key of the scene, for reporting errors of its value.
 #[derive(Debug, Clone)]
 pub(crate) struct Site<'a> {
     document: Document<'a>,
@@ -157,7 +159,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The scene as a whole, for what is written nowhere in it.
+    /// The scene as a whole, for errors that have no place in the text.
     pub(crate) fn whole(self, key: String) -> Place {
         Place {
             file: self.file.map(Path::to_owned),
@@ -167,7 +169,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The file stops being text at this offset, which is the end of `self.text`.
+    /// The error for a file that stops being UTF-8 at this offset, which is the end of `self.text`.
     pub(crate) fn not_text(self, offset: usize) -> SceneError {
         SceneError::Syntax {
             place: self.place(offset, String::new()).into(),
@@ -186,7 +188,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The scene error that an error of the TOML library is. `is_syntax` when the text itself was no TOML.
+    /// Converts an error of the TOML library. `is_syntax` says that the text itself is not TOML.
     pub(crate) fn toml_error(self, error: &toml::de::Error, is_syntax: bool) -> SceneError {
         let span = error.span().unwrap_or(0..0);
         let mut message = plain(error.message());
@@ -208,7 +210,7 @@ impl<'a> Document<'a> {
             );
         }
         let place = self.place(span.start, key);
-        // serde tells what it did not know only in the words of its message: unknown field `a`, expected `b` or `c`
+        // serde names an unknown word only in its message: unknown field `a`, expected `b` or `c`
         let what = match () {
             () if message.starts_with("unknown field") => "key",
             () if message.starts_with("unknown variant") => "value",
@@ -226,10 +228,10 @@ impl<'a> Document<'a> {
     }
 }
 
-/// A message of the parser in the words of a scene rather than of Rust.
+/// A message of the parser, with Rust's terms replaced by those of a scene file.
 fn plain(message: &str) -> String {
     let message = message.trim();
-    // Some messages repeat a value, whatever its length: the end says what was expected.
+    // Some messages repeat a value of any length; the expected kind stands at the end.
     let message = if message.len() > 500 {
         let end = message.char_indices().rev().nth(250);
         let end = end.map_or(message, |(i, _)| &message[i..]);
@@ -276,7 +278,7 @@ impl Site<'_> {
         site
     }
 
-    /// The value, if it is within its limits.
+    /// The value, or an error if it is out of its limits.
     pub(crate) fn within<T: PartialOrd + fmt::Display>(
         &self,
         value: T,
@@ -309,7 +311,8 @@ impl Site<'_> {
         unknown(self.locate().0, what, shortened(found), allowed)
     }
 
-    /// The place of this key's value, or of the nearest table round it that is written, and the value as written.
+    /// Place of this key's value, or of the innermost table around it in the text, and the value as
+    /// written.
     fn locate(&self) -> (Place, Option<String>) {
         let text = self.document.text;
         let mut key = String::new();
@@ -346,7 +349,7 @@ impl Site<'_> {
     }
 }
 
-/// The path of the innermost key that holds this span.
+/// Path of the innermost key whose value contains this span.
 fn key_at(value: &DeValue<'_>, span: &Range<usize>) -> Option<String> {
     let holds = |outer: Range<usize>| outer.start <= span.start && span.end <= outer.end;
     match value {

@@ -1,11 +1,10 @@
-//! The scene as it is written. The doc comments are the descriptions in the JSON Schema.
+//! The scene file. The doc comments become the descriptions in the JSON Schema.
 //!
-//! These types say which keys there are and of which kind their values are; ranges and combinations are checked where
-//! they become a [`Scene`](crate::Scene).
+//! These types define the keys and the kinds of their values. Ranges and combinations are checked
+//! when they become a [`Scene`](crate::Scene).
 
 #![expect(
     clippy::doc_markdown,
-    clippy::doc_link_with_quotes,
     reason = "these comments become the descriptions of the schema, which are plain text"
 )]
 
@@ -28,9 +27,10 @@ use crate::model::ModelKind;
 use crate::scene::{CutFaces, InPlane, LengthUnit, Solver};
 use crate::units::{Kind, Length, Pressure, Quantity, Rate, Time, Velocity};
 
-/// A scene of Palpa: the body that is pressed, its layers, the tool and the press.
+/// A scene of Palpa: the body, its layers, the tool and the press.
 ///
-/// Every quantity is a text with a unit, such as "1.5 mm" or "12 kPa". Paths are relative to the folder of this file.
+/// Every quantity is a text with a unit, such as "1.5 mm" or "12 kPa". Paths are relative to the
+/// folder of this file.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Palpa scene")]
@@ -40,25 +40,25 @@ pub(crate) struct SceneFile {
     /// The layers, from the skin inward: 1 to 32 of them, with 256 levels at most together.
     #[serde(default)]
     pub(crate) layer: Vec<LayerTable>,
-    /// Lumps in the layers, 64 at most; where two overlap, the later one counts.
+    /// Lumps in the layers, 64 at most. Where two overlap, the later one counts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) lump: Vec<LumpTable>,
-    /// What presses. Default: a disc of radius 8 mm, bonded to the skin.
+    /// The tool. Default: a disc of radius 8 mm, bonded to the skin.
     #[serde(default)]
     pub(crate) tool: ToolTable,
-    /// Where, how deep and how fast it presses.
+    /// Place, depth and speed of the press.
     #[serde(default)]
     pub(crate) press: PressTable,
-    /// The haptic device that presses in real time, and how it is held.
+    /// The haptic device used in real time, and the grip of the hand on it.
     #[serde(default)]
     pub(crate) device: DeviceTable,
-    /// How the simulated hand moves in real time.
+    /// The motion of the simulated hand in real time.
     #[serde(default)]
     pub(crate) motion: MotionTable,
-    /// How the body answers.
+    /// The model of the body.
     #[serde(default)]
     pub(crate) model: ModelTable,
-    /// How fine the body is made where it matters.
+    /// Mesh size of the body near the tool and lumps.
     #[serde(default)]
     pub(crate) mesh: MeshTable,
     /// Parameters of the reference method (a network of bars).
@@ -66,68 +66,74 @@ pub(crate) struct SceneFile {
     pub(crate) reference: ReferenceTable,
 }
 
-/// The body. Exactly one of `surface` and `generator` is given.
+/// The body. Give exactly one of `surface` and `generator`.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BodyTable {
     /// The skin: a triangle mesh (PLY, OBJ, STL, GLB, glTF or OFF).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) surface: Option<PathBuf>,
-    /// A body made by formula instead of read from a file.
+    /// A body made by formula, instead of one from a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) generator: Option<GeneratorTable>,
-    /// The bones, triangle meshes in the same frame as the skin; 64 at most. Only with `surface`. Default: none.
+    /// The bones: triangle meshes in the same frame as the skin; 64 at most. Only with `surface`.
+    /// Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) bones: Vec<PathBuf>,
-    /// The unit of the lengths in the files that this scene names (meshes and thickness tables). Default: "m".
+    /// The unit of the lengths in the files that this scene names (meshes and thickness tables).
+    /// Default: "m".
     #[serde(default)]
     pub(crate) unit: LengthUnit,
-    /// Keep only the part of the body within this distance of `cutout_at`, 5 mm to 1 m. Default: the whole body.
+    /// Keep only the part of the body within this distance of `cutout_at`, 5 mm to 1 m. Default:
+    /// the whole body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) cutout_radius: Option<Length>,
-    /// The middle of the part that is kept, each coordinate within 10 m. Default: where the tool presses (`press.at`
-    /// or `press.vertex`).
+    /// Centre of the part that is kept, each coordinate within 10 m. Default: where the tool
+    /// presses (`press.at` or `press.vertex`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) cutout_at: Option<[Length; 3]>,
-    /// How the faces are held at which the body was cut from the rest (the ends of a limb, the rim of a cut-out).
-    /// Default: "free".
+    /// Support of the cut faces, where the body was cut from the rest (the ends of a limb, the rim
+    /// of a cut-out). Default: "free".
     #[serde(default)]
     pub(crate) cut_faces: CutFaces,
 }
 
-/// A body made by formula. The layers of the scene apply to it as to a surface.
+/// A body made by formula. The layers of the scene apply to it as to a surface from a file.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GeneratorTable {
-    /// Its shape: a flat block, a cylinder round one bone, or a forearm with ulna and radius.
+    /// Shape of the body: a flat block, a cylinder around one bone, or a forearm with ulna and
+    /// radius.
     pub(crate) kind: GeneratorKind,
-    /// Distance of neighbouring skin vertices, 0.5 mm to 100 mm. Default: "5 mm".
+    /// Distance between neighbouring skin vertices, 0.5 mm to 100 mm. Default: "5 mm".
     #[serde(default = "default_spacing")]
     pub(crate) spacing: Length,
-    /// Block only: width, length and depth, each 1 mm to 2 m. Default: ["100 mm", "100 mm", "40 mm"].
+    /// Block only: width, length and depth, each 1 mm to 2 m. Default: ["100 mm", "100 mm", "40
+    /// mm"].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) size: Option<[Length; 3]>,
-    /// Cylinder only: its length, 1 mm to 2 m. Default: "200 mm".
+    /// Cylinder only: the length, 1 mm to 2 m. Default: "200 mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) length: Option<Length>,
-    /// Cylinder only: the radius of its skin, 1 mm to 1 m. Default: "40 mm".
+    /// Cylinder only: the radius of the skin, 1 mm to 1 m. Default: "40 mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radius: Option<Length>,
-    /// Cylinder only: the radius of its bone, 0.5 mm to 1 m and less than `radius`. Default: "10 mm".
+    /// Cylinder only: the radius of the bone, 0.5 mm to 1 m and less than `radius`. Default: "10
+    /// mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) bone_radius: Option<Length>,
-    /// Forearm only: its size relative to an average adult's, 0.2 to 3. Default: 1.
+    /// Forearm only: the size relative to an average adult's, 0.2 to 3. Default: 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scale: Option<f64>,
 }
 
-/// The shapes that are made by formula.
+/// The bodies that can be made by formula.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum GeneratorKind {
     /// A flat block on a rigid base.
     Block,
-    /// A cylinder round one straight bone.
+    /// A cylinder around one straight bone.
     Cylinder,
     /// A forearm with ulna and radius, from anthropometry.
     Forearm,
@@ -137,27 +143,30 @@ pub(crate) enum GeneratorKind {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LayerTable {
-    /// The name of a tissue in the catalogue, or a table with its elasticity.
+    /// Name of a tissue in the catalogue, or a table with its values.
     pub(crate) tissue: TissueSpec,
-    /// How thick the layer is, 10 µm to 500 mm: one value, a table along an axis, or a file. Only the last layer may go
-    /// without: it reaches down to the bone (or to the base of a generated body).
+    /// Thickness of the layer, 10 µm to 500 mm: one value, a table along an axis, or a file. Only
+    /// the last layer may have none: it then reaches down to the bone (or to the base of a
+    /// generated body).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) thickness: Option<ThicknessSpec>,
-    /// How far the thickness is to be trusted. Default: "given" (by this scene).
+    /// How reliable the thickness is. Default: "given" (by this scene).
     #[serde(default = "default_thickness_status", skip_serializing_if = "is_given")]
     pub(crate) thickness_status: Status,
-    /// Where the thickness is from, in words. Default: nothing said.
+    /// Source of the thickness, in words. Default: nothing said.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub(crate) thickness_source: String,
-    /// Into how many element levels the layer is divided over its thickness, 1 to 64. Default: 1.
+    /// Number of element levels through the thickness of the layer, 1 to 64. Default: 1.
     #[serde(default = "default_levels")]
     pub(crate) levels: u32,
-    /// How thin the layer may become where the body has no room for it, 1 µm to 100 mm and no more than the thickness.
-    /// Default: a fifth of the (smallest) thickness, or "0.5 mm" when that is not known beforehand.
+    /// Least thickness of the layer where the body has no room for more, 1 µm to 100 mm and no more
+    /// than the thickness. Default: a fifth of the (smallest) thickness, or "0.5 mm" when that is
+    /// not known beforehand.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) min_thickness: Option<Length>,
-    /// The tension in every direction of the layer's plane before anything presses, 0 Pa to 1 MPa. Skin on a living
-    /// forearm is under 28-92 kPa or 6.2-11.4 N/m (Flynn et al., abstracts). Default: "0 Pa".
+    /// Tension in every direction of the layer's plane before anything presses, 0 Pa to 1 MPa. Skin
+    /// on a living forearm has 28-92 kPa or 6.2-11.4 N/m (Flynn et al., abstracts). Default: "0
+    /// Pa".
     #[serde(default, skip_serializing_if = "is_none")]
     pub(crate) prestress: Pressure,
 }
@@ -169,8 +178,9 @@ pub(crate) struct ThicknessTable {
     /// The direction along which the table's positions are measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) axis: Option<AxisSpec>,
-    /// Pairs of a position along the axis (within 10 m, ascending) and the thickness there (10 µm to 500 mm), 1000 pairs
-    /// at most; linear between them, constant before the first and after the last.
+    /// Pairs of a position along the axis (within 10 m, ascending) and the thickness there (10 µm
+    /// to 500 mm), 1000 pairs at most. Linear between them, constant before the first and after the
+    /// last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) table: Option<Vec<[Length; 2]>>,
     /// A CSV file with the columns x, y, z and thickness, in the unit of the body.
@@ -178,37 +188,39 @@ pub(crate) struct ThicknessTable {
     pub(crate) file: Option<PathBuf>,
 }
 
-/// Where, how deep and how fast the tool presses. Either `at` or `vertex` is given, or none of them.
+/// Place, depth and speed of the press. Give `at` or `vertex`, or neither.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct PressTable {
-    /// The point whose nearest point of the skin is pressed, each coordinate within 10 m. Default: the skin vertex
-    /// nearest to the skin's centroid.
+    /// The tool presses the point of the skin nearest to this point, each coordinate within 10 m.
+    /// Default: the skin vertex nearest to the skin's centroid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) at: Option<[Length; 3]>,
-    /// The skin vertex that is pressed, by its number in the skin surface, from 0.
+    /// Number of the skin vertex that the tool presses, as counted in the skin surface, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) vertex: Option<u32>,
-    /// The direction in which the tool moves; its length does not matter. Default: the inward normal of the skin.
+    /// Direction of the tool's movement; its length does not matter. Default: the inward normal of
+    /// the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) direction: Option<[f64; 3]>,
-    /// How deep the tool goes, 1 µm to 500 mm. Default: "8 mm".
+    /// Depth of the press, 1 µm to 500 mm. Default: "8 mm".
     pub(crate) depth: Length,
-    /// How fast the tool goes down and up, 0.01 mm/s to 1 m/s. Default: "10 mm/s".
+    /// Speed of the tool down and up, 0.01 mm/s to 1 m/s. Default: "10 mm/s".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) speed: Option<Velocity>,
-    /// Speeds to compare, in place of `speed`: the whole press is run at each; 16 at most, each 0.01 mm/s to 1 m/s.
-    /// Default: none.
+    /// Speeds to compare, instead of `speed`: the whole press is run at each; 16 at most, each 0.01
+    /// mm/s to 1 m/s. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) speeds: Vec<Velocity>,
-    /// How long the tool rests at its depth, 0 s to 600 s. Default: "0.5 s".
+    /// Time that the tool rests at its depth, 0 s to 600 s. Default: "0.5 s".
     pub(crate) hold: Time,
     /// Whether the tool comes back up. Default: true.
     pub(crate) retract: bool,
-    /// How often the tool goes down, rests and comes back, 1 to 100; more than once only with `retract`. Default: 1.
+    /// Number of cycles of going down, resting and coming back, 1 to 100; more than one only with
+    /// `retract`. Default: 1.
     pub(crate) cycles: u32,
-    /// By how much the depth grows from one result to the next: no more than the depth and no less than a 5000th of it.
-    /// Default: a 32nd of the depth.
+    /// Increase of the depth from one result to the next: no more than the depth and no less than a
+    /// 5000th of it. Default: a 32nd of the depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) step: Option<Length>,
 }
@@ -230,22 +242,23 @@ impl Default for PressTable {
     }
 }
 
-/// How the body answers.
+/// The model of the body.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct ModelTable {
-    /// Which model answers. Default: "tissue".
+    /// Kind of model. Default: "tissue".
     pub(crate) kind: ModelKind,
-    /// The share of the strain that two paired prisms take as their mean, 0 to 0.95. More is softer and nearer to the
-    /// truth on a coarse mesh, but lets a node that is pressed alone move against its neighbours. Default: 0.8.
+    /// Share of the strain that two paired prisms average, 0 to 0.95. A larger share is softer and
+    /// more accurate on a coarse mesh, but a node that is pressed alone can then move against its
+    /// neighbours. Default: 0.8.
     pub(crate) alpha: f64,
-    /// Whether mass and damping count. Default: "quasi-static".
+    /// Whether inertia and damping are included. Default: "quasi-static".
     pub(crate) dynamics: DynamicsName,
-    /// Damping beside that of relaxation; only with dynamics = "implicit". Default: none.
+    /// Damping in addition to relaxation; only with dynamics = "implicit". Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) damping: Option<DampingTable>,
-    /// The largest force left over at a free node in equilibrium, relative to the forces in the body, 0.000000000001 to
-    /// 0.001. Default: 0.00000001.
+    /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
+    /// forces in the body, 0.000000000001 to 0.001. Default: 0.00000001.
     pub(crate) tolerance: f64,
 }
 
@@ -261,50 +274,56 @@ impl Default for ModelTable {
     }
 }
 
-/// Whether mass and damping count.
+/// Whether inertia and damping are included.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum DynamicsName {
-    /// Equilibrium at every moment; time acts through relaxation only.
+    /// Equilibrium at every moment; time matters only through relaxation.
     #[default]
     QuasiStatic,
-    /// Mass and damping, stepped implicitly. Tissues of unknown density count as 1000 kg/m³.
+    /// Inertia and damping, with implicit time steps. Tissues of unknown density count as 1000
+    /// kg/m³.
     Implicit,
 }
 
-/// Rayleigh damping: the damping matrix is `mass` times the mass matrix and `stiffness` times the stiffness matrix.
+/// Rayleigh damping: the damping matrix is `mass` times the mass matrix and `stiffness` times the
+/// stiffness matrix.
 #[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DampingTable {
-    /// The factor of the mass, 0 1/s to 100000 1/s: damps slow motion. Default: "0 1/s".
+    /// Factor of the mass matrix, 0 1/s to 100000 1/s: damps slow motion. Default: "0 1/s".
     #[serde(default)]
     pub(crate) mass: Rate,
-    /// The factor of the stiffness, 0 s to 10 s: damps fast motion. Default: "0 s".
+    /// Factor of the stiffness matrix, 0 s to 10 s: damps fast motion. Default: "0 s".
     #[serde(default)]
     pub(crate) stiffness: Time,
 }
 
-/// How fine the body is made where it matters. Nothing is made coarser than it was.
+/// Mesh size near the tool and lumps. The mesh is never made coarser than the body's own.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct MeshTable {
-    /// Whether the body is refined near the tool and lumps; else it is taken as it was grown. Default: true.
+    /// Whether the mesh is refined near the tool and lumps; if false, it stays as it was grown.
+    /// Default: true.
     pub(crate) refine: bool,
-    /// The wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the
-    /// radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm, and 4/3 of that in real time; nothing under a node.
+    /// Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a
+    /// quarter of the radius that the tool presses on, at most a third of its edge's radius, 0.5 mm
+    /// to 10 mm, and 4/3 of that in real time; nothing under a node.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
-    /// The wanted length of edges and height of levels in and round lumps, 0.1 mm to 100 mm. Default: half of a lump's
-    /// smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
+    /// Wanted length of edges and height of levels in and around lumps, 0.1 mm to 100 mm. Default:
+    /// half of a lump's smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_lumps: Option<Length>,
-    /// By which share of the distance from tool or lump the wanted length grows, 0.02 to 5. Default: 0.5.
+    /// Increase of the wanted length with the distance from the tool or lump, as a share of that
+    /// distance, 0.02 to 5. Default: 0.5.
     pub(crate) growth: f64,
-    /// Most skin vertices that refinement may lead to, 100 to 500000; then the body stays as fine as they allow.
-    /// Default: 20000.
+    /// Largest number of skin vertices after refinement, 100 to 500000. At this limit refinement
+    /// stops. Default: 20000.
     pub(crate) max_vertices: u32,
-    /// Whether in real time what is fine near the tool moves with it, so that the hand may go anywhere; else the body is
-    /// fine along the whole way of the scene's motion. Default: false.
+    /// Whether the fine part near the tool moves with it in real time, so that the hand may go
+    /// anywhere. If false, the body is fine along the whole way of the scene's motion. Default:
+    /// false.
     pub(crate) moves: bool,
 }
 
@@ -325,18 +344,20 @@ impl Default for MeshTable {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct ReferenceTable {
-    /// Into how many equal parts each step of the tool is divided, 1 to 1024. Default: 4.
+    /// Number of equal parts into which each step of the tool is divided, 1 to 1024. Default: 4.
     pub(crate) substeps: u32,
-    /// How a sub-step is solved. Default: "sparse".
+    /// Solver of a sub-step. Default: "sparse".
     pub(crate) solver: Solver,
-    /// Whose stiffness the bars in a level between two layers have. Default: "below".
+    /// Layer whose stiffness the bars in the level between two layers have. Default: "below".
     pub(crate) in_plane: InPlane,
-    /// The share of a spring's change of length that the restoring correction (3.21) takes back after each step, 0 to
-    /// 1; 0 switches it off. It acts once per step, so with it the force depends on the step: at 4 mm on a real forearm
-    /// 0.56 N in steps of 1 mm and 0.48 N in steps of 0.1 mm, without it 0.55 N in both. Default: 0.
+    /// Share of a spring's change of length that the restoring correction (3.21) takes back after
+    /// each step, 0 to 1; 0 switches it off. It acts once per step, so with it the force depends on
+    /// the step size: at 4 mm on a real forearm 0.56 N in steps of 1 mm and 0.48 N in steps of 0.1
+    /// mm, without it 0.55 N in both. Default: 0.
     pub(crate) spring_gain: f64,
-    /// The share of the way to its place at rest by which the restoring correction (3.22) moves a node after each step, 0
-    /// to 1; 0 switches it off. Any other makes a held body creep back under the tool. Default: 0.
+    /// Share of the way back to its place at rest by which the restoring correction (3.22) moves a
+    /// node after each step, 0 to 1; 0 switches it off. With any other value a held body creeps
+    /// back under the tool. Default: 0.
     pub(crate) shape_gain: f64,
 }
 

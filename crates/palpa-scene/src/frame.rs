@@ -1,17 +1,18 @@
-//! Right-handed frames of three unit vectors, for what is turned in space.
+//! Right-handed frames of three unit vectors.
 
-/// Below this cosine's complement two directions are taken for one: nothing can be said of a plane between them.
+/// Two directions count as parallel if the component of one across the other is shorter than this.
 const PARALLEL: f64 = 1e-6;
 
-/// The frame whose first vector is `first` and whose third is as near to `third` as that lets it; any such frame where
-/// both are parallel.
+/// The frame whose first vector is `first` and whose third is as near to `third` as possible. If
+/// both are parallel, any such frame.
 pub(crate) fn keeping_first(first: [f64; 3], third: [f64; 3]) -> [[f64; 3]; 3] {
     let third = across(third, first).unwrap_or_else(|| any_across(first));
     [first, cross(third, first), third]
 }
 
-/// The frame whose third vector is `third` and whose first is as near to `first` as that lets it; without `first`, or
-/// where both are parallel, as near to x, or to y where `third` is nearly along x.
+/// The frame whose third vector is `third` and whose first is as near to `first` as possible.
+/// Without `first`, or if both are parallel, the first vector is as near to x as possible, or to y
+/// if `third` is nearly along x.
 pub(crate) fn keeping_third(first: Option<[f64; 3]>, third: [f64; 3]) -> [[f64; 3]; 3] {
     let first = first
         .and_then(|first| across(first, third))
@@ -19,7 +20,8 @@ pub(crate) fn keeping_third(first: Option<[f64; 3]>, third: [f64; 3]) -> [[f64; 
     [first, cross(third, first), third]
 }
 
-/// What of `v` is perpendicular to the unit vector `to`, as a unit vector; `None` where nothing is left.
+/// Unit vector of the part of `v` that is perpendicular to the unit vector `to`; `None` if `v` is
+/// parallel to it.
 fn across(v: [f64; 3], to: [f64; 3]) -> Option<[f64; 3]> {
     let along = dot(v, to);
     let rest: [f64; 3] = std::array::from_fn(|i| v[i] - along * to[i]);
@@ -28,7 +30,7 @@ fn across(v: [f64; 3], to: [f64; 3]) -> Option<[f64; 3]> {
 }
 
 fn any_across(to: [f64; 3]) -> [f64; 3] {
-    /// Beyond this angle's cosine (26°) to x, y is taken.
+    /// If the cosine of the angle to x is larger than this (26°), y is used instead.
     const NEAR_X: f64 = 0.9;
     let start = if to[0].abs() < NEAR_X {
         [1.0, 0.0, 0.0]

@@ -1,7 +1,7 @@
 //! The elastic laws that a scene can name.
 //!
-//! To add a law: its name in [`LawName`], its parameters in [`Energy`] and [`LawName::keys`], and an
-//! arm in each `match` of this file that the compiler asks for. A number that no law has yet is
+//! To add a law: its name in [`LawName`], its parameters in [`Energy`] and [`LawName::keys`], and
+//! an arm in each `match` of this file that the compiler asks for. A number that no law has yet is
 //! declared in `parameters.rs`. The law itself is one file of `palpa-fem/src/law`, whose head lists
 //! the other places. Reading, checking, writing, schema and reports follow from these.
 
@@ -12,58 +12,62 @@ use crate::parameters::Numbers;
 use crate::units::Pressure;
 use crate::{Sourced, Stiffness};
 
-/// The elastic laws that a tissue can be given.
+/// The elastic laws for a tissue.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum LawName {
-    /// Small strain, a stiffness that never changes. Takes `young` or `shear`.
+    /// Small strain with constant stiffness. Takes `young` or `shear`.
     Linear,
-    /// The linear law with large rotations; softens under compression, for comparison only. Takes `young` or `shear`.
+    /// The linear law with large rotations; it softens under compression, and serves for comparison
+    /// only. Takes `young` or `shear`.
     StVenantKirchhoff,
-    /// C10 (I1 − 3): takes `young`, `shear` or `c10`.
+    /// C10 (I1 − 3). Takes `young`, `shear` or `c10`.
     #[default]
     NeoHookean,
-    /// C10 (I1 − 3) + C01 (I2 − 3): takes `young`, `shear` or `c10`, and `c01`.
+    /// C10 (I1 − 3) + C01 (I2 − 3). Takes `young`, `shear` or `c10`, and `c01`.
     MooneyRivlin,
-    /// C10 (I1 − 3) + C20 (I1 − 3)² + C30 (I1 − 3)³: takes `young`, `shear` or `c10`, and `c20`, `c30`.
+    /// C10 (I1 − 3) + C20 (I1 − 3)² + C30 (I1 − 3)³. Takes `young`, `shear` or `c10`, and `c20`,
+    /// `c30`.
     Yeoh,
-    /// Σ 2µ/α² (λ1^α + λ2^α + λ3^α − 3): takes `terms`, or `young` or `shear` with `alpha`.
+    /// Σ 2µ/α² (λ1^α + λ2^α + λ3^α − 3). Takes `terms`, or `young` or `shear` with `alpha`.
     Ogden,
-    /// µ/(2b) (exp(b (I1 − 3)) − 1), which stiffens as skin does: takes `young` or `shear`, and `b`.
+    /// µ/(2b) (exp(b (I1 − 3)) − 1). Stiffens as skin does. Takes `young` or `shear`, and `b`.
     Fung,
-    /// −µ jm/2 ln(1 − (I1 − 3)/jm), whose chains stretch only so far: takes `young` or `shear`, and `jm`.
+    /// −µ jm/2 ln(1 − (I1 − 3)/jm). Has a limit of stretch. Takes `young` or `shear`, and `jm`.
     Gent,
 }
 
-/// The deviatoric part of a strain energy. `Ī1`, `Ī2` are the isochoric invariants, `λ̄` the isochoric stretches.
+/// The deviatoric part of a strain energy. `Ī1`, `Ī2` are the isochoric invariants, `λ̄` the
+/// isochoric stretches.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Energy {
-    /// `µ dev ε : dev ε` of the small strain `ε`; the stiffness never changes.
+    /// `µ dev ε : dev ε` of the small strain `ε`, with constant stiffness.
     Linear {
-        /// Gives `µ`.
+        /// Determines `µ`.
         stiffness: Stiffness,
     },
-    /// `µ dev E : dev E` of the Green–Lagrange strain `E`; softens under compression, for comparison only.
+    /// `µ dev E : dev E` of the Green–Lagrange strain `E`; it softens under compression, and serves
+    /// for comparison only.
     StVenantKirchhoff {
-        /// Gives `µ`.
+        /// Determines `µ`.
         stiffness: Stiffness,
     },
     /// `C10 (Ī1 − 3)`, `µ = 2 C10`.
     NeoHookean {
-        /// Gives `C10`.
+        /// Determines `C10`.
         stiffness: Stiffness,
     },
     /// `C10 (Ī1 − 3) + C01 (Ī2 − 3)`, `µ = 2 (C10 + C01)`.
     MooneyRivlin {
-        /// Gives `C10`.
+        /// Determines `C10`.
         stiffness: Stiffness,
         /// `C01` in pascals, 0 or more.
         c01: Sourced,
     },
     /// `C10 (Ī1 − 3) + C20 (Ī1 − 3)² + C30 (Ī1 − 3)³`, `µ = 2 C10`.
     Yeoh {
-        /// Gives `C10`.
+        /// Determines `C10`.
         stiffness: Stiffness,
         /// `C20` in pascals.
         c20: Sourced,
@@ -75,16 +79,16 @@ pub enum Energy {
         /// 1 to 6 terms.
         terms: Vec<OgdenTerm>,
     },
-    /// `µ/(2b) (exp(b (Ī1 − 3)) − 1)`: skin, which stiffens as its fibres straighten.
+    /// `µ/(2b) (exp(b (Ī1 − 3)) − 1)`: stiffens as skin does when its fibres straighten.
     Fung {
-        /// Gives `µ`.
+        /// Determines `µ`.
         stiffness: Stiffness,
-        /// How fast it stiffens, above 0.
+        /// Rate of stiffening, above 0.
         b: Sourced,
     },
-    /// `−µ Jm/2 ln(1 − (Ī1 − 3)/Jm)`: stretches no further than `Ī1 − 3 = Jm`.
+    /// `−µ Jm/2 ln(1 − (Ī1 − 3)/Jm)`: the stretch has the limit `Ī1 − 3 = Jm`.
     Gent {
-        /// Gives `µ`.
+        /// Determines `µ`.
         stiffness: Stiffness,
         /// The limit `Jm`, above 0.
         jm: Sourced,
@@ -101,8 +105,8 @@ pub struct OgdenTerm {
 }
 
 impl LawName {
-    /// Its name with the article, the keys by one of which its stiffness is given, and its other keys. `terms` is no
-    /// parameter but a list, and `alpha` its short form.
+    /// Name with the article, the alternative keys for the stiffness, and the other keys.
+    /// `terms` is a list and not a parameter; `alpha` is its short form.
     fn words(
         self,
     ) -> (
@@ -133,18 +137,19 @@ impl LawName {
         self.words().0
     }
 
-    /// The keys it takes beside those of the volume.
+    /// All its keys except those of the volume.
     pub(crate) fn keys(self) -> impl Iterator<Item = &'static str> {
         let (_, stiffness, own) = self.words();
         stiffness.iter().chain(own).copied()
     }
 
-    /// Whether it takes the volume's quadratic energy only.
+    /// Whether its volumetric energy is always quadratic.
     pub(crate) fn is_quadratic(self) -> bool {
         matches!(self, Self::Linear | Self::StVenantKirchhoff)
     }
 
-    /// The energy of this stiffness and the parameters that `own` gives by their keys; of Ogden's, `terms`.
+    /// The energy with this stiffness. `own` gives the other parameters by their keys; for Ogden's
+    /// law, `terms` are used.
     pub(crate) fn energy<E>(
         self,
         stiffness: impl FnOnce() -> Result<Stiffness, E>,
@@ -184,7 +189,7 @@ impl LawName {
 }
 
 impl Energy {
-    /// Its law, as a scene names it.
+    /// The law's name in a scene.
     pub(crate) fn law(&self) -> LawName {
         match self {
             Self::Linear { .. } => LawName::Linear,
@@ -203,7 +208,7 @@ impl Energy {
         self.law().name()
     }
 
-    /// The stiffness as it was given; `None` for Ogden's, whose terms give it.
+    /// The stiffness as it was given; `None` for Ogden's energy, whose terms determine it.
     pub fn stiffness(&self) -> Option<&Stiffness> {
         match self {
             Self::Linear { stiffness }
@@ -217,7 +222,7 @@ impl Energy {
         }
     }
 
-    /// The terms of Ogden's energy; none of any other.
+    /// The terms of Ogden's energy; empty for all others.
     pub fn terms(&self) -> &[OgdenTerm] {
         match self {
             Self::Ogden { terms } => terms,
@@ -225,7 +230,7 @@ impl Energy {
         }
     }
 
-    /// Its parameters beside stiffness and terms, by their keys.
+    /// The parameters other than stiffness and terms, by their keys.
     pub(crate) fn own(&self) -> Numbers<&Sourced> {
         let mut numbers = Numbers::default();
         match self {
@@ -244,7 +249,7 @@ impl Energy {
         numbers
     }
 
-    /// What the second invariant has of half the shear modulus, in pascals.
+    /// The contribution of the second invariant to half the shear modulus, in pascals.
     pub(crate) fn c01(&self) -> f64 {
         match self {
             Self::MooneyRivlin { c01, .. } => c01.value,
@@ -252,7 +257,8 @@ impl Energy {
         }
     }
 
-    /// The key of a parameter that makes the energy shrink with strain beside this `C10`, in pascals, and why.
+    /// The key of a parameter that makes the energy decrease with strain, given this `C10` in
+    /// pascals, and the reason.
     pub(crate) fn fault(&self, c10: f64, shear: f64) -> Option<(&'static str, String)> {
         match self {
             Self::MooneyRivlin { c01, .. } if c10 < 0.0 => Some((

@@ -1,7 +1,8 @@
-//! Scene file, units and the tissue catalogue.
+//! The scene file, units, and the catalogue of tissues.
 //!
-//! A scene is a TOML file that says which body is pressed, of which layers it is made, and how it is pressed. What
-//! [`Scene::load`] returns is complete and valid: lengths are metres, tissues are looked up, defaults are filled in.
+//! A scene is a TOML file with a body, its layers, and the way it is pressed. [`Scene::load`]
+//! returns a complete and valid scene: lengths are in metres, tissues are looked up, and defaults
+//! are filled in.
 //!
 //! ```
 //! use palpa_scene::Scene;

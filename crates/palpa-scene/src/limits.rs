@@ -1,4 +1,4 @@
-//! What each key of a scene may be at most and at least. The descriptions in `file.rs` repeat these in words.
+//! The allowed range of each key of a scene. The descriptions in `file.rs` repeat these in words.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use crate::units::{
     Angle, Density, Kind, Length, Pressure, Quantity, Rate, SpringConstant, Time, Velocity,
 };
 
-/// Larger scene files are refused unread. bytes
+/// Largest size of a scene file, bytes.
 pub(crate) const MAX_FILE: u64 = 1 << 20;
 /// Most layers of a scene.
 pub(crate) const MAX_LAYERS: usize = 32;
@@ -26,10 +26,10 @@ pub(crate) const MAX_SPEEDS: usize = 16;
 pub(crate) const MAX_ROWS: usize = 1000;
 /// Most results of a press on the way down: `depth / step`.
 pub(crate) const MAX_STEPS: f64 = 5000.0;
-/// Most skin vertices that a generator is asked for.
+/// Largest number of skin vertices of a generated body.
 pub(crate) const MAX_VERTICES: f64 = 500_000.0;
 
-/// What a value may be, both ends included.
+/// An allowed range, both ends included.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits<T> {
     pub(crate) min: T,
@@ -70,13 +70,13 @@ pub(crate) const SCALE: Limits<f64> = numbers(0.2, 3.0);
 pub(crate) const THICKNESS: Limits<Length> = between(1e-5, 0.5);
 pub(crate) const MIN_THICKNESS: Limits<Length> = between(1e-6, 0.1);
 pub(crate) const LEVELS: Limits<u32> = numbers(1, 64);
-/// Below the softest gel, above what is still not rigid beside tissue.
+/// From below the softest gel to nearly rigid compared with tissue.
 pub(crate) const YOUNG: Limits<Pressure> = between(10.0, 1e9);
-/// At 0.5 the volume is constant and the stiffness infinite.
+/// At 0.5 the bulk modulus would be infinite.
 pub(crate) const POISSON: Limits<f64> = numbers(0.0, 0.4999);
-/// Shear moduli and the constants that make them.
+/// Shear moduli, and the constants that determine them.
 pub(crate) const SHEAR: Limits<Pressure> = between(1.0, 1e9);
-/// What is left in the end is at least a hundredth, as in `PRONY_SUM`.
+/// At least a hundredth of the stiffness must remain in the end, as in `PRONY_SUM`.
 pub(crate) const PRONY_G: Limits<f64> = numbers(0.001, 0.99);
 pub(crate) const PRONY_SUM: f64 = 0.99;
 pub(crate) const PRONY_TAU: Limits<Time> = between(1e-4, 1e5);
@@ -87,14 +87,14 @@ pub(crate) const TOOL_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
 pub(crate) const TOOL_SIZE: Limits<Length> = between(0.2e-3, 0.4);
 pub(crate) const TOOL_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
 pub(crate) const EDGE_RADIUS: Limits<Length> = between(1e-6, 0.2);
-/// 20° and 160°, as texts of degrees are read.
+/// 20° and 160°, as the reader converts them from degrees.
 pub(crate) const OPENING_ANGLE: Limits<Angle> = between(0.349065850398866, 2.792526803190927);
 pub(crate) const FRICTION: Limits<f64> = numbers(0.0, 5.0);
 pub(crate) const LUMP_RADIUS: Limits<Length> = between(0.1e-3, 0.2);
 pub(crate) const LUMP_LENGTH: Limits<Length> = between(0.1e-3, 0.4);
 pub(crate) const LUMP_DEPTH: Limits<Length> = between(0.1e-3, 0.5);
 pub(crate) const TRANSITION: Limits<Length> = between(0.0, 0.05);
-/// At 1 the element has modes without energy.
+/// At 1 the element would have modes without energy.
 pub(crate) const ALPHA: Limits<f64> = numbers(0.0, 0.95);
 pub(crate) const TOLERANCE: Limits<f64> = numbers(1e-12, 1e-3);
 pub(crate) const DAMPING_MASS: Limits<Rate> = between(0.0, 1e5);
@@ -107,7 +107,7 @@ pub(crate) const DEPTH: Limits<Length> = between(1e-6, 0.5);
 pub(crate) const SPEED: Limits<Velocity> = between(1e-5, 1.0);
 pub(crate) const HOLD: Limits<Time> = between(0.0, 600.0);
 pub(crate) const ACROSS: Limits<Length> = between(0.1e-3, 0.5);
-/// Beyond a pathological tremor it is a motion.
+/// A larger amplitude than a pathological tremor is a motion.
 pub(crate) const TREMOR: Limits<Length> = between(0.0, 5e-3);
 pub(crate) const ABOVE: Limits<Length> = between(0.1e-3, 0.1);
 pub(crate) const SUBSTEPS: Limits<u32> = numbers(1, 1024);
@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
 
-    /// What the schema says of a key must be what is checked.
+    /// Checks that the range in the schema's description is the one that is enforced.
     fn says(table: &str, key: &str, limits: &dyn fmt::Display) {
         static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(crate::scene_schema);
         let keys = match table {

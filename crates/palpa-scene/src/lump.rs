@@ -1,4 +1,4 @@
-//! Lumps: what is harder or softer than the layers round it.
+//! Lumps: inclusions that are harder or softer than the layers around them.
 
 use std::path::PathBuf;
 
@@ -12,15 +12,15 @@ pub struct Lump {
     pub name: String,
     /// Its shape.
     pub shape: LumpShape,
-    /// Where it lies.
+    /// Its place.
     pub place: LumpPlace,
-    /// Unit vector along which its first radius or its length points; `None` is along the skin, see
+    /// Unit vector of its first radius or its length; `None` is along the skin, see
     /// [`axes`](Self::axes).
     pub axis: Option<[f64; 3]>,
-    /// What it is made of; never a tissue given by a spring stiffness.
+    /// Its tissue; never one given by a spring stiffness.
     pub tissue: Tissue,
-    /// Width of the zone, with its middle on the lump's surface, over which its tissue passes into the one round it; 0
-    /// for a sharp edge.
+    /// Width of the transition between its tissue and the tissue around it, centred on the lump's
+    /// surface; 0 for a sharp edge.
     pub transition: f64,
 }
 
@@ -48,19 +48,19 @@ pub enum LumpShape {
     Mesh(PathBuf),
 }
 
-/// Where a lump lies.
+/// The place of a lump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LumpPlace {
-    /// Its centre is below a place of the skin at rest.
+    /// The centre is below a place of the skin at rest.
     Below {
         /// The place of the skin.
         target: Target,
         /// Depth of the centre along the inward normal of the skin there.
         depth: f64,
     },
-    /// Its centre is here.
+    /// The centre is at this point.
     At([f64; 3]),
-    /// Where its mesh has it.
+    /// The position in the mesh file.
     AsRead,
 }
 
@@ -76,10 +76,12 @@ impl LumpShape {
 }
 
 impl Lump {
-    /// The lump's own axes, three unit vectors of a right-handed frame, where the skin's inward normal is `inward`.
+    /// The lump's own axes: three unit vectors of a right-handed frame. `inward` is the skin's
+    /// inward normal.
     ///
-    /// The first points along `axis`, or else along the skin as near to the body's x as it goes (to y where the skin looks
-    /// along x); the third inward as nearly as the first lets it.
+    /// The first axis points along `axis`. Without `axis` it lies along the skin, as near to the
+    /// body's x as possible, or to y if the skin's normal is along x. The third axis is as near to
+    /// `inward` as possible.
     pub fn axes(&self, inward: [f64; 3]) -> [[f64; 3]; 3] {
         match self.axis {
             Some(axis) => frame::keeping_first(axis, inward),

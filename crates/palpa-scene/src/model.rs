@@ -1,4 +1,4 @@
-//! The model of response and the mesh it works on.
+//! The model of the body and its mesh.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,21 +6,23 @@ use serde::{Deserialize, Serialize};
 use crate::lump::Lump;
 use crate::tool::Tool;
 
-/// How the body answers.
+/// The model of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {
-    /// Which model.
+    /// Kind of model.
     pub kind: ModelKind,
-    /// Share of the deviatoric strain that two paired prisms take as their mean, 0 to 0.95. More is softer and nearer to
-    /// the truth on a coarse mesh, and lets a node that is pressed alone move against its neighbours.
+    /// Share of the deviatoric strain that two paired prisms average, 0 to 0.95. A larger share is
+    /// softer and more accurate on a coarse mesh, but a node that is pressed alone can then move
+    /// against its neighbours.
     pub alpha: f64,
-    /// Whether mass and damping count.
+    /// Whether inertia and damping are included.
     pub dynamics: Dynamics,
-    /// Largest force left over at a free node in equilibrium, relative to the scale of the forces in the body.
+    /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
+    /// forces in the body.
     pub tolerance: f64,
 }
 
-/// The models of response.
+/// The models of the body.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelKind {
@@ -31,51 +33,55 @@ pub enum ModelKind {
     Reference,
 }
 
-/// Whether mass and damping count.
+/// Whether inertia and damping are included.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Dynamics {
-    /// Equilibrium at every moment; time acts through relaxation only.
+    /// Equilibrium at every moment; time matters only through relaxation.
     #[default]
     QuasiStatic,
-    /// Mass and damping, stepped implicitly.
+    /// Inertia and damping, with implicit time steps.
     Implicit(Damping),
 }
 
 /// Rayleigh damping: the damping matrix is `mass · M + stiffness · K`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Damping {
-    /// The factor of the mass, in 1/s.
+    /// Factor of the mass matrix, in 1/s.
     pub mass: f64,
-    /// The factor of the stiffness, in seconds.
+    /// Factor of the stiffness matrix, in seconds.
     pub stiffness: f64,
 }
 
-/// How fine the body is made where it matters. Lengths in metres.
+/// Mesh size near the tool and lumps. Lengths in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mesh {
-    /// Whether the body is refined at all; else it is taken as it was grown.
+    /// Whether the mesh is refined; if false, it stays as it was grown.
     pub refine: bool,
-    /// Wanted length of edges and height of levels under the tool; `None` is [automatic](Self::near_tool_of).
+    /// Wanted length of edges and height of levels under the tool; `None` is
+    /// [automatic](Self::near_tool_of).
     pub near_tool: Option<f64>,
-    /// Wanted length of edges and height of levels in and round lumps; `None` is [automatic](Self::near_lump_of).
+    /// Wanted length of edges and height of levels in and around lumps; `None` is
+    /// [automatic](Self::near_lump_of).
     pub near_lumps: Option<f64>,
-    /// By which share of the distance from tool or lump the wanted length grows.
+    /// Increase of the wanted length with the distance from the tool or lump, as a share of that
+    /// distance.
     pub growth: f64,
-    /// Most skin vertices that refinement may lead to.
+    /// Largest number of skin vertices after refinement.
     pub max_vertices: usize,
-    /// Whether in real time what is fine near the tool moves with it; else it lies along the whole way of the motion.
+    /// Whether the fine part near the tool moves with it in real time; if false, the body is fine
+    /// along the whole way of the motion.
     pub moves: bool,
 }
 
 impl Mesh {
-    /// Edges are not made shorter than this unasked. m
+    /// Least automatic edge length, m.
     const FINEST: f64 = 0.5e-3;
-    /// Nor are they left longer than this near a tool. m
+    /// Largest automatic edge length near a tool, m.
     const COARSEST: f64 = 10e-3;
 
-    /// Wanted length near `tool` in metres: as given, or else a quarter of its
-    /// [contact radius](Tool::contact_radius), and no more than a third of the radius that its edge is rounded by, 0.5 mm to
-    /// 10 mm; `None` for a node, which has no size.
+    /// Wanted length near `tool` in metres, as given or by default. Default: a quarter of the
+    /// [contact radius](Tool::contact_radius), at most a third of the radius of the rounded edge,
+    /// 0.5 mm to 10 mm. `None` for a node, which has no size.
     pub fn near_tool_of(&self, tool: &Tool) -> Option<f64> {
         let radius = tool.contact_radius();
         let edge = tool.contact().and_then(|tool| tool.shape.edge_radius());
@@ -84,8 +90,8 @@ impl Mesh {
         self.near_tool.or(automatic)
     }
 
-    /// Wanted length near `lump` in metres: as given, or else half its smallest radius, 0.5 mm to 10 mm; `None` for a
-    /// mesh of which nothing is given.
+    /// Wanted length near `lump` in metres, as given or by default. Default: half the smallest
+    /// radius, 0.5 mm to 10 mm; `None` for a mesh.
     pub fn near_lump_of(&self, lump: &Lump) -> Option<f64> {
         let automatic = lump.shape.smallest_radius();
         let automatic = automatic.map(|r| (r / 2.0).clamp(Self::FINEST, Self::COARSEST));

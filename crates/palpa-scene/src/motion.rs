@@ -1,16 +1,16 @@
-//! Who presses in real time, and how the hand moves.
+//! The device and the motion of the hand in real time.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The haptic device that presses in real time, and how it is held.
+/// The haptic device used in real time, and the grip of the hand on it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Device {
-    /// How it is driven.
+    /// How the device is driven.
     pub kind: DeviceKind,
-    /// Which device.
+    /// The model of the device.
     pub preset: DevicePreset,
-    /// How a simulated hand holds it.
+    /// The grip of the simulated hand.
     pub grip: Grip,
 }
 
@@ -18,12 +18,13 @@ pub struct Device {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceKind {
-    /// Computed: mass, friction, sensor steps and delays of the real one, in a simulated hand.
+    /// Simulated: with mass, friction, sensor resolution and delays of the real device, in a
+    /// simulated hand.
     #[default]
     Simulated,
 }
 
-/// The devices whose figures are known.
+/// The devices with known data.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DevicePreset {
@@ -34,12 +35,12 @@ pub enum DevicePreset {
     Touch,
     /// Haply Inverse3.
     Inverse3,
-    /// Without friction, sensor steps and delay, and strong.
+    /// Strong, without friction, sensor steps and delay.
     Ideal,
 }
 
 impl DevicePreset {
-    /// Its word in a scene.
+    /// Its name in a scene.
     pub fn name(self) -> &'static str {
         match self {
             Self::Falcon => "falcon",
@@ -50,21 +51,21 @@ impl DevicePreset {
     }
 }
 
-/// How fast a hand holds a device.
+/// How firmly a hand holds a device.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Grip {
     /// Barely held.
     Soft,
-    /// As a pen.
+    /// Held like a pen.
     #[default]
     Medium,
-    /// Held fast.
+    /// Held firmly.
     Stiff,
 }
 
 impl Grip {
-    /// Its word in a scene.
+    /// Its name in a scene.
     pub fn name(self) -> &'static str {
         match self {
             Self::Soft => "soft",
@@ -74,26 +75,27 @@ impl Grip {
     }
 }
 
-/// How the hand moves in real time, over and over. Lengths in metres, times in seconds.
+/// The motion of the hand in real time, repeated. Lengths in metres, times in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// What it does.
+    /// Kind of motion.
     pub kind: MotionKind,
-    /// How far down the hand goes, from where the tool first touches.
+    /// Depth that the hand moves to, from the first touch of the tool.
     pub depth: f64,
-    /// Its largest speed, in m/s.
+    /// Largest speed of the hand, in m/s.
     pub speed: f64,
-    /// How long it rests at the depth.
+    /// Time that the hand rests at the depth.
     pub hold: f64,
-    /// How far it strokes, drags or palpates across the skin.
+    /// Length of a stroke, drag or palpation across the skin.
     pub length: f64,
-    /// Unit vector along which it does; its part along the skin counts. `None` is the tool's first axis.
+    /// Unit vector of its direction; only the part along the skin counts. `None` is the tool's
+    /// first axis.
     pub along: Option<[f64; 3]>,
-    /// How often it taps or drags there and back, or at how many places it palpates, at least 1.
+    /// Number of taps, of drags there and back, or of palpated places, at least 1.
     pub times: u32,
-    /// How much the hand trembles: root of the mean square.
+    /// Tremor of the hand, as the root mean square.
     pub tremor: f64,
-    /// How high over the skin it begins and ends.
+    /// Height above the skin at the start and end.
     pub above: f64,
 }
 
@@ -104,18 +106,18 @@ pub enum MotionKind {
     /// Down, rest, up.
     #[default]
     Press,
-    /// Down, across, up.
+    /// Down, across the skin, up.
     Stroke,
-    /// Down, there and back across, up.
+    /// Down, across the skin and back, up.
     Drag,
     /// Quick short presses.
     Tap,
-    /// Pressed at places along a line, with small circles at each, as a physician feels for a lump.
+    /// Presses at places along a line, with small circles at each, as a physician feels for a lump.
     Palpate,
 }
 
 impl MotionKind {
-    /// Its word in a scene.
+    /// Its name in a scene.
     pub fn name(self) -> &'static str {
         match self {
             Self::Press => "press",
@@ -126,7 +128,7 @@ impl MotionKind {
         }
     }
 
-    /// Whether it goes across the skin.
+    /// Whether the motion goes across the skin.
     pub fn goes_across(self) -> bool {
         matches!(self, Self::Stroke | Self::Drag | Self::Palpate)
     }

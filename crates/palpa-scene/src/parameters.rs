@@ -1,7 +1,8 @@
-//! The numbers that elastic laws take: key, unit, range, default and description of each, declared once.
+//! The numbers that elastic laws take: key, unit, range, default and description of each, declared
+//! in one place.
 //!
-//! A scene file is read, checked and written, its schema described and its materials reported from
-//! [`PARAMETERS`]. Which law takes which of them is in `law.rs`.
+//! Reading, checking, writing, the schema and the reports all use [`PARAMETERS`]. `law.rs` says
+//! which law takes which parameter.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::ser::SerializeMap;
@@ -20,7 +21,7 @@ pub(crate) struct ParameterSpec {
     pub(crate) key: &'static str,
     pub(crate) unit: Unit,
     pub(crate) range: Range,
-    /// Its value where the scene gives none.
+    /// What happens if the scene does not give it.
     pub(crate) missing: Missing,
     /// Its description in the schema; `{range}` stands for the range.
     pub(crate) about: &'static str,
@@ -35,22 +36,22 @@ pub(crate) enum Unit {
     One,
 }
 
-/// The values that a parameter may have, in SI, both ends included.
+/// The allowed values of a parameter, in SI units, both ends included.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Range {
     Within(f64, f64),
-    /// The range of the size of a number of either sign.
+    /// Range of the absolute value; the number may have either sign.
     Size(f64, f64),
 }
 
-/// What a law does without one of its parameters.
+/// What happens if a law's parameter is missing.
 #[derive(Debug)]
 pub(crate) enum Missing {
-    /// It does without, or takes another in its place.
+    /// It is not needed, or another parameter takes its place.
     Optional,
-    /// It has this value, from this source.
+    /// It has this default value, from this source.
     Default(f64, &'static str),
-    /// It is refused: `a fung law needs …`.
+    /// The scene is refused with this reason: `a fung law needs …`.
     Refused(&'static str),
 }
 
@@ -66,7 +67,7 @@ pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
     ParameterSpec {
         key: "young",
         unit: Pascal,
-        // Below the softest gel, above what is still not rigid beside tissue.
+        // From below the softest gel to nearly rigid compared with tissue.
         range: Within(limits::YOUNG.min.si(), limits::YOUNG.max.si()),
         missing: Optional,
         about: "Young's modulus at small strain, {range}. Stands in place of `c10`, `shear` or an Ogden term's `mu`.",
@@ -110,7 +111,7 @@ pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
     ParameterSpec {
         key: "alpha",
         unit: One,
-        // Smaller exponents cancel, larger ones overflow, and neither fits a tissue.
+        // Smaller exponents cancel and larger ones overflow; neither fits a tissue.
         range: Size(0.001, 100.0),
         missing: Optional,
         about: "Ogden with `young` or `shear`: the exponent of the one term, of either sign and a size of {range}.",
@@ -141,7 +142,7 @@ pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
     ParameterSpec {
         key: "bulk",
         unit: Pascal,
-        // Up to a thousand times that of water.
+        // The upper limit is below a thousand times the bulk modulus of water.
         range: Within(1.0, 1e12),
         missing: Optional,
         about: "The bulk modulus K in place of `poisson`, {range} and such that Poisson's ratio is 0 to 0.4999. D1 of \
@@ -150,7 +151,7 @@ pub(crate) static PARAMETERS: [ParameterSpec; N_PARAMETERS] = [
 ];
 
 impl ParameterSpec {
-    /// The parameter with this key of [`PARAMETERS`].
+    /// The entry of [`PARAMETERS`] with this key.
     pub(crate) fn of(key: &str) -> Option<&'static Self> {
         PARAMETERS.iter().find(|spec| spec.key == key)
     }
@@ -167,7 +168,7 @@ impl ParameterSpec {
         }
     }
 
-    /// A value of this parameter that stands at `at`, if it is within the range.
+    /// The value at `at`, or an error if it is out of range.
     pub(crate) fn checked(&self, at: &Site<'_>, value: f64) -> Result<f64, SceneError> {
         match (self.range, self.unit) {
             (Within(min, max), One) => at.within(value, &Limits { min, max }),
@@ -209,7 +210,7 @@ impl ParameterSpec {
 }
 
 impl Unit {
-    /// Its symbol; empty of a plain number.
+    /// Its symbol; empty for a plain number.
     pub(crate) fn symbol(self) -> &'static str {
         match self {
             Pascal => "Pa",
@@ -237,7 +238,7 @@ impl<T> Numbers<T> {
         self.0[place(key)] = Some(value);
     }
 
-    /// Those that are given, in the order of [`PARAMETERS`].
+    /// The given values, in the order of [`PARAMETERS`].
     pub(crate) fn given(&self) -> impl Iterator<Item = (&'static ParameterSpec, &T)> {
         let all = PARAMETERS.iter().zip(&self.0);
         all.filter_map(|(spec, value)| Some((spec, value.as_ref()?)))
@@ -249,7 +250,7 @@ fn place(key: &str) -> usize {
     place.unwrap_or_else(|| panic!("`{key}` is no parameter of a law"))
 }
 
-/// As the keys of a tissue's table.
+/// Serialized as keys of a tissue's table.
 impl Serialize for Numbers<f64> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;

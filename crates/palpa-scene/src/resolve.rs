@@ -1,4 +1,5 @@
-//! From the scene as written to the scene: ranges, combinations, defaults, the catalogue.
+//! From the scene file to the scene: checks ranges and combinations, fills in defaults, and looks
+//! tissues up in the catalogue.
 
 mod body;
 pub(crate) mod law;
@@ -20,14 +21,14 @@ use crate::scene::{Generator, Press, Scene, Skin, Target};
 use crate::units::{Kind, Length, Quantity, Velocity};
 use crate::{SceneError, Thickness};
 
-/// Results on the way down, unless the scene says otherwise.
+/// Default number of steps down.
 const DEFAULT_STEPS: f64 = 32.0;
-/// Speed of the tool, unless the scene says otherwise. m/s
+/// Default speed of the tool, m/s.
 const DEFAULT_SPEED: f64 = 10e-3;
 
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let mut bytes = Vec::new();
-    // One byte more than allowed tells a file that is too large from one that just fits.
+    // One byte more than allowed distinguishes a file that is too large from one that just fits.
     File::open(path)
         .and_then(|file| file.take(limits::MAX_FILE + 1).read_to_end(&mut bytes))
         .map_err(|source| SceneError::Io {
@@ -124,7 +125,7 @@ impl<'a> Reader<'a> {
         let step = match press.step {
             None => depth.si() / DEFAULT_STEPS,
             Some(step) => {
-                // A step that divides the depth evenly may miss the bound by rounding.
+                // A step that divides the depth evenly may miss the limit by rounding.
                 let finest = depth.si() / limits::MAX_STEPS;
                 if step > depth || step.si() < finest * (1.0 - 1e-9) {
                     return Err(at.key("step").invalid(format!(
@@ -152,7 +153,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// What concerns body, layers and press together: the layers reach a base, and the press ends above it.
+    /// Checks body, layers and press together: the layers reach a base, and the press ends above
+    /// the base.
     fn depths(&self, scene: &Scene) -> Result<(), SceneError> {
         let at = self.site("layer");
         let last = scene.layers.len() - 1;
@@ -178,7 +180,7 @@ impl<'a> Reader<'a> {
             .filter_map(|layer| layer.thickness.as_ref())
             .map(Thickness::largest)
             .sum();
-        // A file's thickness is not known here; then growth and press see to it.
+        // The thicknesses in a file are not known here; growth and press check them later.
         let Some(layers) = layers else { return Ok(()) };
         if let Some(depth) = body_depth {
             let too_thick = if reaches_down {
@@ -210,7 +212,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The speed, or those of a sweep, in m/s; at least one.
+/// The speed, or the speeds of a sweep, in m/s; at least one.
 fn speeds(at: &Site<'_>, press: &PressTable) -> Result<Vec<f64>, SceneError> {
     let within = |at: Site<'_>, speed| Ok(at.within(speed, &limits::SPEED)?.si());
     let (n, most) = (press.speeds.len(), limits::MAX_SPEEDS);
@@ -248,7 +250,7 @@ pub(crate) fn each<K: Kind>(
     Ok(si)
 }
 
-/// The unit vector that an axis or three numbers name.
+/// The unit vector given by the name of an axis or by three numbers.
 fn direction(at: &Site<'_>, axis: AxisSpec) -> Result<[f64; 3], SceneError> {
     match axis {
         AxisSpec::Name(AxisName::X) => Ok([1.0, 0.0, 0.0]),
@@ -268,7 +270,7 @@ fn unit_vector(at: &Site<'_>, vector: [f64; 3]) -> Result<[f64; 3], SceneError> 
     }
     let scaled = vector.map(|x| x / largest);
     let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // What is a unit vector already stays as it is to the bit.
+    // A vector that is a unit vector already stays unchanged, bit for bit.
     Ok(if (length * largest - 1.0).abs() < 1e-14 {
         vector
     } else {

@@ -1,4 +1,4 @@
-//! The scene as the rest of the program sees it: plain data, SI, complete.
+//! The scene for the rest of the program: plain data in SI units, complete.
 
 use std::path::{Path, PathBuf};
 
@@ -11,34 +11,36 @@ use crate::{
     write::{self, Names},
 };
 
-/// The forearm that is pressed when no scene is named.
+/// The scene that is used when none is named: a forearm.
 const EMBEDDED: &str = include_str!("../scenes/forearm.toml");
 
-/// What is pressed, of which layers it is made, and how it is pressed. Lengths in metres, everything in SI.
+/// The body, its layers, and the way it is pressed. Lengths in metres, everything in SI units.
 ///
-/// A scene that [`Scene::parse`] or [`Scene::load`] returns keeps all the ranges of the scene file. Its fields are open
-/// so that a program can set its own; it then answers for their ranges.
+/// A scene from [`Scene::parse`] or [`Scene::load`] respects all ranges of the scene file. The
+/// fields are public, so a program can set its own values; [`Press::check`] checks those of a
+/// press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// The folder that the paths of the scene are relative to; it is already part of every path in here.
+    /// The folder that the paths of the scene are relative to. All paths in here include it
+    /// already.
     pub base_dir: PathBuf,
     /// The body.
     pub body: Body,
     /// The layers, from the skin inward, at least one.
     pub layers: Vec<Layer>,
-    /// The lumps in them; where two overlap, the later one counts.
+    /// The lumps in the layers. Where two overlap, the later one counts.
     pub lumps: Vec<Lump>,
-    /// What presses.
+    /// The tool.
     pub tool: Tool,
-    /// Where, how deep and how fast it presses.
+    /// Place, depth and speed of the press.
     pub press: Press,
-    /// What presses it in real time.
+    /// The device used in real time.
     pub device: Device,
-    /// How the hand moves that holds the device.
+    /// The motion of the hand that holds the device.
     pub motion: Motion,
-    /// How the body answers.
+    /// The model of the body.
     pub model: Model,
-    /// How fine the body is made where it matters.
+    /// Mesh size near the tool and lumps.
     pub mesh: Mesh,
     /// Parameters of the reference method.
     pub reference: Reference,
@@ -47,19 +49,19 @@ pub struct Scene {
 /// The body before it is divided into layers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// Where its skin comes from.
+    /// Source of its skin.
     pub skin: Skin,
-    /// Files of its bones; empty with a generator, which brings its own.
+    /// Files of its bones; empty with a generator, which makes its own.
     pub bones: Vec<PathBuf>,
-    /// Unit of the lengths in the files of the scene.
+    /// Unit of the lengths in the scene's files.
     pub unit: LengthUnit,
-    /// The part that is kept, if not all.
+    /// The part that is kept; `None` for the whole body.
     pub cutout: Option<Cutout>,
-    /// How the cut faces are held.
+    /// Support of the cut faces.
     pub cut_faces: CutFaces,
 }
 
-/// Where the skin comes from.
+/// Source of the skin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Skin {
     /// A triangle mesh in a file.
@@ -75,23 +77,23 @@ pub enum Generator {
     Block {
         /// Width, length and depth.
         size: [f64; 3],
-        /// Distance of neighbouring skin vertices.
+        /// Distance between neighbouring skin vertices.
         spacing: f64,
     },
-    /// A cylinder round one straight bone.
+    /// A cylinder around one straight bone.
     Cylinder {
         /// Its length.
         length: f64,
         /// Radius of its skin.
         radius: f64,
-        /// Radius of its bone, below `radius`.
+        /// Radius of its bone, less than `radius`.
         bone_radius: f64,
-        /// Distance of neighbouring skin vertices.
+        /// Distance between neighbouring skin vertices.
         spacing: f64,
     },
     /// A forearm with ulna and radius.
     Forearm {
-        /// Distance of neighbouring skin vertices.
+        /// Distance between neighbouring skin vertices.
         spacing: f64,
         /// Size relative to an average adult's.
         scale: f64,
@@ -101,9 +103,9 @@ pub enum Generator {
 /// The part of a large body that is kept.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cutout {
-    /// Distance from the middle up to which the body is kept, in metres.
+    /// The body is kept within this distance of `at`, in metres.
     pub radius: f64,
-    /// The middle of the part; never [`Target::Middle`].
+    /// Centre of the part; never [`Target::Middle`].
     pub at: Target,
 }
 
@@ -114,7 +116,7 @@ pub enum Target {
     Middle,
     /// The point of the skin nearest to this one, in metres.
     Point([f64; 3]),
-    /// The skin vertex of this number, as counted in the skin surface.
+    /// The skin vertex with this number, as counted in the skin surface.
     Vertex(u32),
 }
 
@@ -145,16 +147,16 @@ impl LengthUnit {
     }
 }
 
-/// How the cut faces are held.
+/// Support of the cut faces.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CutFaces {
-    /// Not at all.
+    /// The faces are free.
     #[default]
     Free,
-    /// Every node at its place.
+    /// Every node is fixed.
     Fixed,
-    /// Nodes move in the plane of the face only.
+    /// Nodes move only in the plane of the face.
     Symmetric,
 }
 
@@ -165,19 +167,19 @@ pub struct Layer {
     pub tissue: Tissue,
     /// Its thickness; `None` only in the last layer, which then reaches to the bone or base.
     pub thickness: Option<Thickness>,
-    /// How far the thickness is to be trusted.
+    /// How reliable the thickness is.
     pub thickness_status: Status,
-    /// Where the thickness is from; may be empty.
+    /// Source of the thickness; may be empty.
     pub thickness_source: String,
-    /// Number of element levels (prism intervals) over its thickness, at least 1.
+    /// Number of element levels (prism intervals) through its thickness, at least 1.
     pub levels: usize,
-    /// How thin it may become where there is no room, in metres; no more than its thickness.
+    /// Least thickness where there is no room for more, in metres; no more than the thickness.
     pub min_thickness: f64,
-    /// Tension in every direction of its plane before anything presses, in pascals.
+    /// Tension in every direction of the layer's plane before anything presses, in pascals.
     pub prestress: f64,
 }
 
-/// Where, how deep and how fast the tool presses.
+/// Place, depth and speed of a press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Press {
     /// The place on the skin.
@@ -188,34 +190,36 @@ pub struct Press {
     pub depth: f64,
     /// Speed down and up, in m/s.
     pub speed: f64,
-    /// Speeds of a sweep, in m/s: the whole press is run at each. Empty without a sweep; else `speed` is the first.
+    /// Speeds of a sweep, in m/s: the whole press is run at each, and `speed` is the first. Empty
+    /// without a sweep.
     pub speeds: Vec<f64>,
     /// Rest at the depth, in seconds.
     pub hold: f64,
     /// Whether the tool comes back up.
     pub retract: bool,
-    /// How often it goes down and comes back, at least 1; more than once only with `retract`.
+    /// Number of cycles, at least 1; more than one only with `retract`.
     pub cycles: u32,
-    /// Growth of the depth from one result to the next, in metres; no more than `depth`.
+    /// Increase of the depth from one result to the next, in metres; no more than `depth`.
     pub step: f64,
 }
 
 /// Parameters of the reference method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reference {
-    /// Parts into which each step is divided, at least 1.
+    /// Number of parts into which each step is divided, at least 1.
     pub substeps: u32,
-    /// How a sub-step is solved.
+    /// Solver of a sub-step.
     pub solver: Solver,
-    /// Material of the bars in a level between two layers.
+    /// Layer whose stiffness the bars in the level between two layers have.
     pub in_plane: InPlane,
     /// Share of a spring's change of length that correction (3.21) takes back, 0 (off) to 1.
     pub spring_gain: f64,
-    /// Share of the way to its place at rest by which correction (3.22) moves a node, 0 (off) to 1.
+    /// Share of the way back to its place at rest by which correction (3.22) moves a node, 0 (off)
+    /// to 1.
     pub shape_gain: f64,
 }
 
-/// How a sub-step of the reference method is solved.
+/// The solvers of a sub-step of the reference method.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
@@ -228,13 +232,13 @@ pub enum Solver {
     Euler,
 }
 
-/// Material of the bars in a level between two layers.
+/// Stiffness of the bars in the level between two layers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InPlane {
-    /// That of the layer above the level.
+    /// The stiffness of the layer above the level.
     Above,
-    /// That of the layer below the level.
+    /// The stiffness of the layer below the level.
     #[default]
     Below,
     /// The mean of both.
@@ -245,7 +249,7 @@ impl Scene {
     /// Reads and checks a scene file; its paths are relative to the file's folder.
     ///
     /// # Errors
-    /// When the file cannot be read or is no valid scene; see [`SceneError`].
+    /// When the file cannot be read or is not a valid scene; see [`SceneError`].
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         resolve::load(path)
     }
@@ -253,7 +257,7 @@ impl Scene {
     /// Checks a scene given as text; its paths are relative to `base_dir`. Reads no file.
     ///
     /// # Errors
-    /// When the text is no valid scene; see [`SceneError`].
+    /// When the text is not a valid scene; see [`SceneError`].
     pub fn parse(text: &str, base_dir: &Path) -> Result<Self, SceneError> {
         resolve::parse(text, base_dir, None)
     }
@@ -266,7 +270,7 @@ impl Scene {
         Self::parse(EMBEDDED, Path::new("")).expect("the embedded scene is valid")
     }
 
-    /// The embedded scene as text, with comments: a start for one's own.
+    /// The text of the embedded scene, with comments: a template for new scenes.
     pub fn embedded_toml() -> &'static str {
         EMBEDDED
     }
@@ -278,32 +282,34 @@ impl Scene {
         write::to_toml(self, Names::OfCatalogue)
     }
 
-    /// The same, with the tissues of the catalogue written out as well: every number stands in it, to be changed.
+    /// As [`Self::to_toml`], but with all values of the catalogue's tissues written out, so that
+    /// they can be edited.
     pub fn to_toml_in_full(&self) -> String {
         write::to_toml(self, Names::None)
     }
 
-    /// Number of prisms under each skin triangle, which is one less than the nodes in a column.
+    /// Number of prisms under each skin triangle: one less than the nodes in a column.
     pub fn n_intervals(&self) -> usize {
         self.layers.iter().map(|layer| layer.levels).sum()
     }
 
-    /// For each layer, what its material is and how far it is to be trusted. `[n_layers]`
+    /// Material of each layer, and how reliable its data is. `[n_layers]`
     pub fn material_status(&self) -> Vec<MaterialStatus> {
         self.layers.iter().map(Layer::material_status).collect()
     }
 
-    /// For each lump, what its material is and how far it is to be trusted. `[n_lumps]`
+    /// Material of each lump, and how reliable its data is. `[n_lumps]`
     pub fn lump_status(&self) -> Vec<MaterialStatus> {
         self.lumps.iter().map(Lump::material_status).collect()
     }
 }
 
 impl Press {
-    /// Checks the numbers against the ranges of the scene file, for a program that has set its own.
+    /// Checks the numbers against the ranges of the scene file, for a program that has set its own
+    /// values.
     ///
     /// # Errors
-    /// What is out of range, and the range.
+    /// The value that is out of range, and the range.
     pub fn check(&self) -> Result<(), String> {
         use crate::limits::{CYCLES, DEPTH, HOLD, SPEED};
         use crate::units::{Length, Time, Velocity};

@@ -1,4 +1,4 @@
-//! The JSON Schema of the scene file, made from the types that read it.
+//! The JSON Schema of the scene file, generated from the types that read it.
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ use crate::file::SceneFile;
 
 /// The JSON Schema (2020-12) of a scene file: keys, kinds, descriptions with ranges and defaults.
 ///
-/// Editors use it for completion and checks while writing; [`Scene::load`](crate::Scene::load) checks more.
+/// Editors use it for completion and checks. [`Scene::load`](crate::Scene::load) checks more.
 pub fn scene_schema() -> Value {
     let mut schema = schemars::schema_for!(SceneFile).to_value();
     tidy(&mut schema);
@@ -18,8 +18,8 @@ pub fn scene_schema() -> Value {
     schema
 }
 
-/// Takes `null` out of every choice (TOML has no null, an optional key is left out), and the line breaks of the source
-/// out of the descriptions.
+/// Removes `null` from every choice (TOML has no null; an optional key is left out), and the line
+/// breaks of the source from the descriptions.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Object(object) => {

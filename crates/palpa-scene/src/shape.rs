@@ -3,8 +3,8 @@
 //! To add a shape: its name in [`ToolShape`], its sizes in [`ContactShape`], and an arm in each
 //! `match` of this file that the compiler asks for. A size that no shape has yet is a key of
 //! `ToolTable` (`file/tool.rs`) with its range in `limits.rs`. Its geometry is one file of
-//! `palpa-fem/src/shape`, whose head lists the other places. [`ContactShape`] is also the shape that
-//! the page gets, as JSON.
+//! `palpa-fem/src/shape`, whose head lists the other places. [`ContactShape`] is also the shape
+//! that the page gets, as JSON.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, FRAC_PI_3};
 use std::fmt;
@@ -18,20 +18,21 @@ use crate::file::ToolTable;
 use crate::limits::{self, Limits};
 use crate::units::{Angle, Length};
 
-/// Radius of a tool where none is given. m
+/// Default radius of a tool, m.
 const RADIUS: f64 = 8e-3;
-/// Length of a capsule's straight part. m
+/// Default length of a capsule's straight part, m.
 const LENGTH: f64 = 20e-3;
-/// Size of a box. m
+/// Default size of a box, m.
 const SIZE: [f64; 3] = [16e-3; 3];
-/// Radii of a finger's pad: they curve by 9.1 mm along and 7 mm across, within the 7–10 mm and 6–8 mm of index fingers
-/// (from memory, after Serina et al. 1998). m
+/// Default radii of a fingertip, m. Its radii of curvature are 9.1 mm along and 7 mm across the
+/// finger, within the 7–10 mm and 6–8 mm of index fingers (from memory, after Serina et al. 1998).
 const FINGERTIP: [f64; 3] = [8e-3, 7e-3, 7e-3];
-/// Whole angle at the tip of a cone. rad
+/// Default full angle at the tip of a cone, rad.
 const OPENING_ANGLE: f64 = 2.0 * FRAC_PI_3;
-/// Radius of a cone's rounded tip. m
+/// Default radius of a cone's rounded tip, m.
 const TIP_RADIUS: f64 = 3e-3;
-/// Share of a punch's or a cone's radius, or of half a box's smallest size, by which its edges are rounded.
+/// Default radius of rounded edges, as a share of a punch's or a cone's radius, or of half a box's
+/// smallest size.
 const EDGE: f64 = 0.3;
 
 /// The shapes of tools.
@@ -41,13 +42,13 @@ pub(crate) enum ToolShape {
     /// A patch of skin bonded to a rigid disc.
     #[default]
     Disc,
-    /// A single node of the skin that is moved; for the reference method, or to try out a mesh.
+    /// A single node of the skin that is moved; for the reference method, or for trying out a mesh.
     Node,
     /// A ball.
     Sphere,
     /// The flat end of a round rod.
     FlatPunch,
-    /// A lying cylinder with round ends.
+    /// A cylinder on its side, with round ends.
     Capsule,
     /// A box.
     Box,
@@ -57,8 +58,9 @@ pub(crate) enum ToolShape {
     Cone,
 }
 
-/// The shape of a rigid tool. All lengths in metres. In its own frame its tip is the origin, x points along its length, and
-/// z out of the tissue. At depth 0 the tip, in the middle of its face, touches the skin at rest.
+/// The shape of a rigid tool. All lengths in metres. In its own frame the tip is the origin, x
+/// points along the length, and z points out of the tissue. At depth 0 the tip, in the middle of
+/// the face, touches the skin at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ContactShape {
@@ -71,10 +73,10 @@ pub enum ContactShape {
     FlatPunch {
         /// Radius of the rod.
         radius: f64,
-        /// Radius of its edge's rounding, no more than `radius`.
+        /// Radius of its rounded edge, no more than `radius`.
         edge_radius: f64,
     },
-    /// A lying cylinder along x with round ends.
+    /// A cylinder along x, on its side, with round ends.
     Capsule {
         /// Radius of the cylinder and its ends.
         radius: f64,
@@ -83,9 +85,9 @@ pub enum ContactShape {
     },
     /// A box with rounded edges.
     Box {
-        /// Its whole size along x, y and z.
+        /// Its full size along x, y and z.
         size: [f64; 3],
-        /// Radius of its edges' rounding, no more than half its smallest size.
+        /// Radius of its rounded edges, no more than half its smallest size.
         edge_radius: f64,
     },
     /// The pad of a finger: an ellipsoid.
@@ -97,9 +99,9 @@ pub enum ContactShape {
     Cone {
         /// Radius of the rod.
         radius: f64,
-        /// Whole angle at its tip, in radians.
+        /// Full angle at its tip, in radians.
         opening_angle: f64,
-        /// Radius of its tip's rounding, no more than `radius`.
+        /// Radius of its rounded tip, no more than `radius`.
         tip_radius: f64,
         /// Radius of the rounding between cone and rod, no more than `radius`.
         edge_radius: f64,
@@ -107,7 +109,7 @@ pub enum ContactShape {
 }
 
 impl ToolShape {
-    /// Its name in a sentence, and the keys it takes.
+    /// Name in a sentence, and the keys that it takes.
     pub(crate) fn takes(self) -> (&'static str, &'static [&'static str]) {
         match self {
             Self::Disc => ("a disc", &["radius"]),
@@ -132,7 +134,7 @@ impl ToolShape {
 }
 
 impl ContactShape {
-    /// The shape that a scene's table describes, if it presses by contact.
+    /// The shape in a scene's table; `None` for a tool that does not press by contact.
     pub(crate) fn read(at: &Site<'_>, table: &ToolTable) -> Result<Option<Self>, SceneError> {
         let sizes = Sizes { at, table };
         Ok(Some(match table.shape {
@@ -175,7 +177,7 @@ impl ContactShape {
         }))
     }
 
-    /// Its name and sizes into a scene's table.
+    /// Writes name and sizes into a scene's table.
     pub(crate) fn write(&self, table: &mut ToolTable) {
         let length = |length: f64| Some(Length::from_si(length));
         let three = |lengths: [f64; 3]| Some(lengths.map(Length::from_si));
@@ -224,7 +226,8 @@ impl ContactShape {
         };
     }
 
-    /// Radius of the rounding of a flat tool's edge in metres. A cone's rim is not meant: skin touches it last.
+    /// Radius of a flat tool's rounded edge in metres. `None` for a cone: its rim is the last part
+    /// to touch the skin.
     pub fn edge_radius(&self) -> Option<f64> {
         match *self {
             Self::FlatPunch { edge_radius, .. } | Self::Box { edge_radius, .. } => {
@@ -237,9 +240,10 @@ impl ContactShape {
         }
     }
 
-    /// Radius of a circle of skin that it presses on in metres, as a size: of a punch its own, of a box half its smaller
-    /// width; of a round tool that of the patch which Hertz's `√(R d)` gives at a depth `d` of half its smaller radius of
-    /// curvature `R`; of a cone that of Sneddon's `2/π d tan α` at a depth `d` of its radius, or of its tip.
+    /// Typical contact radius in metres. A punch has its own radius, and a box half its smaller
+    /// width. A round tool has Hertz's `√(R d)` at a depth `d` of half its smaller radius of
+    /// curvature `R`. A cone has Sneddon's `2/π d tan α` at a depth `d` of its radius, but at least
+    /// the value of its tip and at most its radius.
     pub fn contact_radius(&self) -> f64 {
         let hertz = |curvature: f64| curvature * FRAC_1_SQRT_2;
         match *self {
@@ -260,10 +264,11 @@ impl ContactShape {
         }
     }
 
-    /// How far it reaches along the skin where it is pressed to this depth: a rectangle of these half widths along x and y,
-    /// and all points within a radius round it, in metres.
+    /// Extent along the skin of the tool pressed to this depth, in metres: half widths of a
+    /// rectangle along x and y, and the radius of a margin around the rectangle.
     pub fn reach(&self, depth: f64) -> ([f64; 2], f64) {
-        // A round tool sinks in: the circle in which it cuts the skin's plane at its deepest.
+        // A round tool sinks in: radius of the circle in which it cuts the plane of the undeformed
+        // skin.
         let sunk = |r: f64| (depth * (2.0 * r - depth).max(0.0)).sqrt();
         match *self {
             Self::Sphere { radius } => ([0.0; 2], sunk(radius)),
@@ -291,7 +296,7 @@ impl ContactShape {
         }
     }
 
-    /// Half its greater width along the skin, in metres.
+    /// Half the larger width along the skin, in metres.
     pub fn half_width(&self) -> f64 {
         match *self {
             Self::Sphere { radius }
@@ -304,7 +309,7 @@ impl ContactShape {
     }
 }
 
-/// The sizes that a scene's table gives, checked, or their defaults.
+/// Reads the sizes in a scene's table: checks them or takes their defaults.
 struct Sizes<'a> {
     at: &'a Site<'a>,
     table: &'a ToolTable,
@@ -344,7 +349,7 @@ impl Sizes<'_> {
         Ok(at.within(angle, &limits::OPENING_ANGLE)?.si())
     }
 
-    /// The rounding of a tip that has room for this radius, in metres.
+    /// Radius of a rounded tip, at most `most`, in metres.
     fn tip_radius(&self, most: f64) -> Result<f64, SceneError> {
         let default = TIP_RADIUS.min(most);
         let tip = self.one(
@@ -363,7 +368,7 @@ impl Sizes<'_> {
         Ok(tip)
     }
 
-    /// The rounding of edges that have room for this radius, in metres.
+    /// Radius of rounded edges, at most `most`, in metres.
     fn edge_radius(&self, most: f64) -> Result<f64, SceneError> {
         let edge = self.one(
             "edge_radius",

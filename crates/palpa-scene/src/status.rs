@@ -1,4 +1,4 @@
-//! What a material is and how far it is to be trusted, for reports.
+//! The material of a layer or lump and how reliable its data is, for reports.
 
 use std::fmt;
 
@@ -7,14 +7,14 @@ use serde::Serialize;
 use crate::units::{Pressure, Time};
 use crate::{Elastic, Law, Layer, Lump, Moduli, Prony, Sourced, Status, Tissue, Volume};
 
-/// What a layer's or a lump's material is and how far it is to be trusted; shown beside every force.
+/// Material of a layer or lump, and how reliable its data is. Reports show it beside every force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MaterialStatus {
     /// Name of the tissue.
     pub tissue: String,
     /// Name of the law: `neo-hookean`, `ogden`, `spring`, ….
     pub law: &'static str,
-    /// The law, its parameters and its relaxation in words.
+    /// The law with its parameters and relaxation, in words.
     pub summary: String,
     /// Every number that the scene or the catalogue gives for the material.
     pub parameters: Vec<Parameter>,
@@ -22,23 +22,23 @@ pub struct MaterialStatus {
     pub young: Option<f64>,
     /// Poisson's ratio at small strain; `None` for a layer given by a spring stiffness.
     pub poisson: Option<f64>,
-    /// Stiffness of every bar in N/m, for a layer given by it.
+    /// Stiffness of every bar in N/m, for a layer given by a spring stiffness.
     pub spring: Option<f64>,
     /// In-plane tension at rest in pascals; 0 in a lump.
     pub prestress: f64,
-    /// How far the stiffness is to be trusted.
+    /// How reliable the stiffness is.
     pub status: Status,
-    /// Where it is from; may be empty when the scene gives it.
+    /// Source of the stiffness; may be empty when the scene gives it.
     pub source: String,
-    /// How far Poisson's ratio (or the bulk modulus) is to be trusted; `None` without one.
+    /// How reliable Poisson's ratio (or the bulk modulus) is; `None` without one.
     pub poisson_status: Option<Status>,
-    /// How far the thickness is to be trusted; `None` for a layer that reaches to the bone, and for a lump.
+    /// How reliable the thickness is; `None` for a layer that reaches to the bone, and for a lump.
     pub thickness_status: Option<Status>,
-    /// Where the thickness is from; may be empty.
+    /// Source of the thickness; may be empty.
     pub thickness_source: String,
 }
 
-/// A number of a material. Shown as `c10 420 Pa`.
+/// A number of a material. Displayed as `c10 420 Pa`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
     /// Its name as a scene writes it, such as `c10` or `terms[0].mu`.
@@ -47,14 +47,14 @@ pub struct Parameter {
     pub value: f64,
     /// Its unit; empty for a plain number.
     pub unit: &'static str,
-    /// How far it is to be trusted.
+    /// How reliable the number is.
     pub status: Status,
-    /// Where it is from; may be empty when the scene gives it.
+    /// Source of the number; may be empty when the scene gives it.
     pub source: String,
 }
 
 impl Layer {
-    /// What the layer's material is and how far it is to be trusted.
+    /// Material of the layer, and how reliable its data is.
     pub fn material_status(&self) -> MaterialStatus {
         let summary = summary(&self.tissue);
         MaterialStatus {
@@ -75,7 +75,7 @@ impl Layer {
 }
 
 impl Lump {
-    /// What the lump's material is and how far it is to be trusted.
+    /// Material of the lump, and how reliable its data is.
     pub fn material_status(&self) -> MaterialStatus {
         status(&self.tissue)
     }
@@ -101,7 +101,8 @@ fn status(tissue: &Tissue) -> MaterialStatus {
     }
 }
 
-/// The law as a scene names it, and every parameter: `neo-hookean: c10 420 Pa, bulk 36 kPa; relaxes by …`.
+/// The law as a scene names it, and every parameter:
+/// `neo-hookean: c10 420 Pa, bulk 36 kPa; relaxes by …`.
 fn summary(tissue: &Tissue) -> String {
     let mut parts: Vec<String> = law_parameters(&tissue.law)
         .iter()
@@ -163,7 +164,8 @@ fn law_parameters(law: &Law) -> Vec<Parameter> {
     }
 }
 
-/// Those of Ogden's terms come before Poisson's ratio or the bulk modulus, as all others do.
+/// The parameters of an elastic law. Those of Ogden's terms come before Poisson's ratio or the bulk
+/// modulus, as in all other laws.
 fn elastic_parameters(elastic: &Elastic) -> Vec<Parameter> {
     let numbers = elastic.numbers();
     let mut all: Vec<Parameter> = (numbers.given())
@@ -196,7 +198,7 @@ impl Parameter {
     }
 }
 
-/// To six digits: what is derived has more, and means no more.
+/// Shown with six digits: more digits of a derived number have no meaning.
 impl fmt::Display for Parameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = &self.name;

@@ -1,4 +1,4 @@
-//! How thick a layer is, from place to place.
+//! The thickness of a layer as a function of place.
 
 use std::path::{Path, PathBuf};
 
@@ -8,17 +8,17 @@ use crate::LengthUnit;
 use crate::limits::THICKNESS;
 use crate::units::Length;
 
-/// Larger thickness files are refused. bytes
+/// Largest size of a thickness file, bytes.
 const MAX_FILE: u64 = 64 << 20;
 
 /// The thickness of a layer. All lengths in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Thickness {
-    /// The same everywhere.
+    /// Uniform.
     Uniform(f64),
-    /// Changing along an axis.
+    /// Varying along an axis.
     Along {
-        /// Unit vector of the axis; a point's position is its scalar product with this.
+        /// Unit vector of the axis; the position of a point is its scalar product with this vector.
         axis: [f64; 3],
         /// Position along the axis (strictly ascending) and thickness there; at least one pair.
         table: Vec<[f64; 2]>,
@@ -56,7 +56,7 @@ pub struct ThicknessSample {
     pub thickness: f64,
 }
 
-/// Why a thickness file is refused.
+/// The reason why a thickness file is refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ThicknessError {
@@ -65,7 +65,7 @@ pub enum ThicknessError {
     Io {
         /// The thickness file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The file is too large.
@@ -74,22 +74,22 @@ pub enum ThicknessError {
         /// The thickness file.
         path: PathBuf,
     },
-    /// A row is not four numbers under the right heading.
+    /// A row is not four numbers, or the heading is wrong.
     #[error("{}: {message}; the file needs the columns x,y,z,thickness with one number each", path.display())]
     Malformed {
         /// The thickness file.
         path: PathBuf,
-        /// What the reader says, with the line.
+        /// Message of the reader, with the line.
         message: String,
     },
-    /// A thickness or a coordinate that no body has.
+    /// A thickness or coordinate is out of range.
     #[error("{}:{line}: {found}; check the `unit` of the scene's body", path.display())]
     OutOfRange {
         /// The thickness file.
         path: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// What was found and what is allowed.
+        /// The value that was found, and the allowed range.
         found: String,
     },
     /// The file has a heading only.
@@ -100,7 +100,8 @@ pub enum ThicknessError {
     },
 }
 
-/// Reads the samples of a thickness file: CSV with the columns `x,y,z,thickness`, lengths in `unit`.
+/// Reads the samples of a thickness file: CSV with the columns `x,y,z,thickness`, lengths in
+/// `unit`.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed, or holds a value out of range.
@@ -130,7 +131,7 @@ pub fn read_thickness(
         path: path.to_owned(),
         message: error.to_string(),
     };
-    // A device can claim to be empty and never end; the bound holds for it too.
+    // A device file can report size zero and never end, so the limit also applies to the reader.
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))

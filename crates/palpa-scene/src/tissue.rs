@@ -1,30 +1,30 @@
-//! What a tissue is: an elastic law, how it relaxes, its density; every number with its source.
+//! A tissue: an elastic law, relaxation and density. Every number has its source.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Elastic;
 
-/// A tissue: how it resists deformation, how it relaxes and, where known, how heavy it is.
+/// A tissue: its resistance to deformation, its relaxation and, where known, its density.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tissue {
     /// Its name.
     pub name: String,
-    /// How it resists deformation.
+    /// Resistance to deformation.
     pub law: Law,
-    /// How it relaxes; `None` for a tissue without memory.
+    /// Relaxation; `None` for a tissue without it.
     pub prony: Option<Prony>,
     /// Density in kg/m³, where known.
     pub density: Option<Sourced>,
 }
 
-/// How a tissue resists deformation.
+/// The resistance of a tissue to deformation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Law {
     /// An isotropic elastic solid.
     Elastic(Elastic),
-    /// Every bar is a spring of one stiffness: the reference method only.
+    /// Every bar is a spring of the same stiffness; for the reference method only.
     Spring {
         /// Stiffness of a bar in N/m.
         constant: Sourced,
@@ -34,15 +34,15 @@ pub enum Law {
 /// Relaxation as a Prony series: `G(t) = G₀ (1 − Σ gᵢ (1 − exp(−t/τᵢ)))`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prony {
-    /// 1 to 12 terms, whose `g` together are less than 1.
+    /// 1 to 12 terms; the sum of their `g` is less than 1.
     pub terms: Vec<PronyTerm>,
-    /// At which end of the relaxation the law's moduli hold.
+    /// State of relaxation at which the law's moduli hold.
     pub moduli: Moduli,
-    /// Whether the volumetric part relaxes, too.
+    /// Whether the volumetric part relaxes too.
     pub relaxes_volume: bool,
-    /// How far the terms are to be trusted.
+    /// How reliable the terms are.
     pub status: Status,
-    /// Where the terms are from; may be empty when the scene gives them.
+    /// Source of the terms; may be empty when the scene gives them.
     pub source: String,
 }
 
@@ -51,43 +51,43 @@ pub struct Prony {
 pub struct PronyTerm {
     /// Share of the instantaneous modulus that relaxes, above 0.
     pub g: f64,
-    /// Its time constant in seconds.
+    /// Time constant in seconds.
     pub tau: f64,
 }
 
-/// At which end of its relaxation a tissue has the moduli of its law.
+/// State of relaxation at which the moduli of a tissue's law hold.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moduli {
-    /// At rest, after all relaxation: at once it is stiffer, by 1/(1 − Σ g).
+    /// After all relaxation. The instantaneous stiffness is higher, by the factor 1/(1 − Σ g).
     #[default]
     LongTerm,
-    /// At once, before any relaxation: at rest it is softer, by 1 − Σ g.
+    /// Before any relaxation. The long-term stiffness is lower, by the factor 1 − Σ g.
     Instantaneous,
 }
 
 /// A number with its source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sourced {
-    /// The value in SI.
+    /// The value in SI units.
     pub value: f64,
-    /// How far it is to be trusted.
+    /// How reliable the value is.
     pub status: Status,
-    /// Where it is from, in words; may be empty when the scene gives it.
+    /// Source in words; may be empty when the scene gives the value.
     pub source: String,
 }
 
-/// How far a number is to be trusted.
+/// How reliable a number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// Read in the work that measured it, or measured on the body at hand.
+    /// Taken from the publication that measured it, or measured on the body itself.
     Measured,
     /// From an abstract or a secondary source.
     Literature,
-    /// From memory, an order of magnitude or a choice.
+    /// From memory, an order of magnitude, or a choice.
     Assumed,
-    /// Given by the scene, which answers for it.
+    /// Given by the scene, whose author answers for it.
     Given,
 }
 
@@ -100,7 +100,8 @@ impl Tissue {
         }
     }
 
-    /// Young's modulus at small strain in pascals, unless the tissue is given by a spring stiffness.
+    /// Young's modulus at small strain in pascals, unless the tissue is given by a spring
+    /// stiffness.
     pub fn young(&self) -> Option<f64> {
         self.elastic().map(Elastic::young)
     }
@@ -110,7 +111,7 @@ impl Tissue {
         self.elastic().map(Elastic::poisson)
     }
 
-    /// Stiffness of every bar in N/m, if the tissue is given by it.
+    /// Stiffness of every bar in N/m, if the tissue is given by a spring stiffness.
     pub fn spring(&self) -> Option<f64> {
         match &self.law {
             Law::Spring { constant } => Some(constant.value),
@@ -118,14 +119,14 @@ impl Tissue {
         }
     }
 
-    /// How far the stiffness is to be trusted.
+    /// How reliable the stiffness is.
     pub fn status(&self) -> Status {
         self.law.stiffness().status
     }
 }
 
 impl Law {
-    /// Its name as a scene writes it: `neo-hookean`, `ogden`, `spring`, ….
+    /// Name of the law as a scene writes it: `neo-hookean`, `ogden`, `spring`, ….
     pub fn name(&self) -> &'static str {
         match self {
             Self::Elastic(elastic) => elastic.energy.name(),
@@ -133,7 +134,7 @@ impl Law {
         }
     }
 
-    /// The number that says how stiff it is, as it was given.
+    /// The number that determines the stiffness, as it was given.
     pub(crate) fn stiffness(&self) -> &Sourced {
         match self {
             Self::Elastic(elastic) => elastic.energy.given(),
@@ -143,7 +144,7 @@ impl Law {
 }
 
 impl Prony {
-    /// Stiffness at once over stiffness at rest: `1/(1 − Σ g)`.
+    /// Instantaneous stiffness divided by long-term stiffness: `1/(1 − Σ g)`.
     pub fn stiffening(&self) -> f64 {
         1.0 / (1.0 - self.terms.iter().map(|term| term.g).sum::<f64>())
     }

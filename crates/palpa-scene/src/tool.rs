@@ -1,10 +1,10 @@
-//! Tools: what presses.
+//! Tools.
 
 use std::fmt;
 
 use crate::{ContactShape, frame};
 
-/// What presses.
+/// The tool of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Tool {
     /// A patch of skin bonded to a rigid disc of this radius, in metres.
@@ -14,7 +14,7 @@ pub enum Tool {
     },
     /// A single node that is moved.
     Node,
-    /// A rigid body that presses by contact: it pushes and rubs, and never pulls.
+    /// A rigid body that presses by contact: it pushes and rubs, but never pulls.
     Contact(ContactTool),
 }
 
@@ -23,15 +23,15 @@ pub enum Tool {
 pub struct ContactTool {
     /// Its shape.
     pub shape: ContactShape,
-    /// Coulomb's coefficient of friction; 0 is without friction.
+    /// Coulomb's coefficient of friction; 0 for no friction.
     pub friction: f64,
-    /// Unit vector that its length points along as nearly as a lying tool can; `None` is as near to the body's x as it
-    /// goes, see [`axes`](Self::axes).
+    /// Unit vector of its length; only the part across the press counts. `None` is as near to the
+    /// body's x as possible, see [`axes`](Self::axes).
     pub axis: Option<[f64; 3]>,
 }
 
 impl Tool {
-    /// Whether the skin sticks to it: a held disc or node, not a body that touches.
+    /// Whether the skin is bonded to it: true for a disc or a node, false for a body in contact.
     pub fn is_bonded(&self) -> bool {
         !matches!(self, Self::Contact(_))
     }
@@ -44,8 +44,8 @@ impl Tool {
         }
     }
 
-    /// Radius of a circle of skin that it presses on in metres, as a size: of a disc its own, 0 of a node, of a shape see
-    /// [`ContactShape::contact_radius`].
+    /// Typical contact radius in metres: the radius of a disc, 0 for a node, and
+    /// [`ContactShape::contact_radius`] for a shape.
     pub fn contact_radius(&self) -> f64 {
         match self {
             Self::Disc { radius } => *radius,
@@ -56,8 +56,9 @@ impl Tool {
 }
 
 impl ContactTool {
-    /// The tool's own axes, three unit vectors of a right-handed frame, where it moves along the unit vector `direction`:
-    /// its length, its width, and out of the tissue, against `direction`.
+    /// The tool's own axes, for a tool that moves along the unit vector `direction`: three unit
+    /// vectors of a right-handed frame. They are its length, its width, and the direction out of
+    /// the tissue (against `direction`).
     pub fn axes(&self, direction: [f64; 3]) -> [[f64; 3]; 3] {
         frame::keeping_third(self.axis, direction.map(|x| -x))
     }

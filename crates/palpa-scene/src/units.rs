@@ -1,7 +1,7 @@
-//! Quantities at the border: text with a unit in, SI out.
+//! Quantities: texts with a unit in a scene file, SI values in the program.
 //!
-//! The units themselves are those of the crate `uom`; here is only how a text is split, which spellings are taken for
-//! the same unit, and how a value is written back.
+//! The crate `uom` defines the units. This module splits a text into number and unit, accepts
+//! several spellings of a unit, and writes values back.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -13,22 +13,22 @@ use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};
 use uom::si::f64 as si;
 
-/// Longer texts are no quantities; splitting tries every place, so its work is bounded by this.
+/// Longest text of a quantity. Splitting tries every position, so this limits its work.
 const MAX_TEXT: usize = 64;
 
-/// What a quantity measures: its name, its units, and how a text with a unit becomes SI.
+/// A kind of quantity: its name, its units, and the conversion of a number with a unit to SI.
 pub trait Kind: Copy + fmt::Debug + PartialOrd {
-    /// What it is called in messages, with its article: `a length`.
+    /// Name in messages, with its article: `a length`.
     const NAME: &'static str;
-    /// How it may be written.
+    /// An example of the notation.
     const EXAMPLE: &'static str;
-    /// Its unit in SI.
+    /// Unit of the value in SI.
     const BASE: &'static str;
-    /// The units it is written back in: symbol, value in SI, and the number from which on it is used; from large to
-    /// small.
+    /// Units for writing a value: symbol, value in SI, and least number for which it is used; from
+    /// large to small.
     const SCALE: &'static [(&'static str, f64, f64)];
 
-    /// The value in SI of `number` in `unit`, or `None` when `unit` does not measure this kind.
+    /// The SI value of `number` in `unit`, or `None` if `unit` does not measure this kind.
     fn to_si(number: f64, unit: &str) -> Option<f64>;
 }
 
@@ -80,7 +80,8 @@ kind!(
     |number, unit| Some(parse::<si::Time>(number, unit)?.value)
 );
 kind!(
-    /// A rate, per second: one by any time, as `5 1/s`, or a frequency, as `5 Hz`.
+    /// A rate, per second: one divided by any time, such as `5 1/s`, or a frequency, such as
+    /// `5 Hz`.
     Rate, RateKind, "a rate", "5 1/s", "1/s",
     &[("1/s", 1.0, 1.0)],
     |number, unit| match unit.split_once('/') {
@@ -101,7 +102,8 @@ kind!(
     |number, unit| Some(parse::<si::Force>(number, unit)?.value)
 );
 kind!(
-    /// The stiffness of a spring, in newtons per metre: any force by any length, as `dyn/cm` or `N/mm`.
+    /// The stiffness of a spring, in newtons per metre: any force divided by any length, such as
+    /// `dyn/cm` or `N/mm`.
     SpringConstant, SpringConstantKind, "a stiffness", "90 dyn/cm", "N/m",
     &[("MN/m", 1e6, 1.0), ("kN/m", 1e3, 1.0), ("N/m", 1.0, 1.0), ("mN/m", 1e-3, 1.0), ("µN/m", 1e-6, 1.0)],
     |number, unit| {
@@ -116,7 +118,7 @@ kind!(
     |number, unit| Some(parse::<si::MassDensity>(number, unit)?.value)
 );
 
-/// A value in SI that is written as text with a unit.
+/// A value in SI that is written as a text with a unit.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub struct Quantity<K> {
     si: f64,
@@ -124,7 +126,7 @@ pub struct Quantity<K> {
 }
 
 impl<K> Quantity<K> {
-    /// The quantity of this value in SI base units.
+    /// The quantity with this value in SI units.
     pub const fn from_si(si: f64) -> Self {
         Self {
             si,
@@ -132,14 +134,14 @@ impl<K> Quantity<K> {
         }
     }
 
-    /// The value in SI base units.
+    /// The value in SI units.
     pub const fn si(self) -> f64 {
         self.si
     }
 }
 
 impl Pressure {
-    /// To three digits, for messages.
+    /// Rounded to three digits by `round`, for messages.
     pub(crate) fn rounded(pascals: f64, round: fn(f64) -> f64) -> Self {
         let unit = 10f64.powf(pascals.abs().log10().floor() - 2.0);
         let scaled = round(pascals / unit) * unit;
@@ -154,7 +156,7 @@ impl<K> Default for Quantity<K> {
     }
 }
 
-/// Why a text is no quantity of the kind asked for.
+/// The reason why a text is not a quantity of the wanted kind.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QuantityError {
@@ -182,7 +184,7 @@ pub enum QuantityError {
         /// The kind wanted, with an example.
         wanted: String,
     },
-    /// The number stands alone.
+    /// The number has no unit.
     #[error("{text:?} has no unit; write {wanted}")]
     NoUnit {
         /// The text as found.
@@ -240,7 +242,8 @@ impl<K: Kind> FromStr for Quantity<K> {
     }
 }
 
-/// The longest beginning that is a number, and what follows it: `1.5 mm`, and `1.5mm` too.
+/// Splits off the longest beginning that is a number, and returns it with the rest: `1.5 mm`, and
+/// `1.5mm` too.
 fn split(text: &str) -> Option<(f64, &str)> {
     (1..=text.len())
         .rev()
@@ -248,7 +251,8 @@ fn split(text: &str) -> Option<(f64, &str)> {
         .find_map(|end| Some((text[..end].parse().ok()?, text[end..].trim_start())))
 }
 
-/// The decimal number that `si` stands for: a factor such as 1e-6 is rounded, and makes 9.999999999999999e-6 of 10 µm.
+/// The decimal number that `si` stands for. A factor such as 1e-6 is rounded, which turns 10 µm
+/// into 9.999999999999999e-6.
 fn decimal(number: f64, si: f64) -> f64 {
     if si.to_bits() == number.to_bits() {
         return si;
@@ -261,7 +265,7 @@ fn decimal(number: f64, si: f64) -> f64 {
     }
 }
 
-/// The spelling that `uom` knows of a unit: one micro sign, powers raised, metres as meters.
+/// The spelling of a unit that `uom` knows: one micro sign, raised powers, meters for metres.
 fn spelling(unit: &str) -> Cow<'_, str> {
     let mut unit = unit
         .replace('\u{3bc}', "µ")
@@ -283,7 +287,8 @@ fn parse<Q: FromStr>(number: f64, unit: &str) -> Option<Q> {
     format!("{number:e} {unit}").parse().ok()
 }
 
-/// The text, or its beginning, on one line: an error message stays readable whatever was found.
+/// The text, or its beginning, on one line, so that an error message stays readable whatever the
+/// text is.
 pub(crate) fn shortened(text: &str) -> String {
     const MOST: usize = 40;
     let mut chars = text.chars();
@@ -295,7 +300,7 @@ pub(crate) fn shortened(text: &str) -> String {
     start
 }
 
-/// In the unit that reads best, so that reading it back gives the same value to the bit.
+/// Written in the unit that reads best. Reading the text back gives the same value bit for bit.
 impl<K: Kind> fmt::Display for Quantity<K> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let magnitude = self.si.abs();
@@ -306,7 +311,8 @@ impl<K: Kind> fmt::Display for Quantity<K> {
             .filter(|_| magnitude > 0.0);
         if let Some(&(unit, size, _)) = readable {
             let number = self.si / size;
-            // Twelve digits hide the last bit of the division (70.00000000000001 mm) where they lose nothing.
+            // Twelve digits hide the last bit of the division (70.00000000000001 mm); they are used
+            // where nothing is lost.
             let rounded: f64 = format!("{number:.11e}").parse().unwrap_or(number);
             for number in [rounded, number] {
                 let text = format!("{number} {unit}");

@@ -1,4 +1,4 @@
-//! From the scene back to the text of a scene file.
+//! From a scene back to the text of a scene file.
 
 mod motion;
 mod tissues;
@@ -42,7 +42,7 @@ pub(crate) fn to_toml(scene: &Scene, names: Names) -> String {
     toml::to_string(&file).expect("a scene consists of texts, numbers and tables only")
 }
 
-/// The point of a target given by one, as a scene writes it.
+/// The point of a target that is given by a point, as a scene file writes it.
 fn point(target: Target) -> Option<[Length; 3]> {
     match target {
         Target::Point(point) => Some(point.map(Length::from_si)),
@@ -50,7 +50,7 @@ fn point(target: Target) -> Option<[Length; 3]> {
     }
 }
 
-/// The vertex of a target given by one.
+/// The vertex of a target that is given by a vertex.
 fn vertex(target: Target) -> Option<u32> {
     match target {
         Target::Vertex(vertex) => Some(vertex),
@@ -119,7 +119,8 @@ fn reference(reference: &Reference) -> ReferenceTable {
     }
 }
 
-/// The path as a scene in `base_dir` writes it; one that is not Unicode, which no scene file gives, loses characters.
+/// The path relative to `base_dir`, as a scene file writes it. A path that is not Unicode loses
+/// characters; no scene file contains such a path.
 fn relative(scene: &Scene, path: &Path) -> PathBuf {
     let path = path.strip_prefix(&scene.base_dir).unwrap_or(path);
     path.to_string_lossy().into_owned().into()
@@ -143,7 +144,7 @@ fn body(scene: &Scene, body: &Body) -> BodyTable {
             .collect(),
         unit: body.unit,
         cutout_radius: cutout.map(|cutout| Length::from_si(cutout.radius)),
-        // A vertex is the place that is pressed, which needs no second mention.
+        // If the scene presses a vertex, this is the default and need not be written.
         cutout_at: cutout.and_then(|cutout| point(cutout.at)),
         cut_faces: body.cut_faces,
     }
@@ -211,7 +212,7 @@ fn layer(scene: &Scene, layer: &Layer, names: Names) -> LayerTable {
     }
 }
 
-/// An axis of the body by its name.
+/// The axis by name, if the vector is one.
 fn direction(vector: [f64; 3]) -> AxisSpec {
     match vector {
         [1.0, 0.0, 0.0] => AxisSpec::Name(AxisName::X),

@@ -1,13 +1,13 @@
-//! The kernel that takes most of a tick's time: adds three columns of the compliance to the
-//! positions.
+//! The kernel that takes most of a tick's time. It adds three columns of the compliance matrix,
+//! times a force, to the positions.
 //!
-//! The same operations in the same order with and without wide registers, so the numbers are the
-//! same bit for bit.
+//! The operations and their order do not depend on wide registers, so the results are equal bit for
+//! bit with and without them.
 
 #[cfg(target_arch = "x86_64")]
 cpufeatures::new!(has_avx, "avx");
 
-/// `x += c0 f0 + c1 f1 + c2 f2`, over the shortest of them.
+/// `x += c0 f0 + c1 f1 + c2 f2`, over the length of the shortest slice.
 pub(crate) fn add_three(x: &mut [f64], columns: [&[f64]; 3], f: [f64; 3]) {
     #[cfg(target_arch = "x86_64")]
     if has_avx::get() {

@@ -1,4 +1,4 @@
-//! The contact of one vertex with its tool, while all the others are held: an exact local solution.
+//! Exact solution for the contact of one vertex with its tool, with all other forces held fixed.
 //!
 //! In the frame of the contact (normal, two tangents), with `A` the vertex's own compliance:
 //!
@@ -6,27 +6,28 @@
 //! 0 ≤ r_n ⟂ g ≥ 0                                   pressed, never pulled
 //! min ½ r_tᵀ A_tt r_t + s0ᵀ r_t,  |r_t| ≤ μ r_n     sticks inside the cone, slides against the slip on it
 //! ```
-//! The minimum's conditions are Coulomb's law for the slip `s = s0 + A_tt r_t` since the anchor, on
-//! the round cone.
+//! The optimality conditions of the minimum are Coulomb's law on the round cone, for the slip `s =
+//! s0 + A_tt r_t` since the anchor.
 
 use crate::{Mat3, Pose, Vec3};
 use nalgebra::{Matrix2, Vector2};
 
-/// Least compliance of a vertex, m/N: it bounds the force when a patch has zero compliance.
+/// Smallest compliance of a vertex, m/N. It bounds the force if a patch has zero compliance.
 const MIN_COMPLIANCE: f64 = 1e-8;
-/// Newton steps for the multiplier of the cone; from below they converge monotonically and
-/// quadratically.
+/// Most Newton steps for the multiplier of the friction cone. Started from below, they converge
+/// monotonically and quadratically.
 const CONE_STEPS: usize = 8;
-/// Relative length to which the cone is met before the rest is scaled away.
+/// Relative error of the length at which the Newton steps end; then the force is scaled onto the
+/// cone.
 const CONE_TOLERANCE: f64 = 1e-6;
 
-/// A contact linearised where its vertex was last: `gap = n · y + h`, with `y` the vertex relative
-/// to the tool.
+/// A contact, linearised at the last position of its vertex: `gap = n · y + h`, where `y` is the
+/// position of the vertex relative to the tool.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contact {
-    /// Columns: normal and two tangents, in the world.
+    /// Columns: normal and two tangents, in world axes.
     frame: Mat3,
-    /// Own compliance in that frame, m/N.
+    /// The vertex's own compliance in that frame, m/N.
     own: Mat3,
     gap_offset: f64,
     anchor: Vec3,
@@ -39,11 +40,11 @@ pub(crate) struct Contact {
 pub(crate) struct Change {
     /// Change of its force, N.
     pub(crate) force: Vec3,
-    /// Whether it slides.
+    /// Whether the vertex slides.
     pub(crate) is_sliding: bool,
 }
 
-/// The values that a contact is linearised from.
+/// Input for the linearisation of a contact.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ContactInput<'a> {
     pub(crate) candidate: &'a crate::Candidate,
@@ -53,7 +54,7 @@ pub(crate) struct ContactInput<'a> {
     pub(crate) position: &'a Vec3,
     /// Anchor of the vertex, in the tool's frame, m.
     pub(crate) anchor: &'a Vec3,
-    /// Own compliance with that of the coupling, m/N.
+    /// The vertex's own compliance plus that of the coupling, m/N.
     pub(crate) own: &'a Mat3,
     pub(crate) friction: f64,
     pub(crate) is_bonded: bool,
@@ -78,8 +79,8 @@ impl Contact {
             - candidate.surface;
         let bend = candidate.curvature * d;
         let gap = candidate.normal.dot(&d) + 0.5 * d.dot(&bend);
-        // Far from the nearest point the curvature may turn the gradient round; there the normal
-        // has to do.
+        // Far from the nearest point, the curvature may reverse the gradient. Then the normal is
+        // used instead.
         let gradient = candidate.normal + bend;
         let slope = gradient.norm();
         let (gradient, slope) = if slope > 0.2 && gradient.dot(&candidate.normal) > 0.0 {
@@ -105,8 +106,8 @@ impl Contact {
         }
     }
 
-    /// The change from its present force to the one that satisfies its conditions while all others
-    /// are held.
+    /// Change from the present force to the force that satisfies the contact conditions, with all
+    /// other forces held fixed.
     ///
     /// `position` is relative to the displacement of the tool by its coupling.
     pub(crate) fn relax(&self, position: &Vec3, force: &Vec3) -> Change {
@@ -147,8 +148,8 @@ impl Contact {
     }
 }
 
-/// An orthonormal frame with a unit normal as its first column, continuous but for one direction
-/// (Duff et al. 2017, "Building an orthonormal basis, revisited").
+/// An orthonormal frame whose first column is the unit normal. It is continuous except at one
+/// direction (Duff et al. 2017, "Building an orthonormal basis, revisited").
 fn frame_about(n: &Vec3) -> Mat3 {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
@@ -160,7 +161,7 @@ fn frame_about(n: &Vec3) -> Mat3 {
     ])
 }
 
-/// The minimum of `½ rᵀ A r + bᵀ r` over `|r| ≤ radius`, and whether it is on the border.
+/// The minimum of `½ rᵀ A r + bᵀ r` over `|r| ≤ radius`, and whether it lies on the boundary.
 fn least_in_disc(a: &Matrix2<f64>, b: &Vector2<f64>, radius: f64) -> (Vector2<f64>, bool) {
     let solve = |shift: f64| {
         let (p, q, s) = (a.m11 + shift, a.m12, a.m22 + shift);
@@ -175,7 +176,7 @@ fn least_in_disc(a: &Matrix2<f64>, b: &Vector2<f64>, radius: f64) -> (Vector2<f6
     let mut shift = 0.0;
     for _ in 0..CONE_STEPS {
         let length = r.norm();
-        // Only the direction is kept; its error is second to that of the length.
+        // Only the direction is used, and its error is of second order in the error of the length.
         if length <= radius * (1.0 + CONE_TOLERANCE) {
             break;
         }
@@ -197,8 +198,8 @@ fn least_in_disc(a: &Matrix2<f64>, b: &Vector2<f64>, radius: f64) -> (Vector2<f6
     }
 }
 
-/// `A x = b` for a symmetric positive definite A; pivots that are not are raised to the least
-/// compliance.
+/// Solves `A x = b` for a symmetric positive definite `A`. Pivots below [`MIN_COMPLIANCE`] are
+/// raised to it.
 fn solve_spd3(a: &Mat3, b: &Vec3) -> Vec3 {
     let d1 = a.m11.max(MIN_COMPLIANCE);
     let (l21, l31) = (a.m21 / d1, a.m31 / d1);
@@ -227,7 +228,7 @@ mod tests {
             let (r, slides) = least_in_disc(&a, &b, radius);
             let slip = a * r + b;
             assert!(slides && (r.norm() - radius).abs() < 1e-12 * radius.max(1.0));
-            // The slip is against the force.
+            // The friction force opposes the slip.
             assert!((slip.x * r.y - slip.y * r.x).abs() < 1e-4 * slip.norm() * radius);
             assert!(slip.dot(&r) < 0.0);
         }

@@ -1,26 +1,29 @@
 //! The energy observer, and the damping that it injects.
 //!
-//! A force that is held over a tick gives out up to `½ K Δx²` that no tissue ever held, and a patch
-//! that comes late gives more. The observer banks what the hand put in, `−F·Δx`, less what the
-//! local model stores; friction and viscosity leave a surplus, which is forgotten, since it would
-//! hide what is generated later. A deficit is not forgotten. What the model says it stores is not
-//! exact from patch to patch; off the tissue it stores nothing, and the bank is put right by work
-//! alone.
+//! Two effects give energy to the hand that no tissue ever stored: a force held over a tick gives
+//! out up to `½ K Δx²`, and a patch that arrives late gives more. The observer therefore keeps a
+//! bank: the work of the hand, `−F·Δx`, minus the growth of the energy that the local model stores.
+//! Friction and viscosity leave a surplus. The surplus is forgotten with time, since it would hide
+//! energy that is generated later. A deficit is not forgotten.
+//!
+//! The stored energy of the model is not exact from patch to patch. Off the tissue the stored
+//! energy is zero, so there the bank is corrected by the work alone.
 
 use crate::{DeviceSpec, ServoParams, Vec3};
 
-/// Surplus beyond this is not banked, J: as much as a hard push stores.
+/// Largest surplus in the bank, J: the energy that a hard push stores.
 const MAX_BANK: f64 = 0.05;
-/// Share of the budget beyond which a deficit is paid back, and times in which it is to be, s:
-/// gently while it is within the budget, and beyond that as quickly as is not felt as a knock.
+/// Share of the energy budget at which paying back a deficit begins.
 const PAY_FROM: f64 = 0.6;
+/// Times in which a deficit is paid back, s: gently while it is within the budget, and beyond the
+/// budget as fast as is possible without a noticeable knock.
 const PAY_BACK: [f64; 2] = [0.2, 0.02];
-/// The gentle damping is at most this, N s/m: with the steps of a coarse encoder in the velocity,
-/// more would be felt.
+/// Largest gentle damping, N s/m. More would be felt, because the velocity from a coarse encoder
+/// has steps.
 const GENTLE: f64 = 0.1;
-/// Time in which damping fades once it is no longer asked for, s.
+/// Time in which the damping fades when it is no longer needed, s.
 const FADE: f64 = 0.05;
-/// Below this speed damping would only render the sensor's steps, m/s.
+/// Smallest speed for damping, m/s; below it, damping would only render the sensor's steps.
 const MIN_SPEED: f64 = 2e-3;
 /// Damping below this is cut to zero, N s/m.
 const DAMPING_DUST: f64 = 1e-4;
@@ -28,15 +31,15 @@ const DAMPING_DUST: f64 = 1e-4;
 /// The energy account of one tool, J.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Energy {
-    /// Taken from the hand since the start.
+    /// Energy taken from the hand since the start.
     pub(crate) taken: f64,
-    /// Given to the hand since the start.
+    /// Energy given to the hand since the start.
     pub(crate) given: f64,
-    /// Surplus; negative is energy generated.
+    /// Surplus; negative if energy was generated.
     bank: f64,
     /// Damping that is injected, N s/m.
     pub(crate) damping: f64,
-    /// Work of the hand since the tool was last off the tissue, and the bank then.
+    /// Work of the hand since the tool was last off the tissue, plus the bank at that time.
     ledger: f64,
 }
 
@@ -51,19 +54,19 @@ impl Energy {
         }
     }
 
-    /// The bank, J; negative is energy generated.
+    /// The bank, J; negative if energy was generated.
     pub(crate) fn bank(&self) -> f64 {
         self.bank
     }
 
-    /// Begins anew with an empty bank: while the force ramps, work says nothing of the tissue.
+    /// Empties the bank. Used while the force ramps, when the work says nothing about the tissue.
     pub(crate) fn forget(&mut self) {
         self.bank = 0.0;
         self.ledger = 0.0;
     }
 
-    /// Counts the tick that ended: the force `held`, N, over `travel`, m, and the growth of the
-    /// model's store, J.
+    /// Counts the tick that ended: the force `held`, N, acted over `travel`, m, and the energy that
+    /// the model stores grew by `stored`, J.
     pub(crate) fn count(
         &mut self,
         held: &Vec3,
@@ -92,7 +95,8 @@ impl Energy {
         }
     }
 
-    /// Damping to inject now, N s/m, at most what the device renders stably; none off the tissue.
+    /// Damping to inject now, N s/m: at most the damping that the device renders stably, and zero
+    /// off the tissue.
     pub(crate) fn ask_damping(
         &mut self,
         velocity: &Vec3,
@@ -130,7 +134,8 @@ mod tests {
         let (params, mut energy) = (ServoParams::default(), Energy::new());
         let held = Vec3::z();
         for cycle in 1..=50 {
-            // In by 1 mm under 1 N and out under 1.1 N, of which the model thinks it was its own.
+            // The hand goes in 1 mm against 1 N and out under 1.1 N; the model claims that it
+            // stored and returned this energy.
             energy.count(&held, &(Vec3::z() * -1e-3), 1e-3, 1e-3, &params);
             energy.count(&(held * 1.1), &(Vec3::z() * 1e-3), -1.1e-3, 1e-3, &params);
             energy.count(&Vec3::zeros(), &Vec3::zeros(), 0.0, 1e-3, &params);

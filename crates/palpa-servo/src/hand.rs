@@ -1,16 +1,16 @@
-//! Readings of a device, checked: NaN, jumps and silence end here.
+//! Checks the readings of a device, so that NaN, jumps and silence go no further.
 
 use crate::velocity::VelocityEstimate;
 use crate::{DeviceState, Faults, Pose, ServoParams, Vec3};
 
-/// A hand-piece after the check: always finite.
+/// A hand-piece after the check; all its values are finite.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HandPiece {
     pub(crate) pose: Pose,
-    /// Estimated, m/s.
+    /// Estimated velocity, m/s.
     pub(crate) velocity: Vec3,
-    /// Its motion since the tick before, m; zero after a jump or a loss, which are no motion of a
-    /// hand.
+    /// Motion since the previous tick, m; zero after a jump or a loss, because the hand did not
+    /// make that motion.
     pub(crate) travel: Vec3,
     /// Loop's clock when the reading last changed, and the device's time of that reading, s.
     changed_at: f64,
@@ -53,7 +53,8 @@ impl HandPiece {
         let mut faults = Faults::NONE;
         if self.is_known {
             self.travel = at - self.pose.translation.vector;
-            // A missed tick or two must not make a fast hand a jump.
+            // Scaled with `dt`, so that a fast hand does not count as a jump when a tick or two
+            // were missed.
             if self.travel.norm() > params.max_speed * dt.max(params.period) {
                 faults |= Faults::DEVICE_JUMPED;
                 self.travel = Vec3::zeros();
@@ -77,7 +78,8 @@ impl HandPiece {
     }
 
     fn lost(&mut self, fault: Faults) -> Faults {
-        // Where it comes back is no jump of the hand, nor work done by it.
+        // The distance to the place where the device returns is neither a jump nor work of the
+        // hand.
         self.is_known = false;
         self.velocity = Vec3::zeros();
         self.estimate.clear();
@@ -85,5 +87,5 @@ impl HandPiece {
     }
 }
 
-/// No hand is farther than this from the origin, m: larger readings are no positions.
+/// Largest plausible distance of a hand from the origin, m; larger readings are not positions.
 const MAX_POSITION: f64 = 1e3;

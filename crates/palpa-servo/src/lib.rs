@@ -6,9 +6,9 @@
 //!             NaN,    at the devices'    between     after   by the     size, slew
 //!             jumps   poses              patches     faults  energy
 //! ```
-//! [`Servo::tick`] may be called from our own loop or from a vendor's callback. While the force is
-//! ramped, the energy observer stands still: the energy that a ramp up gives out is limited by its
-//! time, not by the budget.
+//! [`Servo::tick`] may be called from Palpa's own loop or from a vendor's callback. While the force
+//! is ramped, the energy observer pauses: the duration of the ramp limits the energy that a ramp up
+//! gives out, not the budget.
 //!
 //! Nothing here allocates, waits or panics; the crate has no heap. All lengths are in metres,
 //! forces in newtons, times in seconds.
@@ -21,13 +21,13 @@
     clippy::unreachable
 )]
 
-// Types that cross the border of the law.
+// Types that callers pass in and get back.
 mod params;
 mod patch;
 mod report;
 mod types;
 
-// The law, in the order of a tick.
+// The stages of the law, in the order of a tick.
 mod servo;
 
 mod hand;

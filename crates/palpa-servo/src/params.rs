@@ -1,12 +1,12 @@
 //! Settings of the law.
 
-/// Settings of the law; the defaults are what the tests show.
+/// Settings of the law. The tests run with the defaults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServoParams {
     /// Period of the loop, s.
     pub period: f64,
-    /// The contact problem is solved when a sweep changes the forces by less than this share of
-    /// their sum.
+    /// Tolerance of the contact problem: the sweeps end when one changes the forces by less than
+    /// this share of their sum.
     pub tolerance: f64,
     /// Largest number of sweeps over the contacts in one solution, 1 to 200.
     pub max_sweeps: u32,
@@ -14,12 +14,13 @@ pub struct ServoParams {
     pub passes: u32,
     /// Time in which a new patch takes over from the old one, in patch periods.
     pub transfer_periods: f64,
-    /// Largest difference between two patches that is bridged, as a share of the device's largest
-    /// force.
+    /// Largest difference in force between two patches that the transfer bridges, as a share of the
+    /// device's largest force.
     pub max_transfer: f64,
-    /// Age at which a patch is stale, in patch periods, and at least [`ServoParams::stale_after`].
+    /// Age at which a patch is stale, in patch periods; never less than
+    /// [`ServoParams::stale_after`].
     pub stale_periods: f64,
-    /// Shortest age at which a patch may be called stale, s.
+    /// Smallest age at which a patch can count as stale, s.
     pub stale_after: f64,
     /// Time between two ticks beyond which the deadline counts as missed, s.
     pub late_after: f64,
@@ -29,16 +30,17 @@ pub struct ServoParams {
     pub max_speed: f64,
     /// Time in which the force falls to zero after a fault, s.
     pub ramp_down: f64,
-    /// Time in which it comes back, s.
+    /// Time in which the force returns after a fault, s.
     pub ramp_up: f64,
-    /// Energy that may be given out beyond what was taken in before damping is injected, J.
+    /// Energy budget, J: energy that the loop may give out beyond the energy it took in. Beyond the
+    /// budget, the observer injects strong damping.
     pub energy_budget: f64,
-    /// Time in which energy that was lost in the tissue is forgotten by the observer, s.
+    /// Time in which the observer forgets energy that was lost in the tissue, s.
     pub bank_time: f64,
-    /// Damping that is always rendered in contact, N s/m: 0 except in trials, because the tissue
-    /// has its own.
+    /// Damping that is always rendered in contact, N s/m. It is 0 except in trials, because the
+    /// tissue has its own damping.
     pub damping: f64,
-    /// Step of the device's position sensor, m: differences below it give no velocity.
+    /// Step of the device's position sensor, m. Smaller differences give no velocity.
     pub resolution: f64,
 }
 

@@ -5,7 +5,7 @@
 //! x_i = x0_i + Σ_j W_ij (r_j − r0_j)          where candidate vertices go under forces r of the tool on them
 //! g_i = n · d + ½ dᵀ C d,  d = T⁻¹ x_i − c    their gap to the tool at pose T, with c, n, C in the tool's frame
 //! ```
-//! Candidates that do not touch have `r0 = 0`; they are there because the tool may reach them
+//! Candidates that do not touch have `r0 = 0`. They are included because the tool may reach them
 //! before the next patch.
 
 use crate::{MAX_TOOLS, Mat3, Pose, Vec3};
@@ -17,13 +17,13 @@ const N: usize = 3 * MAX_CONTACTS;
 /// A vertex of the skin that touches a tool or is near one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// Vertex of the body; the same number in every patch that has it.
+    /// Number of the vertex in the body; the same in every patch.
     pub vertex: u32,
-    /// Tool that it is near, index into the patch's tools.
+    /// Nearest tool, an index into the patch's tools.
     pub tool: u32,
     /// Position, m, `x0`.
     pub position: Vec3,
-    /// Force of the tool on it there, N, `r0`.
+    /// Force of the tool on the vertex at that position, N, `r0`.
     pub force: Vec3,
     /// Nearest point of the tool's surface, in the tool's frame, m, `c`.
     pub surface: Vec3,
@@ -31,8 +31,8 @@ pub struct Candidate {
     pub normal: Vec3,
     /// The tool's curvature there, in the tool's frame, 1/m, `C`.
     pub curvature: Mat3,
-    /// Anchor of friction, in the tool's frame, m; for a vertex that slides or does not touch, its
-    /// position there.
+    /// Anchor of friction, in the tool's frame, m. If the vertex slides or does not touch, the
+    /// anchor is the position of the vertex.
     pub anchor: Vec3,
 }
 
@@ -57,12 +57,13 @@ pub struct ToolContact {
     pub pose: Pose,
     /// Coefficient of friction.
     pub friction: f64,
-    /// Whether its vertices are bonded to it, and may pull, rather than be pressed.
+    /// Whether the vertices are bonded to the tool. Bonded vertices may pull; others are only
+    /// pressed.
     pub is_bonded: bool,
-    /// Force of the tissue on the tool there, N.
+    /// Force of the tissue on the tool at that pose, N.
     pub force: Vec3,
-    /// Stiffness against the tool, N/m: the derivative of that force by the tool's position,
-    /// negated.
+    /// Stiffness against the tool, N/m: the negative derivative of that force with respect to the
+    /// tool's position.
     pub stiffness: Mat3,
 }
 
@@ -87,33 +88,35 @@ impl ToolContact {
 /// A local model of the tissue under the tools.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPatch {
-    /// Number of the tissue's step, from 1; 0 is a patch that was never written.
+    /// Number of the tissue's step, from 1; 0 if the patch was never written.
     pub id: u64,
-    /// Loop's clock when the poses were taken for which this patch was made, s.
+    /// Time on the loop's clock at which the poses for this patch were taken, s.
     pub sampled_at: f64,
-    /// Time from one patch to the next that the tissue expects, s.
+    /// Expected time to the next patch, s, as the tissue declares it.
     pub period: f64,
     /// Number of tools.
     pub n_tools: usize,
-    /// The tools; those past `n_tools` mean nothing.
+    /// The tools; entries from `n_tools` on are not used.
     pub tools: [ToolContact; MAX_TOOLS],
     /// Number of candidates.
     pub n_contacts: usize,
-    /// The candidates; those past `n_contacts` mean nothing.
+    /// The candidates; entries from `n_contacts` on are not used.
     pub contacts: [Candidate; MAX_CONTACTS],
-    /// Compliance `W`, m/N: entry (i, j) at `i + 3 MAX_CONTACTS j`, symmetric, both triangles.
+    /// Compliance `W`, m/N. Entry (i, j) is at `i + 3 MAX_CONTACTS j`; symmetric, both triangles
+    /// are stored.
     pub compliance: [f64; N * N],
 }
 
 impl ContactPatch {
-    /// Distance between columns of the compliance.
+    /// Distance between columns of the compliance, in entries.
     pub const STRIDE: usize = N;
 
     #[expect(
         clippy::large_stack_arrays,
         reason = "a constant, of which the user chooses the place"
     )]
-    /// A patch that was never written. 270 KB: keep it in a `static` or a box, not on a stack.
+    /// A patch that was never written. It takes 270 KB: keep it in a `static` or a box, not on the
+    /// stack.
     pub const EMPTY: Self = Self {
         id: 0,
         sampled_at: 0.0,
@@ -125,7 +128,8 @@ impl ContactPatch {
         compliance: [0.0; N * N],
     };
 
-    /// Displacement of candidate `i` per force on candidate `j`, m/N; zero beyond [`MAX_CONTACTS`].
+    /// Displacement of candidate `i` per unit force on candidate `j`, m/N; zero beyond
+    /// [`MAX_CONTACTS`].
     pub fn block(&self, i: usize, j: usize) -> Mat3 {
         let column = |c: usize| {
             let at = 3 * i + N * (3 * j + c);
@@ -139,7 +143,7 @@ impl ContactPatch {
         }
     }
 
-    /// Sets [`ContactPatch::block`] (i, j), and not its mirror image; does nothing beyond
+    /// Sets [`ContactPatch::block`] (i, j), but not the block (j, i). Does nothing beyond
     /// [`MAX_CONTACTS`].
     pub fn set_block(&mut self, i: usize, j: usize, block: &Mat3) {
         if i < MAX_CONTACTS && j < MAX_CONTACTS {
@@ -155,7 +159,8 @@ impl ContactPatch {
     }
 }
 
-/// The source of patches: the reader's end of a mailbox in which the latest wins. No call may wait.
+/// The source of patches: the reader's end of a mailbox that keeps the latest patch only. No call
+/// may wait.
 pub trait PatchSource {
     /// The patch that the last [`PatchSource::take`] made current.
     fn current(&self) -> &ContactPatch;

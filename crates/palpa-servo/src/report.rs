@@ -11,31 +11,31 @@ macro_rules! flags {
         pub struct $name(u16);
 
         impl $name {
-            /// None of them.
+            /// No flag set.
             pub const NONE: Self = Self(0);
             $($(#[$flag_doc])* pub const $flag: Self = Self(1 << $bit);)*
 
-            /// Whether all of `other` are set.
+            /// Whether all flags of `other` are set.
             pub const fn contains(self, other: Self) -> bool {
                 self.0 & other.0 == other.0
             }
 
-            /// Whether none is set.
+            /// Whether no flag is set.
             pub const fn is_empty(self) -> bool {
                 self.0 == 0
             }
 
-            /// As a bit mask, for records.
+            /// The flags as a bit mask, for records.
             pub const fn bits(self) -> u16 {
                 self.0
             }
 
-            /// From such a mask; bits that mean nothing are dropped.
+            /// The flags of a bit mask; unknown bits are dropped.
             pub const fn from_bits(bits: u16) -> Self {
                 Self(bits & (0 $(| 1 << $bit)*))
             }
 
-            /// Calls `f` with the words for each that is set.
+            /// Calls `f` with the words for each flag that is set.
             pub fn for_each_name(self, mut f: impl FnMut(&'static str)) {
                 $(if self.contains(Self::$flag) { f($text); })*
             }
@@ -65,17 +65,17 @@ macro_rules! flags {
 }
 
 flags! {
-    /// Why the force is ramped to zero. Each is set in the ticks in which its cause is there.
+    /// Why the force is ramped to zero. A fault is set in every tick in which its cause lasts.
     Faults {
         /// There was no patch yet.
         NO_PATCH = 0, "no patch yet";
         /// The newest patch is too old.
         STALE_PATCH = 1, "stale patch";
-        /// The newest patch holds values that are no contact.
+        /// The newest patch holds values that cannot be a contact.
         BAD_PATCH = 2, "patch not usable";
         /// The time since the last tick was too long.
         MISSED_DEADLINE = 3, "missed deadline";
-        /// The clock went back, stood or was not a number.
+        /// The clock went back, stood still, or was not a number.
         BAD_CLOCK = 4, "bad clock";
         /// A device gave no reading.
         DEVICE_LOST = 5, "device lost";
@@ -83,7 +83,7 @@ flags! {
         BAD_READING = 6, "reading not a number";
         /// A device repeats the same reading.
         DEVICE_STALLED = 7, "device stalled";
-        /// A position jumped as no hand can.
+        /// A position jumped faster than a hand can move.
         DEVICE_JUMPED = 8, "device jumped";
         /// The contact problem gave no finite force.
         NO_SOLUTION = 9, "contact not solved";
@@ -97,15 +97,15 @@ flags! {
         FORCE = 0, "force";
         /// Largest moment of the device.
         TORQUE = 1, "torque";
-        /// Largest change in time.
+        /// Largest rate of change of the force.
         SLEW = 2, "slew";
         /// The ramp held the force back.
         RAMP = 3, "ramp";
         /// The energy observer injected damping.
         ENERGY = 4, "energy";
-        /// The coupling softened what is too stiff for the device.
+        /// The coupling softened a contact that is too stiff for the device.
         STIFFNESS = 5, "stiffness";
-        /// The difference to a new patch was more than is bridged.
+        /// The difference in force to a new patch was larger than the transfer bridges.
         TRANSFER = 6, "transfer";
         /// The sweeps ended before the tolerance was met.
         SWEEPS = 7, "sweeps";
@@ -115,23 +115,24 @@ flags! {
 /// The report of one tick on one tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolReport {
-    /// Force of the tissue on the tool by the local model, N, before anything is done to it.
+    /// Force of the tissue on the tool by the local model, N, before transfer, ramp, damping and
+    /// limits.
     pub tissue_force: Vec3,
     /// Its moment about the tool's position, N m.
     pub tissue_torque: Vec3,
-    /// Force that was commanded, N.
+    /// Commanded force, N.
     pub force: Vec3,
-    /// Transfer from the patch before, N; part of the force.
+    /// Transfer from the previous patch, N; part of the force.
     pub transfer: Vec3,
-    /// Velocity as estimated, m/s.
+    /// Estimated velocity, m/s.
     pub velocity: Vec3,
     /// Stiffness of the tissue against the tool, N/m; 0 without contact.
     pub stiffness: f64,
-    /// Displacement of the tool off the device's position by the coupling, m. The tissue's next
-    /// step is made where the tool is: at the device's own place the tissue would be pressed
-    /// deeper, and be stiffer, than it is felt.
+    /// Displacement of the tool from the device by the coupling, m. The tissue's next step uses the
+    /// position of the tool: at the position of the device, the tissue would be pressed deeper, and
+    /// be stiffer, than it is felt.
     pub stretch: Vec3,
-    /// Share of the tissue's stiffness that the coupling takes away: 0 where the tissue's own is
+    /// Share of the tissue's stiffness that the coupling takes away; 0 if the full stiffness is
     /// felt.
     pub softening: f64,
     /// Damping that the energy observer injected, N s/m.
@@ -140,7 +141,7 @@ pub struct ToolReport {
     pub energy_in: f64,
     /// Energy given to the hand since the start, J.
     pub energy_out: f64,
-    /// Bank of the energy observer, J; negative is energy generated.
+    /// Bank of the energy observer, J; negative if energy was generated.
     pub bank: f64,
     /// The limits that were met.
     pub limits: Limits,
@@ -149,7 +150,7 @@ pub struct ToolReport {
 }
 
 impl ToolReport {
-    /// Of a tool that does nothing.
+    /// Report of an unused tool.
     pub const ZERO: Self = Self {
         tissue_force: Vec3::new(0.0, 0.0, 0.0),
         tissue_torque: Vec3::new(0.0, 0.0, 0.0),
@@ -181,26 +182,26 @@ pub struct TickReport {
     pub patch_age: f64,
     /// Number of candidates that touch.
     pub n_active: u32,
-    /// Number of these that slide.
+    /// Number of touching candidates that slide.
     pub n_sliding: u32,
     /// Sweeps over the contacts.
     pub sweeps: u32,
     /// Change of the contact forces in the last sweep as a share of their sum.
     pub residual: f64,
-    /// Share of the force that is let through: below 1 after a fault.
+    /// Share of the force that the ramp lets through; below 1 after a fault.
     pub gain: f64,
-    /// Energy that may be given out beyond what was taken in, J.
+    /// Energy budget, J: energy that the loop may give out beyond the energy it took in.
     pub energy_budget: f64,
     /// Faults of this tick, over all tools.
     pub faults: Faults,
     /// Limits met, over all tools.
     pub limits: Limits,
-    /// The tools; those that the loop has no device for are [`ToolReport::ZERO`].
+    /// The tools; entries without a device are [`ToolReport::ZERO`].
     pub tools: [ToolReport; MAX_TOOLS],
 }
 
 impl TickReport {
-    /// Of a tick that did nothing.
+    /// Report of a tick that did nothing.
     pub const ZERO: Self = Self {
         now: 0.0,
         patch_id: 0,

@@ -1,4 +1,4 @@
-//! One tick of the law, in the order in which things happen.
+//! One tick of the law, in order of execution.
 
 mod coupling;
 mod limits;
@@ -16,7 +16,7 @@ use crate::{
     Pose, ServoParams, TickReport, ToolContact,
 };
 
-/// The law with its memory from tick to tick, of fixed size.
+/// The law and its state from tick to tick. Its size is fixed.
 #[derive(Debug, Clone)]
 pub struct Servo {
     params: ServoParams,
@@ -29,8 +29,8 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// For these devices, tool t in the hand of device t. Those beyond [`MAX_TOOLS`] get no force.
-    /// A period that is no time counts as the default.
+    /// A law for these devices; device `t` holds tool `t`. Devices beyond [`MAX_TOOLS`] get no
+    /// force. If the period is not a positive number, the default is used.
     pub fn new(params: &ServoParams, specs: &[DeviceSpec]) -> Self {
         let mut tools = [Tool::NONE; MAX_TOOLS];
         for (tool, spec) in tools.iter_mut().zip(specs) {
@@ -54,8 +54,8 @@ impl Servo {
 
     /// Computes a force for each device from the devices' states at `now`, s, and the newest patch.
     ///
-    /// The state of a device that gave none is `None`. All of `commands` is written, whatever comes
-    /// in.
+    /// The state of a device that gave no reading is `None`. Every entry of `commands` is written,
+    /// whatever the input.
     pub fn tick(
         &mut self,
         now: f64,
@@ -70,7 +70,7 @@ impl Servo {
         };
         let dt = self.advance_clock(now, &mut report);
         self.read_hands(now, dt, states, &mut report);
-        // From here on a tick counts for at most two periods, whatever the clock says.
+        // From here on, a tick counts for at most two periods, even after a longer pause.
         let dt = dt.clamp(0.0, 2.0 * self.params.period);
         for tool in &mut self.tools {
             tool.transfer.fade(dt);
@@ -141,7 +141,8 @@ impl Servo {
         patches: &mut impl PatchSource,
         report: &mut TickReport,
     ) -> [ToolLoad; MAX_TOOLS] {
-        // Asked once: a patch that comes while the old one is evaluated waits for the next tick.
+        // Checked once: a patch that arrives while the old one is evaluated waits for the next
+        // tick.
         let is_newer = patches.is_newer();
         let mut loads = [ToolLoad::ZERO; MAX_TOOLS];
         if self.patch.is_used() {
@@ -159,7 +160,7 @@ impl Servo {
         loads
     }
 
-    /// Forces of the local model at the present poses; the anchors of friction follow.
+    /// Computes the forces of the local model at the present poses and moves the friction anchors.
     fn evaluate(
         &mut self,
         patch: &ContactPatch,
@@ -192,7 +193,7 @@ impl Servo {
         poses
     }
 
-    /// Forgets a solution that is not finite, and the patch with it.
+    /// Discards a solution that is not finite, and its patch.
     fn check_loads(&mut self, loads: &mut [ToolLoad; MAX_TOOLS], report: &mut TickReport) {
         if !loads.iter().all(ToolLoad::is_finite) {
             report.faults |= Faults::NO_SOLUTION;
@@ -202,8 +203,9 @@ impl Servo {
         }
     }
 
-    /// Moves the share of the force that is let through; when it begins to come back, nothing old
-    /// does.
+    /// Updates the share of the force that the ramp lets through. When the force begins to return,
+    /// the friction anchors, the transfer and the energy bank are reset, so that no force from
+    /// before the fault returns.
     fn update_ramp(&mut self, dt: f64, patch: &ContactPatch, report: &mut TickReport) {
         let comes_back = self.ramp.update(report.faults, dt, &self.params);
         if comes_back && self.patch.is_used() {

@@ -3,11 +3,11 @@
 //! ```text
 //! x = x0 + W (r − r0),   y_i = x_i − q_t,   q_t = −c_t Σ r_i      tool t stands off its device by the coupling c_t
 //! ```
-//! Block Gauss–Seidel over the contacts, each solved exactly ([`Contact`]), with a nonlinear
-//! conjugate gradient step on top of every sweep (after Silcowitz-Hansen, Niebe & Erleben 2010):
-//! plain sweeps need 3 to 10 times as many where fine meshes or a coupling tie the contacts
-//! together. `x` is kept with `r` through all of it, so that nothing is multiplied by the whole of
-//! `W` except when a patch arrives, and a tick starts from where the last one ended.
+//! Block Gauss–Seidel over the contacts, each solved exactly ([`Contact`]). A nonlinear conjugate
+//! gradient step follows every sweep (after Silcowitz-Hansen, Niebe & Erleben 2010). Where fine
+//! meshes or a coupling tie the contacts together, plain sweeps need 3 to 10 times as many. The
+//! solver updates `x` together with `r`, so it multiplies by the whole of `W` only when a patch
+//! arrives. A tick starts from the solution of the previous tick.
 
 mod adopt;
 mod anchors;
@@ -20,17 +20,18 @@ use crate::contact::{Contact, ContactInput};
 use crate::{ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ServoParams, Vec3};
 
 const N: usize = ContactPatch::STRIDE;
-/// Visits of contacts in one tick, whatever the settings say: what is not settled then goes on in
-/// the next.
+/// Largest number of contact visits in one tick, whatever the settings say. The next tick continues
+/// from there.
 const MAX_VISITS: u32 = 1200;
-/// The load on one tool by a solution.
+/// The load of a solution on one tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ToolLoad {
-    /// Force of the tissue on it, N.
+    /// Force of the tissue on the tool, N.
     pub(crate) force: Vec3,
     /// Its moment about the device's position, N m.
     pub(crate) torque: Vec3,
-    /// `rᵀ W r` of its own contacts, J: twice the energy that the patch's tissue holds.
+    /// `rᵀ W r` of the tool's own contacts, J: twice the energy that the tissue stores in the
+    /// patch's model.
     pub(crate) work: f64,
 }
 
@@ -41,38 +42,42 @@ impl ToolLoad {
         work: 0.0,
     };
 
-    /// Whether all its numbers are finite, and no force or moment larger than any that could be.
+    /// Whether all numbers are finite, and force and moment are of a plausible size.
     pub(crate) fn is_finite(&self) -> bool {
         let small = |x: &f64| x.abs() < 1e12;
         self.force.iter().all(small) && self.torque.iter().all(small) && self.work.is_finite()
     }
 }
 
-/// The contacts of the current patch with their forces and the memory of friction.
+/// The contacts of the current patch, with their forces and friction anchors.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactSolver {
-    /// Number of contacts: the first `n` entries of all that follows count.
+    /// Number of contacts; of each array below, the first `n` entries are used.
     n: usize,
-    /// Vertex and tool of each.
+    /// Vertex and tool of each contact.
     key: [Key; MAX_CONTACTS],
     /// Forces of the tools on the vertices, N.
     force: [Vec3; MAX_CONTACTS],
-    /// Anchor of each, in its tool's frame, m.
+    /// Anchor of each contact, in its tool's frame, m.
     anchor: [Vec3; MAX_CONTACTS],
     is_sliding: [bool; MAX_CONTACTS],
     contact: [Contact; MAX_CONTACTS],
-    /// Each vertex's own compliance: out of `W`, where every one of them is a cache line apart.
+    /// Each vertex's own compliance, m/N: a copy of the diagonal blocks of `W`, which lie a cache
+    /// line or more apart.
     own: [Mat3; MAX_CONTACTS],
-    /// Positions of the vertices, m, flat: `x`, and those without any force.
+    /// Positions `x` of the vertices, m, as a flat array.
     position: [f64; N],
+    /// Positions of the vertices without any force, m, as a flat array.
     free: [f64; N],
-    /// For the conjugate gradients: the direction, N, and its displacement, m, and both values
-    /// before the sweep.
+    /// Direction of the conjugate gradients, N.
     direction: [Vec3; MAX_CONTACTS],
+    /// Displacement by `direction`, m, as a flat array.
     drift: [f64; N],
+    /// Forces before the sweep, N.
     last_force: [Vec3; MAX_CONTACTS],
+    /// Positions before the sweep, m.
     last_position: [f64; N],
-    /// Displacement of each tool off its device, m.
+    /// Displacement of each tool from its device, m.
     stretch: [Vec3; MAX_TOOLS],
 }
 
@@ -102,8 +107,8 @@ impl ContactSolver {
         self.stretch = [Vec3::zeros(); MAX_TOOLS];
     }
 
-    /// Finds the forces at these poses, from those of the last call. `couplings` are in m/N; the
-    /// tick makes `solutions` calls like this one, which share its time.
+    /// Finds the forces at these poses, starting from those of the last call. `couplings` are in
+    /// m/N. The tick makes `solutions` such calls, and they share its limit of contact visits.
     pub(crate) fn solve(
         &mut self,
         patch: &ContactPatch,
@@ -120,8 +125,8 @@ impl ContactSolver {
             self.update_stretch(patch, couplings);
             self.linearise(patch, poses, couplings);
             let left = max_sweeps - solution.sweeps;
-            // A part is kept for the passes to come: what they correct matters more than the last
-            // digit of this one.
+            // Some sweeps are reserved for the later passes: their corrections matter more than the
+            // last digit of this pass.
             let allowed = if pass + 1 == passes {
                 left
             } else {
@@ -129,7 +134,8 @@ impl ContactSolver {
             };
             let before = solution.sweeps;
             self.sweep_until_done(patch, couplings, params.tolerance, allowed, &mut solution);
-            // A pass that found nothing to do in its first sweep was the last that is needed.
+            // A pass that converges in its first sweep changes nothing, so no further pass is
+            // needed.
             if solution.sweeps >= max_sweeps || pass > 0 && solution.sweeps == before + 1 {
                 break;
             }
@@ -190,7 +196,7 @@ impl ContactSolver {
         nearest
     }
 
-    /// Displacement of a tool off its device by the coupling, m.
+    /// Displacement of a tool from its device by the coupling, m.
     pub(crate) fn stretch(&self, tool: usize) -> Vec3 {
         self.stretch.get(tool).copied().unwrap_or_default()
     }
@@ -246,7 +252,7 @@ impl ContactSolver {
     }
 }
 
-/// A tool of a patch, if the patch has it.
+/// A tool of a patch; `None` if the patch does not have it.
 fn tool_of(patch: &ContactPatch, tool: u32) -> Option<&crate::ToolContact> {
     patch
         .tools

@@ -1,8 +1,8 @@
 //! Velocity from positions that come in steps of an encoder.
 //!
-//! First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000): the longest window whose
-//! straight line passes all its readings within the resolution. A still hand gives exactly zero or
-//! the drift over the whole window, a fast one a short window and little lag.
+//! First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000): it uses the longest window
+//! in which a straight line passes all readings within the resolution. A still hand gives zero or
+//! the drift over the whole window; a fast hand gives a short window and little lag.
 
 use crate::Vec3;
 
@@ -29,7 +29,7 @@ impl VelocityEstimate {
         self.n = 0;
     }
 
-    /// Takes a reading; the velocity with it, m/s.
+    /// Adds a reading and returns the new velocity, m/s.
     pub(crate) fn update(&mut self, time: f64, position: &Vec3, resolution: f64) -> Vec3 {
         self.readings.rotate_right(1);
         if let Some(first) = self.readings.first_mut() {

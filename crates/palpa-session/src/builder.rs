@@ -1,11 +1,11 @@
-//! The scene that is wanted, and the thread that builds its body.
+//! The wanted scene, and the thread that builds its body.
 //!
 //! ```text
 //!  Idle ── build ──► Building ── another scene is wanted ──► Stale
 //!    ▲ finish: take over │                                     │ finish: leave it, build again
 //!    └───────────────────┘                                     └──► Building
 //! ```
-//! One body is built at a time. The body before is pressed meanwhile.
+//! One body is built at a time. Meanwhile, the previous body can be pressed.
 
 use std::io;
 use std::sync::mpsc::Sender;
@@ -36,12 +36,12 @@ enum Work {
     Stale,
 }
 
-/// Starts to build a scene, beside the caller. The outcome comes as [`Order::Built`].
+/// Starts to build a scene on another thread. The outcome arrives as [`Order::Built`].
 type StartBuilding = Box<dyn FnMut(&Scene) -> io::Result<()> + Send>;
 
 /// The builder.
 pub(crate) struct Builder {
-    /// The scene of the body that is there, or the scene that is wanted instead of it.
+    /// The scene of the present body, or the scene that will replace it.
     pub(crate) wanted: Wanted,
     work: Work,
     start: StartBuilding,
@@ -61,7 +61,7 @@ impl Builder {
         }
     }
 
-    /// Builds the wanted scene, or after the one that is being built.
+    /// Builds the wanted scene, now or after the present build.
     ///
     /// # Errors
     /// When the system gives no thread.
@@ -76,7 +76,8 @@ impl Builder {
         Ok(())
     }
 
-    /// A body was built, or cannot be. Returns whether it is the wanted one; if not, build again.
+    /// Called when a build has ended. Returns whether it was for the wanted scene; if not, build
+    /// again.
     #[must_use]
     pub(crate) fn finish(&mut self) -> bool {
         std::mem::replace(&mut self.work, Work::Idle) != Work::Stale
@@ -96,10 +97,10 @@ fn spawn(scene: &Scene, orders: &Sender<Order>) -> io::Result<()> {
             let built = std::panic::catch_unwind(|| World::build(&scene));
             let built = built.unwrap_or_else(|_| {
                 Err(anyhow::anyhow!(
-                    "building the body failed by a fault of Palpa, not of the scene"
+                    "building the body failed because of a bug in Palpa, not of the scene"
                 ))
             });
-            // A session that is over wants no body.
+            // A session that has ended needs no body.
             let _ = orders.send(Order::Built(Box::new(built)));
         })?;
     Ok(())

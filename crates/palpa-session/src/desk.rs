@@ -1,6 +1,6 @@
-//! The desk: hands each request to the part of the session that it concerns.
+//! The desk: passes each request to the part of the session that handles it.
 //!
-//! A request that concerns several parts is a method here; everything else is in the parts.
+//! A request that concerns several parts is a method here; all other code is in the parts.
 
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
@@ -32,7 +32,7 @@ use crate::{edit, gallery};
 pub(crate) struct Desk {
     /// The folder for recordings.
     out: PathBuf,
-    /// Seed of the next round of the game, where the page gives none.
+    /// Seed of the next round of the game, if the page gives none.
     seed: Option<u64>,
     clients: Clients,
     stage: Stage,
@@ -45,7 +45,7 @@ pub(crate) struct Desk {
 }
 
 impl Desk {
-    /// A desk without a body. The outcome of building comes to `orders`; `problem` is shared with
+    /// A desk without a body. The result of a build arrives in `orders`; `problem` is shared with
     /// the server.
     pub(crate) fn new(
         params: SessionParams,
@@ -101,7 +101,7 @@ impl Desk {
 
     fn request(&mut self, request: Request, now: Instant) -> anyhow::Result<()> {
         match request {
-            // The server has done it.
+            // The server has handled it.
             Request::TakeControl => {}
             Request::Hand(hand) => self.put_hand(&hand, now)?,
             Request::Lift => self.lift(),
@@ -155,14 +155,14 @@ impl Desk {
         Ok(())
     }
 
-    // The scene, and the body that is built from it.
+    // The scene and its body.
 
     fn want(&mut self, scene: Scene, key: Option<String>) -> anyhow::Result<()> {
         if self.game.is_some() {
-            bail!("the scene stays as it is while lumps are hidden; end the game first");
+            bail!("the scene cannot be changed while lumps are hidden; end the game first");
         }
         if self.tape.is_under_way() {
-            bail!("the scene stays as it is while it is recorded; stop the recording first");
+            bail!("the scene cannot be changed while it is recorded; stop the recording first");
         }
         self.tape.close();
         if self.end_motion() {
@@ -198,7 +198,7 @@ impl Desk {
             Err(error) => {
                 self.fail(one_paragraph(&error));
                 if let Some(live) = self.stage.live() {
-                    // The body before stays, and so does its scene.
+                    // The previous body stays, and so does its scene.
                     self.builder.wanted = Wanted {
                         scene: live.world.scene.clone(),
                         key: self.status.gallery_key().map(str::to_owned),
@@ -208,8 +208,8 @@ impl Desk {
         }
     }
 
-    /// Starts the engine anew on the body at rest. If the body is lost over it, pages see why, and
-    /// it is built again.
+    /// Restarts the engine with the body at rest. If the body is lost in the process, pages see the
+    /// reason, and the body is built again.
     fn restart(&mut self, recorder: &RecorderParams) -> anyhow::Result<()> {
         let outcome = self.stage.restart(recorder);
         if self.stage.live().is_some() {
@@ -279,7 +279,7 @@ impl Desk {
             bail!("nothing is being recorded");
         }
         self.status.change();
-        // The log is whole once its engine has ended; the body goes on, at rest.
+        // The log is complete only when its engine has ended. The body then continues, at rest.
         if self.stage.live().is_some() {
             self.restart(&RecorderParams::default())?;
         }
@@ -315,7 +315,7 @@ impl Desk {
         self.status.set_field(Field::None);
         self.game = Some(game);
         self.builder.wanted.scene = scene;
-        // Pages see no lumps of the scene before either.
+        // Hide the scene's own lumps from pages too.
         self.describe();
         self.build();
         Ok(())
@@ -329,7 +329,7 @@ impl Desk {
             bail!("the lumps are still being hidden");
         }
         game.reveal(&live.world);
-        // Now with the stiffness of its lumps.
+        // The new mesh shows the stiffness of its lumps.
         self.screen.renew_mesh();
         self.describe();
         Ok(())
@@ -361,7 +361,7 @@ impl Desk {
 
     // Time.
 
-    /// Moves everything on by `dt` seconds, and shows a frame.
+    /// Advances everything by `dt` seconds, and shows a frame.
     pub(crate) fn advance(&mut self, dt: f64, now: Instant) {
         if let Some(live) = self.stage.live_mut() {
             live.refresh();
@@ -380,14 +380,14 @@ impl Desk {
         }
         self.show(dt);
         if is_full {
-            // A failure is told as the session's problem.
+            // A failure is reported as the session's problem.
             let _ = self.stop_recording();
             let text = "the recording ended: an hour is the longest".to_owned();
             self.status.notice(NoticeLevel::Warning, text);
         }
     }
 
-    /// Makes a frame of the body, and shows it or that of a replay.
+    /// Makes a frame of the body, and shows it or the frame of a replay.
     fn show(&mut self, dt: f64) {
         let mut is_made = false;
         if let Some(live) = self.stage.live() {
@@ -413,11 +413,11 @@ impl Desk {
         }
     }
 
-    /// Sends the engine's figures. An engine that has lost a thread is started anew first.
+    /// Sends the engine's figures. First restarts an engine that has lost a thread.
     pub(crate) fn tell_figures(&mut self) {
         self.watch_over();
         if self.veil().is_drawn() {
-            // The round's time goes on.
+            // The game's clock is part of the state.
             self.status.change();
         }
         let Some(live) = self.stage.live_mut() else {
@@ -431,7 +431,7 @@ impl Desk {
         self.status.tell_figures(figures, notices);
     }
 
-    /// An engine without its tissue gives no force: it is started anew.
+    /// Restarts an engine that has lost its tissue thread, because it gives no force.
     fn watch_over(&mut self) {
         let live = self.stage.live();
         let ended = live.map_or_else(Vec::new, |live| live.running.engine.ended());
@@ -465,7 +465,7 @@ impl Desk {
         });
     }
 
-    /// Ends the engine; a recording is closed.
+    /// Ends the engine and closes a recording.
     pub(crate) fn end(mut self) {
         self.stage.end();
     }

@@ -1,4 +1,4 @@
-//! Faults on purpose, as a page asks for them: drills for the engine and its user.
+//! Faults that a page causes on purpose, to test the engine and train its user.
 
 use std::time::{Duration, Instant};
 
@@ -6,10 +6,10 @@ use anyhow::bail;
 use palpa_rt::FaultHooks;
 use palpa_viewer::control::FaultKind;
 
-/// Length of a pause of the tissue.
+/// Duration of a pause of the tissue.
 const PAUSE: Duration = Duration::from_millis(500);
 
-/// Drills.
+/// Causes faults on purpose.
 #[derive(Debug)]
 pub(crate) struct Drills {
     is_allowed: bool,
@@ -26,7 +26,7 @@ impl Drills {
         }
     }
 
-    /// Refuses a fault where none is allowed.
+    /// Refuses a fault if faults are not allowed.
     pub(crate) fn check_allowed(&self) -> anyhow::Result<()> {
         if !self.is_allowed {
             bail!("faults on purpose are not allowed here; start with --allow-faults");
@@ -46,7 +46,8 @@ impl Drills {
         }
     }
 
-    /// Ends a pause that is over. The engine may have been started anew meanwhile, or be gone.
+    /// Ends a pause when its time is over. The engine may have been restarted meanwhile, or have
+    /// ended.
     pub(crate) fn advance(&mut self, engine: Option<&FaultHooks>, now: Instant) {
         if self.paused_until.is_some_and(|until| now >= until) {
             self.paused_until = None;

@@ -35,12 +35,13 @@ pub(crate) fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
         apply(&mut value, edit).with_context(|| format!("edit of \"{}\"", edit.path))?;
     }
     name_again(&mut value, &in_full, &as_json(&scene.to_toml())?);
-    let text = toml::to_string(&without_nulls(value)).context("the edits make no scene file")?;
+    let text = toml::to_string(&without_nulls(value))
+        .context("the edited scene cannot be written as a scene file")?;
     Ok(Scene::parse(&text, &scene.base_dir).map_err(SceneError::by_key)?)
 }
 
-/// Puts the catalogue's names back in place of tissues that no edit has changed, so that their
-/// sources are known again.
+/// Puts the catalogue's names back for tissues that no edit has changed, so that their sources are
+/// known again.
 fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
     for list in ["layer", "lump"] {
         let tissues = |scene: &Value| -> Vec<Value> {
@@ -73,7 +74,7 @@ fn apply(scene: &mut Value, edit: &Edit) -> anyhow::Result<()> {
         .split('/')
         .map(|key| key.replace("~1", "/").replace("~0", "~"))
         .collect();
-    let (last, parents) = keys.split_last().context("the path names nothing")?;
+    let (last, parents) = keys.split_last().context("the path is empty")?;
     let mut at = scene;
     for (key, child) in parents.iter().zip(&keys[1..]) {
         at = match at {

@@ -22,14 +22,14 @@ const FROM_RIM: f64 = 25e-3;
 const TISSUE: &str = "fibrous lump";
 /// Least force that counts as a touch, N.
 const TOUCH: f64 = 0.05;
-/// Touches nearer to each other than this are one, m.
+/// Touches closer together than this count as one, m.
 const GRAIN: f64 = 2e-3;
 const MOST_TOUCHES: usize = 4000;
 /// Radius around a touch that counts as explored, m.
 const REACH: f64 = 8e-3;
 /// Largest seed: the largest whole number that a page can represent.
 const MOST_SEED: u64 = (1 << 53) - 1;
-/// Most marks: nobody finds more lumps than that.
+/// Largest number of marks, more than there can be lumps.
 const MOST_MARKS: usize = 10;
 
 /// A round of the game.
@@ -65,9 +65,7 @@ impl Game {
             bail!("{n_lumps} lumps cannot be hidden; choose 1 to 3");
         }
         if world.spring_body().is_some() {
-            bail!(
-                "bars between nodes have no place for a lump; choose a scene of the continuum model"
-            );
+            bail!("lumps can be hidden in the continuum model only; choose a scene without bars");
         }
         if seed.is_some_and(|seed| seed > MOST_SEED) {
             bail!("a seed is a whole number up to {MOST_SEED}");
@@ -115,7 +113,7 @@ impl Game {
         Ok((game, scene))
     }
 
-    /// Starts the clock: the body is there.
+    /// Starts the clock when the body is ready.
     pub(super) fn begin(&mut self) {
         self.began.get_or_insert_with(Instant::now);
     }
@@ -125,7 +123,7 @@ impl Game {
         self.result.is_some()
     }
 
-    /// Notes a force (N) on a place of the skin, lasting `dt` seconds.
+    /// Records a force (N) on a place of the skin for `dt` seconds.
     pub(super) fn feel(&mut self, place: Vec3, force: f64, dt: f64) {
         if self.is_revealed() || force < TOUCH {
             return;
@@ -141,13 +139,13 @@ impl Game {
         }
     }
 
-    /// Marks a point of the skin: the user suspects a lump under it.
+    /// Marks a point of the skin where the user suspects a lump.
     ///
     /// # Errors
     /// When the lumps are revealed, or there are [`MOST_MARKS`] marks.
     pub(super) fn mark(&mut self, point: Vec3) -> anyhow::Result<()> {
         if self.is_revealed() {
-            bail!("the truth is shown already; begin a new round");
+            bail!("the lumps are revealed already; begin a new round");
         }
         if self.marks.len() >= MOST_MARKS {
             bail!("{MOST_MARKS} marks are enough; take one back first");
@@ -195,7 +193,7 @@ impl Game {
         self.result = Some((self.seconds(), result));
     }
 
-    /// Share of the skin's area within [`REACH`] of a touch, 0 to 1; skin near the rims does not
+    /// Share of the skin's area within [`REACH`] of a touch, 0 to 1. Skin near the rims does not
     /// count.
     fn covered(&self, skin: &Skin) -> f64 {
         let (mut all, mut pressed) = (0.0, 0.0);
@@ -258,8 +256,8 @@ fn matched(places: &[Vec3], marks: &[Vec3]) -> Vec<Option<f64>> {
     errors
 }
 
-/// A random place of the skin with room for a lump: place, and radius and depth of the lump's
-/// centre, m.
+/// A random place of the skin with room for a lump. Returns the place, and the radius and depth of
+/// the lump's centre, m.
 fn hiding_place(
     skin: &Skin,
     others: &[Vec3],
@@ -276,7 +274,7 @@ fn hiding_place(
     let is_apart = |p: Vec3| others.iter().all(|q| (p - q).norm() > APART);
     let &(place, thickness) =
         (places.iter()).find(|(p, thickness)| room(*thickness) > 0.0 && is_apart(*p))?;
-    // In the upper half of the room: what lies on the bone is the bone.
+    // In the upper half of the room: close to the bone, a lump could not be told from the bone.
     let depth = COVER + radius + 0.5 * random.f64() * room(thickness);
     Some((place, radius, depth))
 }

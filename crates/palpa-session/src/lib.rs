@@ -1,4 +1,4 @@
-//! A viewer's session: a body under the hand of whoever looks at it, behind the viewer's server.
+//! A viewer's session: the body that users press and see through the viewer's server.
 //!
 //! ```text
 //!  server ── requests ──► remote ── orders ──► session (thread, 60 Hz) ──► desk
@@ -11,8 +11,8 @@
 //!        ├─► drill     faults on purpose
 //!        └─► publish   frames, meshes, fields, state, figures, notices ──► server
 //! ```
-//! The session's thread waits for nobody: bodies and fields are computed on threads of their own, and
-//! a file is written on the server's thread that asked for it.
+//! The session's thread never waits. Bodies and fields are computed on threads of their own, and a
+//! file is written on the server's thread that requested it.
 
 mod builder;
 mod desk;

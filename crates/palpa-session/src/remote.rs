@@ -1,4 +1,4 @@
-//! The server's end of a session: sends orders to its thread, and puts files together.
+//! The server's end of a session: sends orders to the session's thread, and assembles files.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
@@ -22,12 +22,12 @@ pub(super) enum Order {
     Request(Request, Answer),
     Clients(Clients),
     File(HostFile, SyncSender<Option<Material>>),
-    /// A scene was built, or could not be.
+    /// A scene was built, or building failed.
     Built(Box<anyhow::Result<World>>),
     Stop,
 }
 
-/// The content of a file, before it is written.
+/// The data of a file, before it is written.
 pub(super) enum Material {
     Scene(String),
     Tissue(Arc<Model>, Vec<Vec3>),
@@ -44,7 +44,7 @@ pub struct Remote {
 
 impl Host for Remote {
     fn request(&self, request: Request, answer: Answer) {
-        // A session that is gone answers nothing: the server goes with it.
+        // If the session has ended, nobody answers; the server is then ending too.
         let _ = self.orders.send(Order::Request(request, answer));
     }
 

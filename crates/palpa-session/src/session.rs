@@ -1,4 +1,4 @@
-//! The session and its thread: orders in, a picture out, sixty times a second.
+//! The session and its thread: takes orders and makes sixty frames a second.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -16,15 +16,16 @@ use crate::world::BEFORE_THE_BROWSER;
 
 /// Time between two frames.
 const PERIOD: Duration = Duration::from_micros(16_667);
-/// Longest time by which a frame moves the hand on, s: after a hold-up the hand does not jump.
+/// Longest time by which a frame moves the hand on, s, so that the hand does not jump after a
+/// delay.
 const LONGEST_FRAME: f64 = 0.1;
-/// Most orders taken between two frames: all that may come in a second, as a page may send more
-/// requests than there are frames.
+/// Largest number of orders taken between two frames: more than arrive in a second. A page may send
+/// more requests than there are frames.
 const MOST_ORDERS: u32 = 1000;
-/// Time between two tellings of the engine's figures.
+/// Time between two messages with the engine's figures.
 const FIGURES_PERIOD: Duration = Duration::from_millis(500);
 
-/// How a session begins.
+/// Parameters of a session.
 #[derive(Debug, Clone)]
 pub struct SessionParams {
     /// The scene.
@@ -33,14 +34,13 @@ pub struct SessionParams {
     pub gallery_key: Option<String>,
     /// The folder for recordings.
     pub out: PathBuf,
-    /// Seed of the first round of "find the lump", where the page gives none. Later rounds count
-    /// on.
+    /// Seed of the first round of "find the lump", if the page gives none. Later rounds count up.
     pub seed: Option<u64>,
-    /// Whether pages may ask for faults.
+    /// Whether pages may cause faults on purpose.
     pub allows_faults: bool,
 }
 
-/// A session that does not run yet.
+/// A session that has not started.
 #[derive(Debug)]
 pub struct Session {
     params: SessionParams,
@@ -49,7 +49,8 @@ pub struct Session {
     problem: Arc<Mutex<Option<String>>>,
 }
 
-/// A running session. Dropped, it stops: the engine ramps down and a recording is closed.
+/// A running session. When dropped, it stops: the engine ramps the force down and a recording is
+/// closed.
 #[derive(Debug)]
 pub struct Handle {
     orders: Sender<Order>,
@@ -67,7 +68,7 @@ impl Drop for Handle {
 }
 
 impl Session {
-    /// A session, and the server's end of it.
+    /// Creates a session, and the server's end of it.
     pub fn new(params: SessionParams) -> (Self, Arc<Remote>) {
         let (orders, inbox) = channel();
         let problem = Arc::<Mutex<Option<String>>>::default();
@@ -94,8 +95,8 @@ impl Session {
         let thread = thread::Builder::new()
             .name("palpa-session".to_owned())
             .spawn(move || {
-                // It moves the hand: as high a priority as the tissue's, where the system grants
-                // it.
+                // This thread moves the hand. It gets the same priority as the tissue's thread, if
+                // the system grants it.
                 BEFORE_THE_BROWSER.ask("palpa-session");
                 let desk = Desk::new(self.params, self.orders, self.problem, publisher, fields);
                 run(desk, &self.inbox);
@@ -107,7 +108,7 @@ impl Session {
     }
 }
 
-/// The thread: takes orders as they come, and makes a frame when one is due.
+/// The session's thread: takes orders as they arrive, and makes a frame when one is due.
 fn run(mut desk: Desk, inbox: &Receiver<Order>) {
     desk.build();
     let mut due = Instant::now();

@@ -28,7 +28,7 @@ pub(crate) struct Live {
     pub(crate) hand: Hand,
     /// The latest tick.
     pub(crate) entry: TickEntry,
-    /// The tissue's latest step.
+    /// The tissue's last step.
     pub(crate) step: StepRecord,
     /// Number of the engine: no two of a session share it.
     pub(crate) engine: u64,
@@ -36,7 +36,7 @@ pub(crate) struct Live {
 }
 
 impl Live {
-    /// Takes the latest from engine and tissue.
+    /// Takes the latest data from engine and tissue.
     pub(crate) fn refresh(&mut self) {
         let snapshot = self.running.engine.snapshot();
         (self.entry, self.step) = (snapshot.tick, snapshot.step);
@@ -49,7 +49,7 @@ impl Live {
         self.running.looks.current()
     }
 
-    /// Moves the hand on by `dt` seconds.
+    /// Moves the hand by `dt` seconds.
     pub(crate) fn move_hand(&mut self, dt: f64, now: Instant) {
         let frame = self.world.scene_from_device;
         let ground = Ground {
@@ -71,7 +71,7 @@ impl Live {
         self.hand.place_under(tip, skin, *home)
     }
 
-    /// The body as the tissue left it last; at rest before its first step.
+    /// The body as the tissue left it last; at rest before the first step.
     pub(crate) fn body(&self) -> Option<Material> {
         Some(match &self.look().body {
             Some(Seen::Tissue(glance)) => {
@@ -95,7 +95,7 @@ impl Live {
         })
     }
 
-    /// The engine's figures since the last call, and notices of its errors since.
+    /// The engine's figures, and notices of its errors, since the last call.
     pub(crate) fn figures(
         &mut self,
         n_nodes: usize,
@@ -107,7 +107,7 @@ impl Live {
     }
 }
 
-/// What remains of a body when its engine has ended.
+/// The remains of a body whose engine has ended.
 struct Stopped {
     world: World,
     lead: Lead,
@@ -128,7 +128,7 @@ impl Stage {
         self.live.as_ref()
     }
 
-    /// The same, to be changed.
+    /// The body under the hand, mutable.
     pub(crate) fn live_mut(&mut self) -> Option<&mut Live> {
         self.live.as_mut()
     }
@@ -141,15 +141,15 @@ impl Stage {
         self.live.as_mut().context("there is no body yet")
     }
 
-    /// Puts another body under the hand, at rest. A body that was only changed is pressed where it
-    /// was before.
+    /// Puts another body under the hand, at rest. If it is only a changed version of the old one,
+    /// it is pressed at the same place.
     ///
     /// # Errors
-    /// When the engine cannot start on it. Then the body before is there again, if its engine
+    /// When the engine cannot start on it. The previous body is then restored, if its engine
     /// starts.
     pub(crate) fn replace(&mut self, world: World) -> anyhow::Result<()> {
-        // First the old one ends: two at once would share the processor, and the first steps are
-        // the costliest.
+        // End the old engine first: two at once would share the processor, and the first steps are
+        // the most costly.
         let (before, lead) = match self.stop() {
             Some(Stopped { world, lead, point }) => (Some((world, point)), lead),
             None => (None, Lead::Nobody),
@@ -176,12 +176,12 @@ impl Stage {
         Err(failed.unwrap_or_else(|| anyhow::anyhow!("there is no place to begin")))
     }
 
-    /// Starts the engine anew on the same body, at rest, with the hand at home. With a recorder,
-    /// the hand begins where a replay of the log does.
+    /// Restarts the engine on the same body, at rest, with the hand at home. With a recorder, the
+    /// hand begins where a replay of the log does.
     ///
     /// # Errors
-    /// When there is no body, or its engine cannot start. If only the recorded start fails, the
-    /// body is there again without a recorder.
+    /// When there is no body, or its engine cannot start. If only the start with a recorder fails,
+    /// the body is restored without one.
     pub(crate) fn restart(&mut self, recorder: &RecorderParams) -> anyhow::Result<()> {
         let stopped = self.stop().context("there is no body yet")?;
         let Stopped { world, lead, point } = stopped;
@@ -264,7 +264,7 @@ mod tests {
         let before = stage.need().unwrap().engine;
         let folder = tempfile::tempdir().unwrap();
         let recorder = RecorderParams {
-            // A folder is no place for a log.
+            // A folder cannot be opened as a log file.
             path: Some(folder.path().to_owned()),
             ..RecorderParams::default()
         };

@@ -1,4 +1,4 @@
-//! Decides what pages may see while lumps are hidden. No other place does.
+//! Decides what pages may see while lumps are hidden. No other module decides this.
 
 use anyhow::bail;
 use palpa::Note;
@@ -39,7 +39,7 @@ impl<'a> Veil<'a> {
     /// Refuses a field that shows where lumps are.
     pub(crate) fn check_field(self, field: Field) -> anyhow::Result<()> {
         if self.is_drawn() && field != Field::None {
-            bail!("while lumps are hidden, only displacement may be shown");
+            bail!("while lumps are hidden, only the displacement can be shown");
         }
         Ok(())
     }
@@ -48,7 +48,7 @@ impl<'a> Veil<'a> {
     pub(crate) fn check_recording(self) -> anyhow::Result<()> {
         if self.is_drawn() {
             bail!(
-                "a log holds the whole scene, hidden lumps as well: record after the truth is shown"
+                "a log contains the whole scene with its hidden lumps; reveal the lumps before you record"
             );
         }
         Ok(())

@@ -1,30 +1,33 @@
-//! Matrices of layered bodies: 3 × 3 blocks between the nodes of one column, or of two that are neighbours.
+//! Matrices of layered bodies. They consist of 3 × 3 blocks, between two nodes of the same column
+//! or of two neighbouring columns.
 //!
 //! ```text
 //! own blocks of a column     (l, l) at first + 2 l,  (l + 1, l) at first + 2 l + 1
 //! between columns a > b      row (a, k), column (b, l) at first + 3 l + (k − l + 1),  |k − l| ≤ 1
 //! ```
-//! Places of blocks that do not exist (k = −1 or n) are kept, so that an index is a formula. They hold nothing.
+//! Index ranges also include blocks that do not exist (k = −1 or k = n), so that a formula gives
+//! every index. Those blocks are not used.
 
-/// A 3 × 3 block, column by column.
+/// A 3 × 3 block, column-major.
 pub type Block<T> = [T; 9];
 
-/// Which columns are neighbours, and where their blocks stand.
+/// Which columns are neighbours, and the indices of their blocks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnPattern {
     n_columns: usize,
     n_levels: usize,
-    /// Columns a > b of each pair, sorted by b, then a.
+    /// Pairs of neighbouring columns `[a, b]` with a > b, sorted by b, then a.
     pairs: Vec<[u32; 2]>,
-    /// First pair of each b, and one past the last.
+    /// First pair of each b, and one past the last. `[n_columns + 1]`
     first_pair: Vec<u32>,
-    /// All neighbours of every column.
+    /// Neighbours of every column, one column after the other, ascending.
     neighbours: Vec<u32>,
     first_neighbour: Vec<u32>,
 }
 
 impl ColumnPattern {
-    /// The pattern of `n_columns` columns of `n_levels` nodes. Edges may come in any order and more than once.
+    /// The pattern of `n_columns` columns of `n_levels` nodes each. The edges join neighbouring
+    /// columns; they may come in any order and more than once.
     pub fn new(
         n_columns: usize,
         n_levels: usize,
@@ -54,12 +57,12 @@ impl ColumnPattern {
         self.n_columns
     }
 
-    /// Nodes of a column.
+    /// Number of nodes in a column.
     pub fn n_levels(&self) -> usize {
         self.n_levels
     }
 
-    /// Unknowns of a column.
+    /// Number of unknowns in a column.
     pub fn width(&self) -> usize {
         3 * self.n_levels
     }
@@ -69,17 +72,17 @@ impl ColumnPattern {
         self.width() * self.n_columns
     }
 
-    /// Number of blocks, with the places of those that do not exist.
+    /// Number of blocks, including the unused ones.
     pub fn n_blocks(&self) -> usize {
         self.n_levels * (2 * self.n_columns + 3 * self.pairs.len())
     }
 
-    /// Number of pairs of neighbours.
+    /// Number of pairs of neighbouring columns.
     pub fn n_pairs(&self) -> usize {
         self.pairs.len()
     }
 
-    /// Columns a > b of a pair.
+    /// The two columns a > b of a pair.
     pub fn pair(&self, pair: usize) -> [u32; 2] {
         self.pairs[pair]
     }
@@ -91,17 +94,17 @@ impl ColumnPattern {
         &self.neighbours[range]
     }
 
-    /// The first of a column's own blocks.
+    /// Index of the first block within a column.
     pub fn own(&self, column: usize) -> usize {
         2 * self.n_levels * column
     }
 
-    /// The first block of a pair.
+    /// Index of the first block of a pair.
     pub fn between(&self, pair: usize) -> usize {
         self.n_levels * (2 * self.n_columns + 3 * pair)
     }
 
-    /// The pair of two neighbours a > b.
+    /// Index of the pair of the columns a > b; `None` if they are not neighbours.
     pub fn find(&self, a: usize, b: usize) -> Option<usize> {
         let first = self.first_pair[b] as usize;
         let range = first..self.first_pair[b + 1] as usize;
@@ -112,7 +115,8 @@ impl ColumnPattern {
     }
 }
 
-/// First index of every key of a sorted sequence of keys below `n`, and one past the last.
+/// Index of the first element of every key in a sorted sequence of keys below `n`, and one past the
+/// last.
 fn starts(n: usize, keys: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut starts = vec![0; n + 1];
     for key in keys {

@@ -1,4 +1,4 @@
-//! Cholesky factors, dense or by supernodes, in memory that is allocated once.
+//! Cholesky factors, dense or supernodal, in memory that is allocated once.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt;
@@ -9,22 +9,23 @@ use faer::{Conj, MatMut, MatRef, Par};
 
 use crate::{NodePattern, Singular, TooLarge};
 
-/// How readily supernodes are merged: up to this many columns while the share of zeros stays below. Columns of a body are
-/// small dense blocks already, and merging more of them than is usual saves 5–10 % of a step at 300–1,000 nodes.
+/// Limits for merging supernodes: (number of columns, largest share of zeros). The columns of a
+/// body are small dense blocks already. Merging more of them than is usual saves 5–10 % of a step
+/// at 300–1,000 nodes.
 const RELAXATION: [(usize, f64); 4] = [(8, 1.0), (32, 0.8), (64, 0.3), (usize::MAX, 0.1)];
 
-/// Largest factor, in entries: 8 GiB. More than that is a mesh that is finer than it was meant to be.
+/// Largest factor, in entries: 8 GiB. A larger factor means that the mesh is finer than intended.
 const MOST_ENTRIES: usize = 1 << 30;
 
-/// Where the entries of the lower triangle stand.
+/// Positions of the entries of the lower triangle.
 #[derive(Debug)]
 pub struct Pattern(Kind);
 
 #[derive(Debug)]
 enum Kind {
-    /// All of them, by columns of length `n`.
+    /// All entries, in columns of length `n`.
     Dense { n: usize },
-    /// Only what bars touch, by columns.
+    /// Only the entries that bars touch, by columns.
     Sparse {
         lower: SymbolicSparseColMat<usize>,
         symbolic: Box<supernodal::SymbolicSupernodalCholesky<usize>>,
@@ -37,7 +38,8 @@ impl Pattern {
         Self(Kind::Dense { n })
     }
 
-    /// The pattern of nodes in their order of elimination; `unknowns` says a node's first unknown and how many it has.
+    /// The pattern of nodes in their order of elimination. `unknowns` returns a node's first
+    /// unknown and the number of its unknowns.
     ///
     /// # Errors
     /// When the factor would take more than 8 GiB.
@@ -67,7 +69,7 @@ impl Pattern {
         }))
     }
 
-    /// Number of entries of the lower triangle that are kept (of the whole matrix, if it is dense).
+    /// Number of stored entries of the lower triangle (of the whole matrix, if it is dense).
     pub fn n_entries(&self) -> usize {
         match &self.0 {
             Kind::Dense { n } => n * n,
@@ -75,7 +77,8 @@ impl Pattern {
         }
     }
 
-    /// Number of entries of the factor's lower triangle that are kept (of the whole matrix, if it is dense).
+    /// Number of stored entries of the factor's lower triangle (of the whole matrix, if it is
+    /// dense).
     pub fn n_factor_entries(&self) -> usize {
         match &self.0 {
             Kind::Dense { n } => n * n,
@@ -107,13 +110,13 @@ impl Pattern {
     }
 }
 
-/// The symbolic factor of a lower pattern that is already in its order of elimination.
+/// The symbolic factor of a lower triangle whose columns are already in the order of elimination.
 fn analyse(
     col_ptr: &[usize],
     row_idx: &[usize],
     n: usize,
 ) -> Option<supernodal::SymbolicSupernodalCholesky<usize>> {
-    // The analysis reads the upper triangle: the transpose.
+    // The analysis reads the upper triangle, which is the transpose.
     let mut upper_ptr = vec![0; n + 1];
     for &row in row_idx {
         upper_ptr[row + 1] += 1;
@@ -155,7 +158,7 @@ fn analyse(
     .ok()
 }
 
-/// The numbers of a factor. A dense one overwrites the matrix.
+/// The numbers of a factor. A dense factor overwrites the matrix.
 pub struct Factor {
     lower: Vec<f64>,
     memory: MemBuffer,
@@ -170,7 +173,7 @@ impl std::fmt::Debug for Factor {
 }
 
 impl Factor {
-    /// Memory for the factors of a pattern, before there is one.
+    /// Allocates memory for the factors of a pattern; it holds no factor yet.
     pub fn new(pattern: &Pattern) -> Self {
         let (n_entries, scratch) = match &pattern.0 {
             Kind::Dense { n } => (
@@ -202,10 +205,12 @@ impl Factor {
         }
     }
 
-    /// Factors the matrix in `values`; pivots are judged by `scale`, the matrix's diagonal.
+    /// Factors the matrix in `values`. `scale` is the diagonal of the matrix; pivots are compared
+    /// with it.
     ///
     /// # Errors
-    /// When a pivot is not positive, or is smaller than `least_pivot` of the diagonal entry that it came from.
+    /// When a pivot is not positive, or is smaller than `least_pivot` times the diagonal entry that
+    /// it came from.
     pub fn refactor(
         &mut self,
         pattern: &Pattern,
@@ -251,7 +256,7 @@ impl Factor {
         }
     }
 
-    /// Solves in place; `values` holds the factor if it is dense.
+    /// Solves in place. If the factor is dense, it is in `values`.
     pub fn solve(&mut self, pattern: &Pattern, values: &[f64], right_side: &mut [f64]) {
         let n = right_side.len();
         let stack = MemStack::new(&mut self.memory);

@@ -1,4 +1,4 @@
-//! Fill-reducing order of elimination.
+//! An order of elimination that reduces the fill.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
@@ -6,7 +6,8 @@ use faer::sparse::linalg::amd;
 
 use crate::TooLarge;
 
-/// The vertices of a graph in an order of approximate minimum degree. Edges may come in any order and more than once.
+/// The vertices of a graph, ordered by approximate minimum degree. Edges may come in any order and
+/// more than once.
 ///
 /// # Errors
 /// When the graph is too large to be ordered.

@@ -1,19 +1,21 @@
-//! Which nodes may move, and along what.
+//! Constraints: which nodes may move, and in which directions.
 
 use nalgebra::Matrix3;
 use palpa_mesh::{LayeredBody, Vec3};
 
 use crate::error::SpringError;
 
-/// How nodes are held. A node that is named nowhere is free.
+/// How nodes are held. A node that is in none of the lists is free.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Constraints {
-    /// Nodes that do not move: the rigid base and what else is fixed.
+    /// Nodes that do not move: the rigid base and other fixed nodes.
     pub fixed: Vec<usize>,
-    /// Nodes that the device holds; they are moved as one by the displacement of a step. The thesis has one.
+    /// Nodes that the device holds. All of them move by the displacement of a step. The thesis has
+    /// one such node.
     pub operated: Vec<usize>,
-    /// Nodes that stay in a plane through them, with the plane's normal. A node may be named up to three times, for
-    /// a corner of planes. Being fixed or operated comes before this.
+    /// Nodes that stay in a plane, each with the normal of its plane. A node may be listed up to
+    /// three times, for a corner of planes. If the node is also fixed or operated, the plane is
+    /// ignored.
     pub symmetric: Vec<(usize, Vec3)>,
 }
 
@@ -28,7 +30,7 @@ impl Constraints {
     }
 }
 
-/// What becomes of a node.
+/// How a node may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
     Free,
@@ -45,7 +47,7 @@ pub(crate) struct Freedom {
 }
 
 impl Freedom {
-    /// `v` seen from the frame; its first `n_free` entries are the free ones.
+    /// `v` in the axes of the frame; the first `n_free` entries are in the free directions.
     #[inline]
     pub(crate) fn local(&self, v: &Vec3) -> Vec3 {
         if self.n_free == 3 {
@@ -55,7 +57,7 @@ impl Freedom {
         }
     }
 
-    /// The part of `v` that the node is free to follow.
+    /// The part of `v` that lies in the node's free directions.
     #[inline]
     pub(crate) fn project(&self, v: &Vec3) -> Vec3 {
         match self.n_free {
@@ -69,7 +71,7 @@ impl Freedom {
     }
 }
 
-/// Resolves the constraints into the freedom of every node.
+/// Combines the constraints into the free directions of every node.
 pub(crate) fn freedoms(
     n_nodes: usize,
     constraints: &Constraints,
@@ -122,15 +124,15 @@ pub(crate) fn freedoms(
     Ok(freedoms)
 }
 
-/// Takes one direction away from a node's freedom.
+/// Removes one direction from a node's freedom.
 fn without_direction(freedom: &Freedom, normal: Vec3) -> Freedom {
-    // Two planes closer than this in direction are one plane.
+    // Planes whose directions differ by less than this count as one plane.
     const SAME_PLANE: f64 = 1e-6;
     let taken = freedom.project(&normal);
     let Some(taken) = taken.try_normalize(SAME_PLANE) else {
         return *freedom;
     };
-    // Gram–Schmidt: what is left of the old free directions first, then all that is taken.
+    // Gram–Schmidt: first the remaining free directions, then the ones taken away.
     let n_free = freedom.n_free - 1;
     let mut columns: Vec<Vec3> = Vec::with_capacity(3);
     let old = (0..3).map(|i| freedom.frame.column(i).into_owned());
@@ -139,7 +141,7 @@ fn without_direction(freedom: &Freedom, normal: Vec3) -> Freedom {
         d - taken * taken.dot(&d)
     });
     let mut candidates: Vec<Vec3> = left.collect();
-    // The most independent first, so that the basis is well conditioned.
+    // The longest vector first, so that the basis is well conditioned.
     candidates.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
     for d in candidates {
         if columns.len() == n_free {

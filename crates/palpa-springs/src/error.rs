@@ -1,25 +1,25 @@
-//! What can be wrong with the input.
+//! Errors in the input.
 
 /// Why a spring model cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpringError {
-    /// The body names another number of layers than stiffnesses are given.
+    /// The number of stiffnesses differs from the number of layers.
     #[error(
         "the body has {found} layers, but {given} stiffnesses are given; give one for each layer, from the skin down"
     )]
     LayerCount {
-        /// Layers of the body.
+        /// Number of layers of the body.
         found: usize,
-        /// Stiffnesses given.
+        /// Number of stiffnesses given.
         given: usize,
     },
     /// A stiffness or modulus that is not a positive number.
     #[error("layer {layer}: a stiffness of {value} is not a positive number")]
     Stiffness {
-        /// Layer, from the skin down.
+        /// Layer, counted from the skin down.
         layer: usize,
-        /// N/m or Pa.
+        /// The value given, in N/m or Pa.
         value: f64,
     },
     /// A bar between two nodes that coincide or are not finite.
@@ -27,11 +27,11 @@ pub enum SpringError {
         "the bar between nodes {a} and {b} is {length} m long; the two must be apart: repair the mesh or thicken the layer"
     )]
     BarLength {
-        /// One end.
+        /// Node at one end.
         a: usize,
-        /// The other end.
+        /// Node at the other end.
         b: usize,
-        /// m
+        /// Length of the bar. m
         length: f64,
     },
     /// A bar whose stiffness is not a number ≥ 0.
@@ -39,29 +39,29 @@ pub enum SpringError {
         "the bar between nodes {a} and {b} has the stiffness {stiffness} N/m; it must be a number that is not negative"
     )]
     BarStiffness {
-        /// One end.
+        /// Node at one end.
         a: usize,
-        /// The other end.
+        /// Node at the other end.
         b: usize,
-        /// N/m
+        /// Stiffness of the bar. N/m
         stiffness: f64,
     },
-    /// A node number beyond the last.
+    /// A node number that is too large.
     #[error("{what} names node {node}, but the last node is {last}")]
     NodeRange {
-        /// What names the node.
+        /// The item that contains the node number.
         what: &'static str,
         /// The node.
         node: usize,
-        /// The last node that there is.
+        /// The last existing node.
         last: usize,
     },
-    /// No node for the device to hold.
+    /// The device holds no node.
     #[error("no node is operated; name at least one node that the device holds")]
     NothingOperated,
-    /// A node that is held by the device and fixed in space.
+    /// A node that is both held by the device and fixed in space.
     #[error(
-        "node {node} is operated and fixed at once; a node on the rigid base cannot be held by the device"
+        "node {node} is both operated and fixed; a node on the rigid base cannot be held by the device"
     )]
     OperatedAndFixed {
         /// The node.
@@ -75,23 +75,23 @@ pub enum SpringError {
         /// The node.
         node: usize,
     },
-    /// A dense solver on a system that only a sparse one bears.
+    /// Too many nodes for a dense solver.
     #[error(
         "{n_nodes} nodes are too many for a dense solver, whose step grows with their cube; up to {limit} are taken: \
          use the sparse solver, or a coarser mesh"
     )]
     TooLargeForDense {
-        /// Nodes.
+        /// Number of nodes.
         n_nodes: usize,
-        /// Most nodes.
+        /// Largest number of nodes for a dense solver.
         limit: usize,
     },
-    /// Too much memory for the factor.
+    /// The factor would need too much memory.
     #[error(
         "the factor of {n_dofs} unknowns would take more than 8 GiB; make the mesh coarser or cut out a part"
     )]
     TooLarge {
-        /// Unknowns.
+        /// Number of unknowns.
         n_dofs: usize,
     },
 }

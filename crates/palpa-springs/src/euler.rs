@@ -1,12 +1,13 @@
-//! Explicit Euler alone: the method that the thesis compares itself with.
+//! Explicit Euler alone: the method with which the thesis compares its own.
 //!
-//! Every step moves each free node by (3.21), its sign so that it restores,
+//! Every step moves each free node by (3.21), with the sign that makes it restoring,
 //! ```text
 //!     U_a = ½ h Σ_i k_i (l_i − L_i) (P_i − P_a)
 //! ```
-//! with one step size `h` for all nodes. To the letter the vector `P_i − P_a` is not of unit length, so the pull grows with
-//! the square of the stretch and its tangent is up to `k (2l − L)`: whatever `h` is stable at rest, a large enough
-//! stretch is beyond it, and the nodes fly apart. A node only feels its neighbours, so a force crosses one level a step.
+//! with one step size `h` for all nodes. Taken literally, the vector `P_i − P_a` is not a unit
+//! vector. So the pull grows with the square of the stretch, and its tangent is up to `k (2l − L)`.
+//! A step size `h` that is stable at rest therefore becomes unstable at a large enough stretch, and
+//! the nodes fly apart. A node feels only its neighbours, so a force crosses one level per step.
 
 use palpa_mesh::Vec3;
 
@@ -19,14 +20,15 @@ use crate::step::{Method, Outcome, StepParams, bar_force, move_operated, nodal_f
 /// The step size of explicit Euler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EulerParams {
-    /// `h` above, in 1/N: the same for all nodes.
+    /// `h` above, in 1/N; all nodes use it.
     pub step_size: f64,
 }
 
 impl EulerParams {
     /// A fraction of the largest step size that is stable at rest, that is, under small loads.
     ///
-    /// The smaller it is, the greater the load that it bears, and the more steps a force needs to cross the body.
+    /// A smaller step size stays stable under a larger load, but a force then needs more steps to
+    /// cross the body.
     pub fn of_stable(model: &SpringModel, fraction: f64) -> Self {
         Self {
             step_size: fraction * 4.0 / largest_tangent(model),
@@ -34,8 +36,9 @@ impl EulerParams {
     }
 }
 
-/// The largest eigenvalue of the tangent of `Σ_i k_i (l_i − L_i) (P_i − P_a)` at rest, which is the stiffness of bars
-/// `k L`, over the free nodes. By power iteration, to about 1 %: the eigenvalues next to it are that near. N
+/// The largest eigenvalue, in N, of the tangent of `Σ_i k_i (l_i − L_i) (P_i − P_a)` at rest, over
+/// the free nodes. That tangent is the stiffness matrix of bars with the stiffness `k L`. Computed
+/// by power iteration to about 1 %, because the next eigenvalues are that close.
 fn largest_tangent(model: &SpringModel) -> f64 {
     const ITERATIONS: usize = 200;
     let rest = &model.rest;
@@ -49,7 +52,8 @@ fn largest_tangent(model: &SpringModel) -> f64 {
             ..*bar
         })
         .collect();
-    // Any start that is not orthogonal to the mode does; a fixed one gives the same result in every run.
+    // Any start that is not orthogonal to the mode will do. A fixed one gives the same result in
+    // every run.
     let mut x: Vec<Vec3> = (0..model.n_nodes())
         .map(|i| {
             let phase = i as f64;
@@ -80,7 +84,8 @@ fn largest_tangent(model: &SpringModel) -> f64 {
     largest
 }
 
-/// One step of explicit Euler: the operated nodes move, then every free node once, all from the same positions.
+/// One step of explicit Euler: the operated nodes move, then every free node once, all computed
+/// from the same positions.
 pub(crate) fn euler_step(
     model: &SpringModel,
     state: &mut SpringState,
@@ -109,7 +114,8 @@ pub(crate) fn euler_step(
     state.mode = Mode::Euler;
 }
 
-/// Sets the forces of the state to those of the bars as they are stretched now: Euler keeps no path.
+/// Sets the forces of the state to those of the bars at their present lengths. Euler does not sum
+/// forces along a path.
 fn update_forces(model: &SpringModel, state: &mut SpringState) {
     state.node_forces.fill(Vec3::zeros());
     for bar in &model.bars {
@@ -122,21 +128,21 @@ fn update_forces(model: &SpringModel, state: &mut SpringState) {
     state.force = bar_force(model, &state.positions);
 }
 
-/// How many steps it takes until the reaction at the fixed nodes comes to a fraction of what it settles at.
+/// Number of steps until the reaction at the fixed nodes reaches a fraction of its final value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Steps until the fixed nodes feel anything at all.
+    /// Steps until the fixed nodes feel a reaction (more than 1e-12 of the final one).
     pub first_steps: usize,
-    /// Steps until their reaction has come to the fraction asked for, for good.
+    /// Steps until their reaction has reached the requested fraction and stays there.
     pub settled_steps: usize,
-    /// The reaction that it settles at. N
+    /// The final reaction. N
     pub reaction: f64,
 }
 
-/// Applies `displacement` in the first step and waits: when does the base feel it?
+/// Applies `displacement` in the first step, then counts steps until the base feels it.
 ///
-/// `None` if the method diverges, or the reaction still changes by more than a thousandth between half of `max_steps`
-/// and all of them.
+/// `None` if the method diverges, if the base feels no force, or if the reaction at half of
+/// `max_steps` differs from the final one by more than a thousandth.
 pub fn steps_to_cross(
     model: &SpringModel,
     displacement: Vec3,
@@ -171,7 +177,7 @@ pub fn steps_to_cross(
 }
 
 impl StepParams {
-    /// Explicit Euler alone, its step size a fraction of what is stable at rest.
+    /// Explicit Euler alone. The step size is a fraction of the largest one that is stable at rest.
     pub fn euler(model: &SpringModel, fraction_of_stable: f64) -> Self {
         Self {
             method: Method::Euler(EulerParams::of_stable(model, fraction_of_stable)),

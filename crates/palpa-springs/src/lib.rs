@@ -1,9 +1,10 @@
-//! The reference method: a layered body as a network of bars, moved by incremental finite elements and, where these
-//! fail, by explicit Euler.
+//! The reference method: a layered body as a network of bars. Incremental finite elements move it;
+//! where they fail, explicit Euler takes over.
 //!
-//! A [`Network`] of pin-jointed bars is grown from a layered body; [`Constraints`] say which nodes are fixed, which the
-//! device holds (the *operated* nodes), and which move in a plane only. Both make a [`SpringModel`], which never changes.
-//! [`step()`] moves a [`SpringState`] by one displacement of the operated nodes, with a [`Workspace`] as scratch memory.
+//! A [`Network`] of pin-jointed bars is built from a layered body. [`Constraints`] say which nodes
+//! are fixed, which the device holds (the *operated* nodes), and which move only in a plane. Both
+//! make a [`SpringModel`], which never changes. [`step()`] moves a [`SpringState`] by one
+//! displacement of the operated nodes; a [`Workspace`] is its scratch memory.
 //!
 //! ```
 //! use palpa_mesh::{Vec3, generate::patch};
@@ -19,7 +20,8 @@
 //! # Ok::<(), palpa_springs::SpringError>(())
 //! ```
 //!
-//! Displacements are in metres, stiffnesses in N/m, forces in newtons. The force is the one **on the tool by the body**.
+//! Displacements are in metres, stiffnesses in N/m, forces in newtons. The force is the one **on
+//! the tool by the body**.
 
 mod constraints;
 mod error;

@@ -1,4 +1,5 @@
-//! The model of a step: bars, freedoms, and the structure of the linear system. Built once, never changed.
+//! The model behind every step: bars, constraints, and the structure of the linear system. It is
+//! built once and never changes.
 
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -8,10 +9,11 @@ use crate::network::{Bar, Network};
 use crate::params::{Solver, SpringParams};
 use crate::system::Structure;
 
-/// Most nodes for a dense solver: two matrices of 3N × 3N take 144 MB, and a step of Gauss–Jordan some 20 s.
+/// Largest number of nodes for a dense solver. Two matrices of 3N × 3N then take 144 MB, and a step
+/// of Gauss–Jordan some 20 s.
 const MAX_DENSE_NODES: usize = 1000;
 
-/// A network of bars under constraints, ready to be stepped.
+/// A network of bars under constraints, ready for steps.
 #[derive(Debug)]
 pub struct SpringModel {
     pub(crate) rest: Vec<Vec3>,
@@ -19,14 +21,14 @@ pub struct SpringModel {
     pub(crate) freedoms: Vec<Freedom>,
     /// The nodes that the device holds, ascending.
     pub(crate) operated: Vec<usize>,
-    /// Bars with exactly one operated end: bar, and whether that end is `a`.
+    /// Bars with exactly one operated end: index of the bar, and whether that end is `a`.
     pub(crate) operated_bars: Vec<(usize, bool)>,
     /// Sum of the stiffnesses of the bars at each node. N/m
     pub(crate) stiffness_at: Vec<f64>,
     /// Number of bars at each node.
     pub(crate) n_bars_at: Vec<u32>,
     pub(crate) structure: Structure,
-    /// Diagonal of the bounding box at rest, the scale by which a runaway is known. m
+    /// Diagonal of the bounding box at rest. The check for nodes that run away compares with it. m
     pub(crate) size: f64,
 }
 
@@ -34,7 +36,7 @@ impl SpringModel {
     /// Builds the model of a layered body.
     ///
     /// # Errors
-    /// If stiffnesses, constraints or the body's shape make no model; see [`SpringError`].
+    /// If the stiffnesses, the constraints or the body's shape are invalid; see [`SpringError`].
     pub fn build(
         body: &LayeredBody,
         params: &SpringParams,
@@ -50,7 +52,7 @@ impl SpringModel {
     /// Builds the model of any network of bars.
     ///
     /// # Errors
-    /// If a bar or a constraint makes no sense, or the system is too large.
+    /// If a bar or a constraint is invalid, or the system is too large.
     pub fn from_network(
         network: Network,
         constraints: &Constraints,
@@ -107,7 +109,7 @@ impl SpringModel {
         self.rest.len()
     }
 
-    /// Number of unknowns of a step, the free directions of all nodes.
+    /// Number of unknowns of a step: the free directions of all nodes.
     pub fn n_dofs(&self) -> usize {
         self.structure.n_dofs()
     }
@@ -117,7 +119,7 @@ impl SpringModel {
         &self.bars
     }
 
-    /// Nodes at rest, in metres. `[n_nodes]`
+    /// Node positions at rest, in metres. `[n_nodes]`
     pub fn rest_positions(&self) -> &[Vec3] {
         &self.rest
     }
@@ -127,7 +129,8 @@ impl SpringModel {
         &self.operated
     }
 
-    /// Numbers in the factor of the stiffness matrix, or in its inverse: what one solution multiplies.
+    /// Number of entries in the factor of the stiffness matrix, or in its inverse. One solution
+    /// multiplies by each of them.
     pub fn n_factor_entries(&self) -> usize {
         self.structure.n_factor_entries()
     }

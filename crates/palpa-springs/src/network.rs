@@ -35,26 +35,27 @@ pub struct Bar {
     pub length: f64,
 }
 
-/// Nodes at rest and the bars between them.
+/// Nodes at rest, and the bars between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
-    /// Nodes at rest, in metres. `[n_nodes]`
+    /// Node positions at rest, in metres. `[n_nodes]`
     pub positions: Vec<Vec3>,
-    /// Bars, each pair of nodes at most once.
+    /// Bars; at most one for each pair of nodes.
     pub bars: Vec<Bar>,
-    /// The column of each node: nodes of one column are numbered together in the solver. `[n_nodes]`
+    /// The column of each node. The solver numbers the nodes of a column together. `[n_nodes]`
     pub column: Vec<u32>,
 }
 
 impl Network {
-    /// The bars of a layered body: in every level along every skin edge, the verticals of every column, and both
-    /// diagonals below every skin edge between two levels.
+    /// Builds the bars of a layered body: in-level bars along every skin edge on every level,
+    /// verticals in every column, and both diagonals below every skin edge between two levels.
     ///
     /// # Errors
-    /// If stiffnesses do not fit the layers or are not positive, or two joined nodes coincide.
+    /// If the stiffnesses do not fit the layers or are not positive, or if two nodes joined by a
+    /// bar coincide.
     ///
     /// # Panics
-    /// If an interval of the body is of a layer without a name.
+    /// If an interval of the body belongs to a layer without a name.
     pub fn from_body(body: &LayeredBody, params: &SpringParams) -> Result<Self, SpringError> {
         let n_layers = body.layer_names.len();
         if params.layers.len() != n_layers {
@@ -99,11 +100,11 @@ impl Network {
         self.positions.len()
     }
 
-    /// The global stiffness `M1` of the network, its bars in the directions that `positions` give them.
+    /// The global stiffness `M1` of the network, with the bar directions at `positions`.
     /// `[3 n_nodes × 3 n_nodes]`, node-major, N/m
     ///
     /// # Panics
-    /// If `positions` are not one for each node.
+    /// If `positions` does not hold one position for each node.
     pub fn stiffness_matrix(&self, positions: &[Vec3]) -> DMatrix<f64> {
         assert_eq!(
             positions.len(),
@@ -124,7 +125,7 @@ impl Network {
         m1
     }
 
-    /// Finds bars that are no bars.
+    /// Returns an error for the first invalid bar.
     pub(crate) fn check(&self) -> Result<(), SpringError> {
         let last = self.n_nodes().saturating_sub(1);
         for bar in &self.bars {
@@ -149,7 +150,8 @@ impl Network {
     }
 }
 
-/// The unit vector along `d`, or zero where a bar has collapsed to a point: then it has no direction and no force.
+/// The unit vector along `d`, or zero if the bar has collapsed to a point: then it has no direction
+/// and no force.
 #[inline]
 pub(crate) fn direction(d: Vec3) -> Vec3 {
     let length_sq = d.norm_squared();
@@ -160,8 +162,8 @@ pub(crate) fn direction(d: Vec3) -> Vec3 {
     }
 }
 
-/// Where each bar of a body stands in the list: in-level bars by edge and level, then verticals by vertex and
-/// interval, then pairs of diagonals by edge and interval.
+/// The index of each bar of a body in the list: in-level bars by edge and level, then verticals by
+/// vertex and interval, then pairs of diagonals by edge and interval.
 struct BarNumbering {
     edges: Vec<[u32; 2]>,
     n_levels: usize,
@@ -193,12 +195,13 @@ impl BarNumbering {
         self.first_vertical + vertex * self.n_intervals() + interval
     }
 
-    /// The diagonal from `edges[edge][upper]` above to the other end below.
+    /// Index of the diagonal from the upper node at `edges[edge][upper]` to the lower node at the
+    /// other end of the edge.
     fn diagonal(&self, edge: usize, interval: usize, upper: usize) -> usize {
         self.first_diagonal + 2 * (edge * self.n_intervals() + interval) + upper
     }
 
-    /// All bars with their ends and natural lengths, without stiffness yet.
+    /// All bars with their ends and natural lengths; stiffnesses are still 0.
     fn joined(&self, body: &LayeredBody) -> Vec<Bar> {
         let mut ends =
             Vec::with_capacity(self.first_diagonal + 2 * self.edges.len() * self.n_intervals());
@@ -231,7 +234,8 @@ impl BarNumbering {
         for vertex in 0..n_vertices {
             bars[self.vertical(vertex, interval)].stiffness += stiffness;
         }
-        // The share of this interval's layer in the bars of its upper and of its lower level.
+        // The shares of this interval's layer in the in-level bars of its upper and its lower
+        // level.
         let (upper, lower) = match rule {
             InterfaceBars::Above => (0.0, 1.0),
             InterfaceBars::Below => (1.0, 0.0),

@@ -1,21 +1,26 @@
-//! The corrections by explicit Euler, (3.21) and (3.22), as they are meant: restoring, and scaled to be stable.
+//! The corrections by explicit Euler, (3.21) and (3.22), as the thesis means them: restoring, and
+//! scaled to be stable.
 //!
 //! ```text
 //!            1      1
 //!     U_a =  ─ · ─────── ( α Σ_i k_i (l_i − L_i) e_i  −  β k̄_a (P_a − S_a) )
 //!            2   Σ_i k_i
 //! ```
-//! over the bars `i` at node `a`: `l` and `L` their length now and at rest, `e` the unit direction away from `a`, `S_a` the
-//! node's place at rest, `k̄_a` the mean of the bars' stiffnesses (the initial shape holds a node as one more bar would).
-//! The ½ is the thesis's.
+//! The sum is over the bars `i` at node `a`. `l` and `L` are a bar's present and natural length,
+//! `e` the unit direction away from `a`, and `S_a` the rest position of the node. `k̄_a` is the
+//! mean stiffness of the bars at the node: the initial shape pulls a node as one more bar would.
+//! The ½ is from the thesis.
 //!
-//! **Stable**: with `D = diag(Σ_i k_i)`, a bar's tangent is at most `k I` (its axial part is `k ccᵀ`, its transverse part
-//! `k (1 − L/l) < k`), and `Σ k |u_a − u_b|² ≤ 2 Σ k (|u_a|² + |u_b|²) = 2 uᵀDu`, so no eigenvalue of `½ D⁻¹K` exceeds 1,
-//! and a step with `α = 1` cannot overshoot; the shape term adds at most `½ β`. Explicit Euler is unstable from 2 on.
+//! **Stable**: let `D = diag(Σ_i k_i)`. A bar's tangent is at most `k I` (its axial part is
+//! `k ccᵀ`, its transverse part `k (1 − L/l) < k`), and
+//! `Σ k |u_a − u_b|² ≤ 2 Σ k (|u_a|² + |u_b|²) = 2 uᵀDu`. So no eigenvalue of `½ D⁻¹K` exceeds 1,
+//! and a step with `α = 1` cannot overshoot. The shape term adds at most `½ β`. Explicit Euler is
+//! unstable from 2 on.
 //!
-//! **Force**: a correction moves free nodes, so bars at operated nodes change; `K` times the correction is added to the
-//! sums along the path, as for any other increment. Then nodal forces still add up to zero, the force keeps following the
-//! bars, and what the correction leaves unbalanced is seen at the free nodes.
+//! **Force**: a correction moves free nodes, so the forces of bars at operated nodes change. `K`
+//! times the correction is added to the sums along the path, as for any other increment. Nodal
+//! forces therefore still add up to zero, and the force keeps following the bars. An imbalance that
+//! the correction leaves shows at the free nodes.
 
 use palpa_mesh::Vec3;
 
@@ -24,7 +29,8 @@ use crate::model::SpringModel;
 use crate::state::{SpringState, Workspace};
 use crate::step::{Corrections, nodal_forces};
 
-/// Fills `ws.increments` with one correction of all free nodes, and `ws.forces` with its nodal forces.
+/// Fills `ws.increments` with one correction of all free nodes, and `ws.forces` with its nodal
+/// forces.
 pub(crate) fn relax(
     model: &SpringModel,
     state: &SpringState,
@@ -63,7 +69,7 @@ pub(crate) fn relax(
     );
 }
 
-/// A gain from 0 to 1; what is not a number is 0.
+/// Limits a gain to the range from 0 to 1; NaN becomes 0.
 fn held_to_range(gain: f64) -> f64 {
     if gain > 0.0 { gain.min(1.0) } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! What evolves, and the scratch memory of a step.
+//! The state of a spring model, and the scratch memory of a step.
 
 use palpa_mesh::Vec3;
 
@@ -6,7 +6,7 @@ use crate::constraints::Role;
 use crate::model::SpringModel;
 use crate::system::System;
 
-/// Which of its two ways the method took last.
+/// The method that was used last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
@@ -17,24 +17,25 @@ pub enum Mode {
     Euler,
 }
 
-/// The state of a spring model: where its nodes are, and the forces that built up on the way.
+/// The state of a spring model: the positions of its nodes, and the forces summed along the path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpringState {
-    /// Nodes now, in metres. `[n_nodes]`
+    /// Present node positions, in metres. `[n_nodes]`
     pub positions: Vec<Vec3>,
-    /// Force on each node from outside, summed along the path, in newtons: by the tool at operated nodes, by the
-    /// ground at fixed ones; at free nodes what has not been brought to equilibrium. `[n_nodes]`
+    /// External force on each node, summed along the path, in newtons: from the tool at operated
+    /// nodes, from the ground at fixed nodes. At free nodes it is the force not yet in equilibrium.
+    /// `[n_nodes]`
     pub node_forces: Vec<Vec3>,
     /// Force on the tool by the body, summed along the path. N
     pub force: Vec3,
     /// Displacement of the operated nodes since rest. m
     pub displacement: Vec3,
-    /// How the last sub-step was done.
+    /// The method of the last sub-step.
     pub mode: Mode,
 }
 
 impl SpringState {
-    /// The state at rest: no displacement, no force.
+    /// The rest state: no displacement, no force.
     pub fn new(model: &SpringModel) -> Self {
         Self {
             positions: model.rest.clone(),
@@ -48,7 +49,7 @@ impl SpringState {
     /// Displacement of every node since rest, in metres. `[n_nodes]`
     ///
     /// # Panics
-    /// If the state is not of this model.
+    /// If the state belongs to another model.
     pub fn displacements(&self, model: &SpringModel) -> Vec<Vec3> {
         assert_eq!(
             self.positions.len(),
@@ -59,10 +60,10 @@ impl SpringState {
         pairs.map(|(now, rest)| now - rest).collect()
     }
 
-    /// Force on the body by what holds its fixed nodes. N
+    /// Force of the supports on the body, summed over the fixed nodes. N
     ///
     /// # Panics
-    /// If the state is not of this model.
+    /// If the state belongs to another model.
     pub fn fixed_reaction(&self, model: &SpringModel) -> Vec3 {
         assert_eq!(
             self.positions.len(),
@@ -86,7 +87,8 @@ impl SpringState {
     }
 }
 
-/// Scratch memory of a step; meaningless between calls. One model, one thread.
+/// Scratch memory of a step; its contents have no meaning between calls. Use one per model and
+/// thread.
 #[derive(Debug)]
 pub struct Workspace {
     pub(crate) system: System,
@@ -94,12 +96,12 @@ pub struct Workspace {
     pub(crate) increments: Vec<Vec3>,
     /// Nodal forces of a sub-step. N
     pub(crate) forces: Vec<Vec3>,
-    /// The last good state.
+    /// A copy of the state before the step, to go back to.
     pub(crate) saved: SpringState,
 }
 
 impl Workspace {
-    /// Memory for steps of this model.
+    /// Allocates memory for steps of this model.
     pub fn new(model: &SpringModel) -> Self {
         let n_nodes = model.n_nodes();
         Self {

@@ -1,12 +1,13 @@
-//! One step of the method: the displacement of the tool in, the force that it feels out.
+//! One step of the method: it takes the displacement of the tool and returns the force on it.
 //!
-//! The displacement is split into `n` parts. In each, with the bars in their current directions,
+//! The displacement is split into `n` parts. Each part uses the current directions of the bars,
 //! ```text
 //!     U'_f = −K_ff⁻¹ K_fc u_c            the free nodes follow, into equilibrium     (3.19, 3.20)
 //!     ΔF   =  K_cc u_c + K_cf U'_f       the force of the increment                  (3.17, after the nodes moved)
 //! ```
-//! and the force that is felt is the sum of the increments along the path. Where `K_ff` is singular the part is done by
-//! explicit Euler (`relax`); every part tries the finite elements first, so that they take over again by themselves.
+//! and the force on the tool is the sum of the increments along the path. If `K_ff` is singular,
+//! explicit Euler (`relax`) does that part. Every part tries finite elements first, so that the
+//! method returns to them by itself.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::Singular;
@@ -18,23 +19,25 @@ use crate::network::Bar;
 use crate::relax::relax;
 use crate::state::{Mode, SpringState, Workspace};
 
-/// A free node that moves further than this many times the way of the tool in one part is on a mechanism, though
-/// rounding (or its bars being very nearly in a plane) let the matrix pass as regular.
+/// A free node that moves further than this, in multiples of the tool's displacement in one part,
+/// is on a mechanism. The matrix can pass as regular all the same, because of rounding or because
+/// the node's bars lie very nearly in a plane.
 const MECHANISM_TRAVEL: f64 = 1e3;
 
-/// A node further than this from where it was, in sizes of the body, has run away.
+/// A node has run away if it moved further than this in one step, in sizes of the body.
 const RUNAWAY: f64 = 1e2;
 
-/// How a step is done.
+/// Parameters of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepParams {
     /// Number of parts that the displacement is split into; 0 counts as 1.
     pub substeps: usize,
     /// Finite elements, or explicit Euler alone.
     pub method: Method,
-    /// The explicit Euler corrections that end a step.
+    /// Corrections by explicit Euler at the end of a step.
     pub corrections: Corrections,
-    /// The step's duration in **milliseconds** for the literal force of (3.18), or `None` for leaving it out.
+    /// The step's duration in **milliseconds**, for the literal force of (3.18). `None` leaves that
+    /// force out.
     pub literal_duration_ms: Option<f64>,
 }
 
@@ -49,21 +52,22 @@ impl Default for StepParams {
     }
 }
 
-/// How nodes are moved.
+/// How nodes move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// The combined method: finite elements, and Euler where these are singular.
+    /// The combined method: finite elements, and explicit Euler where the system is singular.
     FiniteElements,
-    /// Explicit Euler alone, which the thesis compares itself with.
+    /// Explicit Euler alone, with which the thesis compares its method.
     Euler(EulerParams),
 }
 
-/// Gains of the corrections (3.21) and (3.22), each from 0 (off) to 1; beyond that they are held to 1.
+/// Gains of the corrections (3.21) and (3.22), each from 0 (off) to 1; larger values count as 1.
 ///
-/// Both are scaled by the stiffness at the node, so that no gain in this range overshoots (`relax.rs` has the proof).
-/// The pull of springs towards their lengths mends the drift of the incremental method and leaves an equilibrium in
-/// place. The pull towards the initial shape does not: it makes a held body creep back under the tool, by an amount that
-/// depends on the number of steps. So it is off unless asked for.
+/// Both are scaled by the stiffness at the node, so that no gain in this range overshoots
+/// (`relax.rs` has the proof). The pull of springs towards their natural lengths corrects the drift
+/// of the incremental method and does not disturb an equilibrium. The pull towards the initial
+/// shape does disturb it: a held body creeps back under the tool, by an amount that depends on the
+/// number of steps. Therefore it is off by default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corrections {
     /// Gain of the springs' pull towards their natural lengths (3.21).
@@ -93,14 +97,14 @@ impl Default for Corrections {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// As the method was asked for.
+    /// With the requested method.
     Converged,
-    /// The system was singular in this many parts; they were done by explicit Euler.
+    /// The system was singular in some parts; explicit Euler did those.
     EulerFallback {
-        /// Parts done by explicit Euler.
+        /// Number of parts done by explicit Euler.
         n_substeps: usize,
     },
-    /// A node ran away or its position is no number. The state is the one before the step.
+    /// A node ran away or its position is not a number. The state is the one before the step.
     Diverged {
         /// The first such node.
         node: usize,
@@ -109,32 +113,34 @@ pub enum Outcome {
     NotFinite,
 }
 
-/// What a step did.
+/// The result of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
     /// How it ended.
     pub outcome: Outcome,
-    /// Force on the tool by the body, the sum along the path since rest. N
+    /// Force on the tool by the body, summed along the path since rest. N
     pub force: Vec3,
-    /// What this step added to it. N
+    /// Change of `force` in this step. N
     pub force_increment: Vec3,
-    /// Force on the tool by the bars as they are stretched now, in their present directions. It equals `force` for small
-    /// displacements; the difference is what the linear increments leave out. N
+    /// Force on the tool by the bars at their present lengths and directions. For small
+    /// displacements it equals `force`. The difference is the error of the linear increments. N
     pub bar_force: Vec3,
-    /// Largest force left on a free node by the last part that finite elements did, over the largest nodal force in it;
-    /// 0 if they did none.
+    /// Largest residual force on a free node after the last part that finite elements did, divided
+    /// by the largest nodal force in that part; 0 if they did no part.
     pub free_residual: f64,
-    /// Largest force on a free node that the path has not brought to equilibrium, over the largest nodal force, after the
-    /// corrections and whatever way the step went.
+    /// Largest force on a free node that is not in equilibrium, divided by the largest nodal force.
+    /// It is summed along the path, and taken after the corrections, for either method.
     pub imbalance: f64,
-    /// The force as (3.17), (3.18) give it to the letter: the reaction of this step's displacement *before* the free
-    /// nodes moved, over the duration in ms. For comparison; never send it to a device. N/ms
+    /// The force taken literally from (3.17) and (3.18): the reaction to this step's displacement
+    /// *before* the free nodes moved, divided by the duration in ms. For comparison only; never
+    /// send it to a device. N/ms
     pub literal_force: Option<Vec3>,
 }
 
-/// Moves the operated nodes by `displacement` (m) and lets the body follow.
+/// Moves the operated nodes by `displacement` (m); the body follows.
 ///
-/// Whatever happens, the state stays finite: a step that diverges leaves it as it was, and says so in the report.
+/// The state always stays finite: a step that diverges leaves the state unchanged, and the report
+/// says so.
 ///
 /// # Panics
 /// If `state` or `ws` belong to another model.
@@ -189,7 +195,7 @@ fn advance(
     free_residual: &mut f64,
     literal: &mut Vec3,
 ) -> Outcome {
-    // A tool at rest moves nothing by finite elements: only the corrections go on.
+    // If the tool is at rest, finite elements would move nothing. Only the corrections continue.
     let is_resting = displacement == Vec3::zeros() && params.method == Method::FiniteElements;
     let n = if is_resting {
         0
@@ -240,7 +246,8 @@ fn advance(
     }
 }
 
-/// Solves one part into `ws.increments` and `ws.forces`, and adds its literal force (3.17).
+/// Solves one part and writes the results to `ws.increments` and `ws.forces`. Adds the part's
+/// literal force (3.17) to `literal`.
 fn finite_elements(
     model: &SpringModel,
     state: &SpringState,
@@ -252,7 +259,8 @@ fn finite_elements(
     ws.system
         .refactor(&model.structure, &model.bars, &model.freedoms)?;
     move_operated(model, ws, part);
-    // M1 u_c: as all operated nodes move alike, only bars with one operated end are stretched.
+    // M1 u_c: all operated nodes have the same displacement, so only bars with one operated end are
+    // stretched.
     ws.forces.fill(Vec3::zeros());
     let mut f1 = Vec3::zeros();
     for &(i, a_is_operated) in &model.operated_bars {
@@ -270,7 +278,7 @@ fn finite_elements(
     );
 
     let limit = MECHANISM_TRAVEL * part.norm();
-    // Written so that NaN counts as too far.
+    // Written so that NaN exceeds the limit.
     let stays = |u: &Vec3| u.norm() <= limit;
     if !ws.increments.iter().all(stays) {
         return Err(Singular);
@@ -285,7 +293,7 @@ fn finite_elements(
     Ok(())
 }
 
-/// Moves the operated nodes only; their bars are stretched and nothing follows yet.
+/// Moves only the operated nodes. Their bars are stretched, and the free nodes do not follow yet.
 fn push_through(model: &SpringModel, state: &SpringState, ws: &mut Workspace, part: Vec3) {
     ws.system.update_directions(&model.bars, &state.positions);
     move_operated(model, ws, part);
@@ -304,7 +312,7 @@ pub(crate) fn move_operated(model: &SpringModel, ws: &mut Workspace, part: Vec3)
     }
 }
 
-/// `M1 U`, the nodal forces that belong to the increments.
+/// `M1 U`: the nodal forces of the increments.
 pub(crate) fn nodal_forces(
     bars: &[Bar],
     directions: &[Vec3],
@@ -334,7 +342,7 @@ pub(crate) fn commit(model: &SpringModel, state: &mut SpringState, ws: &Workspac
     }
 }
 
-/// Force on the tool by the bars at their lengths and directions now.
+/// Force on the tool by the bars at their present lengths and directions.
 pub(crate) fn bar_force(model: &SpringModel, positions: &[Vec3]) -> Vec3 {
     let mut force = Vec3::zeros();
     for &(i, a_is_operated) in &model.operated_bars {

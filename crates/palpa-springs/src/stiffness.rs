@@ -1,41 +1,46 @@
 //! The stiffness of the bars of a prism from Young's modulus.
 //!
-//! Bars in the directions `c_b` with volumes `V_b = w_b V` of the prism's volume `V` make the tensor (Cox 1952)
+//! Let bars have the directions `c_b` and the volumes `V_b = w_b V`, in a prism of volume `V`. They
+//! form the tensor (Cox 1952)
 //! ```text
 //!     C_ijkl = Σ_b W_b c_i c_j c_k c_l,      W_b = k_b L_b² / V      [Pa]
 //! ```
-//! which is symmetric in all indices: Poisson's ratio is ¼ (Cauchy) whatever the weights, and isotropy means
-//! `C_11 = C_33 = 6/5 E`, `C_13 = C_44 = 2/5 E`. The three families of a prism, averaged over the azimuth, with
-//! `s = (c·axis)²` of a diagonal, give
+//! which is symmetric in all indices. So Poisson's ratio is ¼ (Cauchy) whatever the weights, and
+//! isotropy means `C_11 = C_33 = 6/5 E`, `C_13 = C_44 = 2/5 E`. With `s = (c·axis)²` of a diagonal,
+//! the three families of bars of a prism, averaged over the azimuth, give
 //! ```text
 //!                 C_11 (along the layer)   C_33 (across)   C_13 = C_44
 //!     in-level         3/8 W_i                 0              0
 //!     vertical         0                       W_v            0
 //!     diagonal         3/8 W_d (1−s)²          W_d s²         ½ W_d s (1−s)
 //! ```
-//! and three equations for three weights. A flat or tall prism would need a negative one; there `C_11` and `C_33` are
-//! kept and the shear stiffness `C_44` gives way. Derivation and measured figures: `docs/theory/spring_stiffness.md`.
+//! These are three equations for three weights. A flat or tall prism would need a negative weight.
+//! There, `C_11` and `C_33` are kept and the shear stiffness `C_44` deviates. Derivation and
+//! measured figures: `docs/theory/spring_stiffness.md`.
 
 use palpa_mesh::Vec3;
 use palpa_mesh::quality::prism_volume;
 
-/// The share of the in-level and of the vertical bars in `C_11` and `C_33` is not let fall below this, so that no bar
-/// is without stiffness.
+/// Least share of the in-level bars in `C_11` and of the vertical bars in `C_33`, so that every bar
+/// has some stiffness.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Stiffness of the 15 bars of one prism, in N/m, in the order of the triangle's sides (0,1), (1,2), (2,0).
+/// Stiffness of the 15 bars of one prism, in N/m, in the order of the triangle's sides (0,1),
+/// (1,2), (2,0).
 pub(crate) struct PrismBars {
-    /// In the upper triangle.
+    /// Bars in the upper triangle.
     pub(crate) upper: [f64; 3],
-    /// In the lower triangle.
+    /// Bars in the lower triangle.
     pub(crate) lower: [f64; 3],
-    /// At the three corners.
+    /// Bars at the three corners.
     pub(crate) vertical: [f64; 3],
-    /// In each side face: from the first corner above to the second below, and the other way round.
+    /// Bars in each side face: from the first corner above to the second below, then from the
+    /// second above to the first below.
     pub(crate) diagonal: [[f64; 2]; 3],
 }
 
-/// Shares the modulus (Pa) of a prism among its bars; `corners` are the upper triangle, then the lower.
+/// Distributes the modulus (Pa) of a prism over its bars. `corners` are the upper triangle, then
+/// the lower.
 pub(crate) fn prism_bar_stiffness(corners: &[Vec3; 6], modulus: f64) -> PrismBars {
     let [a, b, c, d, e, f] = corners;
     let axis = ((a - d) + (b - e) + (c - f))

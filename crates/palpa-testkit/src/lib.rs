@@ -1,4 +1,5 @@
-//! The test kit: a builder of scene files ([`Scene`]), and the command in a folder of its own ([`Bench`]).
+//! The test kit: a builder of scene files ([`Scene`]), and the command in a folder of its own
+//! ([`Bench`]).
 //!
 //! It knows texts and processes alone, so that the tests of every crate can use it.
 //!

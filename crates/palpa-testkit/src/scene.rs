@@ -46,8 +46,8 @@ impl Scene {
         }
     }
 
-    /// The block of benchmark B2 under a ball without friction, 10 mm in radius: 2 mm of skin, 10 mm
-    /// of soft fat and 28 mm of muscle, in as many intervals between levels as given.
+    /// The block of benchmark B2 under a ball without friction, 10 mm in radius: 2 mm of skin, 10
+    /// mm of soft fat and 28 mm of muscle, in as many intervals between levels as given.
     pub fn skin_fat_muscle(fat_levels: u32, muscle_levels: u32) -> Self {
         Self::block([100.0, 100.0, 40.0], 12.0)
             .layer(Layer::elastic("skin", "100 kPa").thick(2.0))
@@ -243,7 +243,8 @@ impl Layer {
 }
 
 impl Lump {
-    /// A sphere of this radius (mm), nearly incompressible: a name and Young's modulus with its unit.
+    /// A sphere of this radius (mm), nearly incompressible: a name and Young's modulus with its
+    /// unit.
     pub fn sphere(radius: f64, name: &str, young: &str) -> Self {
         Self(
             Table::new("[lump]")

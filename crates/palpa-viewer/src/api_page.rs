@@ -1,5 +1,5 @@
-//! A page that lists what the control API offers. The types of requests and answers are in the `OpenAPI` document, which
-//! it links.
+//! A page that lists the operations of the control API. It links the `OpenAPI` document, which has
+//! the types of requests and answers.
 
 use serde_json::{Map, Value};
 
@@ -16,8 +16,8 @@ dt { margin-top: 1rem; font-weight: 600 }
 <h1>Control API</h1>
 ";
 
-/// HTML of the operations of `document`, an `OpenAPI` document. `query` is that of the page's address: its link to the
-/// document needs the same token.
+/// HTML of the operations in `document`, an `OpenAPI` document. `query` is the query of the page's
+/// own address; its link to the document repeats it, because it needs the same token.
 pub(crate) fn html(document: &Value, query: Option<&str>) -> String {
     let query = query.map_or(String::new(), |query| format!("?{}", escape(query)));
     let about = text(&document["info"]["description"]);

@@ -1,6 +1,8 @@
-//! What the session has published last, and who is connected: the place between the session's threads and the server's.
+//! The latest published state and the connected clients: the exchange between the session's threads
+//! and the server's.
 //!
-//! Nothing here waits: what is published replaces what was there, and each client takes what is newest when it has room.
+//! Nothing here blocks. New data replaces old data, and each client takes the newest when it has
+//! room.
 
 use crate::{
     control::{EngineFigures, Message, Notice, State},
@@ -14,10 +16,10 @@ use std::{
 };
 use tokio::sync::{broadcast, watch};
 
-/// Notices that a client may be behind.
+/// Largest number of notices that a client may lag behind.
 const NOTICES: usize = 64;
 
-/// Gives pages what they show. Never waits for them, callable from any thread.
+/// Sends data to pages. Never waits for them; callable from any thread.
 #[derive(Clone)]
 pub struct Publisher {
     board: Arc<Board>,
@@ -28,8 +30,8 @@ impl Publisher {
         Self { board }
     }
 
-    /// A new mesh, a [`MeshSnapshot`](crate::wire::MeshSnapshot) with its number: sent to every client before any frame of it,
-    /// and to each client that connects later.
+    /// Publishes a new mesh, a [`MeshSnapshot`](crate::wire::MeshSnapshot) with its number. Every
+    /// client gets it before any frame of it, and so does each client that connects later.
     pub fn mesh(&self, mesh: u32, snapshot: Vec<u8>) {
         self.board.picture.send_modify(|picture| {
             let serial = picture.mesh.as_ref().map_or(0, |m| m.serial) + 1;
@@ -37,8 +39,8 @@ impl Publisher {
         });
     }
 
-    /// A new frame of a mesh, a [`FrameSnapshot`](crate::wire::FrameSnapshot): the latest wins, slow clients miss frames. One
-    /// that is not of the latest mesh is shown to nobody.
+    /// Publishes a new frame of a mesh, a [`FrameSnapshot`](crate::wire::FrameSnapshot). The latest
+    /// wins; slow clients miss frames. A frame that does not belong to the latest mesh is not sent.
     pub fn frame(&self, mesh: u32, snapshot: Vec<u8>) {
         self.board.picture.send_modify(|picture| {
             let serial = picture.frame.as_ref().map_or(0, |f| f.serial) + 1;
@@ -46,14 +48,15 @@ impl Publisher {
         });
     }
 
-    /// The state has changed. Who controls and how many are connected is filled in here, and the revision made to grow.
+    /// Publishes a changed state. The controller, the number of clients and a new revision are
+    /// filled in here.
     pub fn state(&self, state: State) {
         let mut seats = self.board.seats();
         seats.state = Some(Message::State(Box::new(state)));
         seats.tell(&self.board.state);
     }
 
-    /// How the engine fares; the latest wins.
+    /// Publishes the engine's figures; the latest wins.
     pub fn engine(&self, figures: EngineFigures) {
         let message = Message::Engine(Box::new(figures));
         let text = json(&message);
@@ -63,13 +66,14 @@ impl Publisher {
         }
     }
 
-    /// Something that happened, for all who are connected. A client that is far behind misses the oldest.
+    /// Publishes a notice to all connected clients. A client that lags far behind misses the
+    /// oldest.
     pub fn notice(&self, notice: Notice) {
-        // An error says that nobody is connected, and nobody hears it.
+        // An error means that no client is connected.
         let _ = self.board.notices.send(json(&Message::Notice(notice)));
     }
 
-    /// How many are connected.
+    /// Number of connected clients.
     pub fn n_clients(&self) -> usize {
         self.board.clients().n
     }
@@ -83,10 +87,10 @@ impl fmt::Debug for Publisher {
     }
 }
 
-/// What was published last.
+/// The latest published data.
 #[derive(Debug)]
 pub(crate) struct Board {
-    /// What is seen.
+    /// The mesh and the frame.
     pub(crate) picture: watch::Sender<Picture>,
     /// The state, as the text of its message.
     pub(crate) state: watch::Sender<Option<Utf8Bytes>>,
@@ -94,12 +98,12 @@ pub(crate) struct Board {
     pub(crate) engine: watch::Sender<Option<(Arc<EngineFigures>, Utf8Bytes)>>,
     /// Notices, as texts of their messages.
     pub(crate) notices: broadcast::Sender<Utf8Bytes>,
-    /// What was counted.
+    /// The server's counters.
     pub(crate) counts: Counts,
     seats: Mutex<Seats>,
 }
 
-/// A mesh and a frame, of the same watch so that no client can see a frame and not its mesh.
+/// A mesh and a frame. They share one watch, so that no client sees a frame without its mesh.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Picture {
     pub(crate) mesh: Option<Shot>,
@@ -109,9 +113,9 @@ pub(crate) struct Picture {
 /// A snapshot, shared by all clients.
 #[derive(Debug, Clone)]
 pub(crate) struct Shot {
-    /// The mesh that it is or belongs to.
+    /// Number of the mesh that it is or belongs to.
     pub(crate) mesh: u32,
-    /// Counts those that were published.
+    /// Number of the snapshot among all that were published.
     pub(crate) serial: u64,
     pub(crate) bytes: Bytes,
 }
@@ -138,12 +142,12 @@ impl Board {
         }
     }
 
-    /// Who is connected.
+    /// The connected clients.
     pub(crate) fn clients(&self) -> Clients {
         self.seats().clients()
     }
 
-    /// A client comes, and is told its number. It controls if nobody does.
+    /// Adds a client and returns its number. The client takes control if nobody has it.
     pub(crate) fn enter(&self) -> u64 {
         let mut seats = self.seats();
         seats.last += 1;
@@ -156,8 +160,9 @@ impl Board {
         client
     }
 
-    /// A client leaves. If it controlled, nobody does until [`inherit`](Self::inherit) or a client comes: a page that is loaded
-    /// again is to have its control again. Says whether it controlled.
+    /// Removes a client and returns whether it was in control. If it was, nobody is in control
+    /// until [`inherit`](Self::inherit) or until a client connects: a page that reloads gets its
+    /// control back.
     pub(crate) fn leave(&self, client: u64) -> bool {
         let mut seats = self.seats();
         seats.taken.retain(|&c| c != client);
@@ -169,7 +174,7 @@ impl Board {
         has_controlled
     }
 
-    /// If nobody controls, the only client that is left does.
+    /// Gives control to the only client that is left, if nobody has it.
     pub(crate) fn inherit(&self) {
         let mut seats = self.seats();
         if let ([only], Controller::Nobody) = (&seats.taken[..], seats.controller) {
@@ -178,7 +183,7 @@ impl Board {
         }
     }
 
-    /// It is this one who controls from now on.
+    /// Gives control to `by`.
     pub(crate) fn take_control(&self, by: Controller) {
         let mut seats = self.seats();
         if seats.controller != by {
@@ -187,12 +192,12 @@ impl Board {
         }
     }
 
-    /// Who controls.
+    /// The client in control.
     pub(crate) fn controller(&self) -> Controller {
         self.seats().controller
     }
 
-    /// The state as it is told, alone.
+    /// The state as JSON, without the message around it.
     pub(crate) fn state_alone(&self) -> Option<String> {
         match &self.seats().state {
             Some(Message::State(state)) => serde_json::to_string(state).ok(),
@@ -205,10 +210,10 @@ impl Board {
     }
 }
 
-/// Who controls.
+/// The client in control.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Controller {
-    /// Whoever asks first.
+    /// Nobody; the first client that connects takes control.
     #[default]
     Nobody,
     /// The page of this connection.
@@ -217,7 +222,7 @@ pub(crate) enum Controller {
     Program,
 }
 
-/// Who is connected, and the state that tells it.
+/// The connected clients, and the state that reports them.
 #[derive(Debug, Default)]
 struct Seats {
     last: u64,
@@ -239,7 +244,7 @@ impl Seats {
         }
     }
 
-    /// Fills in who is connected, and tells all.
+    /// Fills in the controller and the number of clients, and publishes the state.
     fn tell(&mut self, to: &watch::Sender<Option<Utf8Bytes>>) {
         let Clients { n, controller } = self.clients();
         let Some(message) = &mut self.state else {
@@ -257,6 +262,6 @@ impl Seats {
 
 /// A message as text.
 pub(crate) fn json(message: &Message) -> Utf8Bytes {
-    // Our own types: string keys, and numbers that JSON lacks become null.
+    // Serializing these types cannot fail: keys are strings, and NaN and infinity become null.
     serde_json::to_string(message).unwrap_or_default().into()
 }

@@ -1,11 +1,11 @@
-//! A page, or a program in its place, at the other end of a WebSocket.
+//! One client, a page or a program, at the other end of a WebSocket.
 //!
 //! ```text
 //!  hello, state, mesh, frame │ then, whatever is new and as fast as the client takes it:
 //!                            │ ping, answers, state, notices, engine, mesh before its frames
 //! ```
-//! One task reads and writes. A client that does not take what is sent to it is not waited for by anyone else: it misses
-//! frames, and after a while it is let go.
+//! One task per client reads and writes. Nobody waits for a slow client: it misses frames, and
+//! after a while the server closes its connection.
 
 use crate::{
     board::{Board, Controller, Picture, json},
@@ -37,7 +37,7 @@ use tokio::{
 type Sink = SplitSink<WebSocket, ws::Message>;
 type Answers = mpsc::Sender<Utf8Bytes>;
 
-/// Serves a client until one of the two has had enough.
+/// Serves a client until the client or the server ends the connection.
 pub(crate) async fn serve(socket: WebSocket, hub: Arc<Hub>, place: OwnedSemaphorePermit) {
     let seat = Seat::take(hub);
     let (mut sink, mut stream) = socket.split();
@@ -56,13 +56,13 @@ pub(crate) async fn serve(socket: WebSocket, hub: Arc<Hub>, place: OwnedSemaphor
     drop(place);
 }
 
-/// Returns when the server is to end.
+/// Returns when the server shall end.
 pub(crate) async fn is_closing(mut closing: watch::Receiver<bool>) {
-    // An error says that the server is gone already.
+    // An error means that the server is gone already.
     let _ = closing.wait_for(|&is_closing| is_closing).await;
 }
 
-/// A client's place among those who are connected.
+/// A client's place among the connected clients.
 struct Seat {
     hub: Arc<Hub>,
     client: u64,
@@ -94,14 +94,14 @@ impl Drop for Seat {
 
 /// Why a connection ends.
 enum End {
-    /// The client has gone.
+    /// The client closed the connection.
     Gone,
-    /// We let it go.
+    /// The server closes the connection.
     Close { code: u16, reason: Utf8Bytes },
 }
 
 impl End {
-    /// A reason has room for 123 bytes.
+    /// WebSocket allows 123 bytes for a reason.
     fn new(code: u16, reason: &str) -> Self {
         Self::Close {
             code,
@@ -123,17 +123,17 @@ async fn say_good_bye(mut sink: Sink, mut stream: SplitStream<WebSocket>, end: E
             End::Close { code, reason } => {
                 let frame = CloseFrame { code, reason };
                 if sink.send(ws::Message::Close(Some(frame))).await.is_ok() {
-                    // What the client has sent meanwhile, until it has read that this is the end.
+                    // Discard what the client sent before it read the close frame.
                     while let Some(Ok(_)) = stream.next().await {}
                 }
             }
         }
     };
-    // A client that takes no leave is left without.
+    // If the client does not answer the close frame, drop the connection.
     let _ = timeout(CLOSE_WAIT, good_bye).await;
 }
 
-/// Hears a client until it is gone, silent, or asks too much.
+/// Reads from a client until it is gone, is silent for too long, or sends too much.
 async fn read(stream: &mut SplitStream<WebSocket>, seat: &Seat, answers: &Answers) -> End {
     let mut gate = Gate::new(Instant::now());
     let mut n_malformed = 0;
@@ -203,9 +203,9 @@ fn unreadable(error: &axum::Error) -> End {
     }
 }
 
-/// A request out of its text, or the refusal.
+/// Parses a request, or makes the refusal.
 pub(crate) fn understand(text: &str) -> Result<Envelope, Reply> {
-    /// The number alone, to answer what is not understood otherwise.
+    /// Only the number, so that the refusal of a malformed request can repeat it.
     #[derive(Deserialize)]
     struct Numbered {
         #[serde(default)]
@@ -243,7 +243,8 @@ fn ask(seat: &Seat, answers: &Answers, Envelope { id, request }: Envelope) {
     seat.hub.ask(who, request, move |outcome| {
         let error = outcome.err();
         if id.is_some() || error.is_some() {
-            // A client that is gone needs no answer, and one that does not read is let go by the writer.
+            // Ignore errors: a client that is gone needs no answer, and the writer drops a client
+            // that does not read.
             let _ = send_answer(&answers, Reply { id, error });
         }
     });
@@ -265,7 +266,7 @@ fn warn(answers: &Answers) -> Result<(), ()> {
         .map_err(|_| ())
 }
 
-/// Tells a client what is new until it does not take it.
+/// Sends all news to a client until it no longer takes them.
 async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8Bytes>) -> End {
     let board = &*seat.hub.board;
     let mut out = Outlet::new(sink, board);
@@ -281,7 +282,7 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
     if let Err(end) = out.text(json(&hello)).await {
         return end;
     }
-    // What is there already is news to a new client.
+    // Everything already on the board is news to a new client.
     state.mark_changed();
     picture.mark_changed();
     engine.mark_changed();
@@ -289,11 +290,12 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
     ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
     ping.reset();
     loop {
-        // The picture comes last: there is always a newer one.
+        // The picture comes last, because a newer one always follows.
         let sent = select! {
             biased;
             _ = ping.tick() => {
-                // A page does not see pings. While the session says nothing, it hears the state.
+                // A page's script does not see pings. If nothing was sent for a while, send the
+                // state as a sign of life.
                 let is_silent = out.spoke_at.elapsed() > QUIET;
                 let text = is_silent.then(|| state.borrow().clone()).flatten();
                 match out.some(text).await {
@@ -326,15 +328,15 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
     }
 }
 
-/// Sends, and knows which picture the client has.
+/// Sends messages and remembers which picture the client has.
 struct Outlet<'a> {
     sink: &'a mut Sink,
     board: &'a Board,
-    /// Serial number of the mesh that it has.
+    /// Serial number of the mesh that the client has.
     mesh: u64,
-    /// Serial number of the frame that it had last, or of the one before it came.
+    /// Serial number of the last frame sent; at first, of the one before the first frame.
     frame: u64,
-    /// When something was said last.
+    /// Time of the last text or binary message.
     spoke_at: Instant,
 }
 
@@ -385,7 +387,7 @@ impl<'a> Outlet<'a> {
         }
     }
 
-    /// The mesh if the client lacks it, and the frame if it is of that mesh.
+    /// Sends the mesh if the client lacks it, then the frame if it belongs to that mesh.
     async fn picture(&mut self, Picture { mesh, frame }: Picture) -> Result<(), End> {
         let Some(mesh) = mesh else {
             return Ok(());
@@ -409,7 +411,7 @@ impl<'a> Outlet<'a> {
     }
 }
 
-/// The beginning of a text, of so many bytes at most.
+/// The beginning of a text, at most `n_bytes` long.
 fn cut(text: &str, n_bytes: usize) -> &str {
     &text[..text.floor_char_boundary(n_bytes)]
 }

@@ -1,4 +1,4 @@
-//! Connections of all kinds, bounded in number, and ended when nothing goes through them.
+//! All TCP connections: limited in number, and closed when idle.
 
 use crate::limits::{IDLE, MAX_CONNECTIONS};
 use axum::serve::Listener;
@@ -16,7 +16,7 @@ use tokio::{
     time::{Instant, Sleep, sleep},
 };
 
-/// Takes connections while there is room; others wait at the door.
+/// Accepts connections while fewer than the limit are open; others wait in the backlog.
 pub(crate) struct Connections {
     listener: TcpListener,
     places: Arc<Semaphore>,
@@ -36,10 +36,10 @@ impl Listener for Connections {
     type Addr = SocketAddr;
 
     async fn accept(&mut self) -> (Connection, SocketAddr) {
-        // Never closed, so that there always is a place at last.
+        // The semaphore is never closed, so a permit always comes.
         let place = Arc::clone(&self.places).acquire_owned().await.ok();
         let (stream, address) = Listener::accept(&mut self.listener).await;
-        // Small messages go at once; where this is refused they come a little later.
+        // Send small messages at once. If the system refuses, they are only a little later.
         let _ = stream.set_nodelay(true);
         let connection = Connection {
             stream,
@@ -54,7 +54,7 @@ impl Listener for Connections {
     }
 }
 
-/// A connection that ends when nothing went through it for long.
+/// A connection that ends when it was idle for [`IDLE`].
 pub(crate) struct Connection {
     stream: TcpStream,
     idle: Pin<Box<Sleep>>,

@@ -1,8 +1,8 @@
-//! What a page asks of the engine, and what it is told: JSON, one `type` each.
+//! Messages between a page and the engine: JSON, each with a `type`.
 //!
-//! Lengths are metres, forces newtons, places in the frame of the scene, except inside a scene's own keys, which are those
-//! of a scene file ("12 kPa"). The JSON Schema of these types is the control API's document, and the page's types are made
-//! from it.
+//! Lengths are in metres and forces in newtons. Positions are in the frame of the scene. The keys
+//! of a scene are those of a scene file, with units ("12 kPa"). The JSON Schema of these types is
+//! the control API's document, and the page's TypeScript types are generated from it.
 
 use palpa_scene::ContactShape;
 use schemars::JsonSchema;
@@ -12,123 +12,126 @@ use serde_json::Value;
 /// A point or a vector.
 pub type Vec3 = [f64; 3];
 
-/// A request of a page, with a number of its own that the answer repeats.
+/// A request, with a number that the answer repeats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Envelope {
-    /// Repeated in the [`Reply`]; without it only a refusal is answered.
+    /// Number of the request, repeated in the [`Reply`]. Without it, only a refusal gets a reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u32>,
-    /// What is asked.
+    /// The request.
     #[serde(flatten)]
     pub request: Request,
 }
 
-/// What a page may ask. Only who controls may ask for more than control.
+/// The requests of a client. Only the client in control may send requests other than
+/// `take_control`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Request {
-    /// To be the one who controls.
+    /// Take control.
     TakeControl,
-    /// The hand goes there.
+    /// Move the hand to a pose.
     Hand(Hand),
-    /// The hand lifts the tool off the skin.
+    /// Lift the tool off the skin.
     Lift,
-    /// A scene of the gallery.
+    /// Load a scene of the gallery.
     LoadScene {
-        /// Its key.
+        /// Key of the scene.
         key: String,
     },
-    /// A scene of one's own, as the text of a scene file.
+    /// Load a scene from the text of a scene file.
     LoadText {
-        /// The text (TOML).
+        /// The scene file (TOML).
         text: String,
     },
-    /// Changes of the scene, all of them or none.
+    /// Change the scene. Either all edits apply or none.
     Edit {
-        /// In order.
+        /// The edits, applied in order.
         edits: Vec<Edit>,
     },
-    /// The scene's motion, from a press to a palpation, by a simulated hand at the place of the scene.
+    /// Start the scene's motion, for example a press or a palpation. A simulated hand performs it
+    /// at the scene's place.
     RunMotion,
-    /// The hand is free again.
+    /// Stop the scene's motion and free the hand.
     StopMotion,
-    /// A new recording begins, on a body at rest.
+    /// Start a new recording. The body starts at rest.
     StartRecording,
-    /// The recording ends.
+    /// End the recording.
     StopRecording,
-    /// The recording is shown instead of the body that is pressed.
+    /// Show the recording instead of the live body.
     OpenReplay,
-    /// The body that is pressed is shown again.
+    /// Show the live body again.
     CloseReplay,
-    /// The moment of the recording that is shown.
+    /// Go to a moment of the recording.
     Seek {
-        /// Since the recording's beginning, s.
+        /// Time since the start of the recording, s.
         time: f64,
     },
-    /// The recording goes on by itself, or stands.
+    /// Play or pause the recording.
     Play {
-        /// Whether it goes on.
+        /// True to play, false to pause.
         on: bool,
     },
-    /// The field that frames carry.
+    /// Choose the field that frames carry.
     ShowField {
-        /// Which.
+        /// The field.
         field: Field,
     },
-    /// Lumps are hidden at random places, to be found.
+    /// Start a round of "find the lump": hide lumps at random places.
     StartGame {
-        /// The same seed hides them at the same places; none is a new one.
+        /// The same seed hides the lumps at the same places. Without it, a new seed is chosen.
         #[serde(default)]
         seed: Option<u64>,
-        /// How many, 1 to 3.
+        /// Number of lumps, 1 to 3.
         n_lumps: u32,
     },
-    /// A lump is thought to be here.
+    /// Mark a place where the user suspects a lump.
     Mark {
-        /// A point of the skin at rest.
+        /// A point of the skin at rest, m.
         point: Vec3,
     },
-    /// The last mark was a mistake.
+    /// Take the last mark back.
     Unmark,
-    /// The truth is shown.
+    /// Show where the lumps are.
     Reveal,
-    /// The game is over, and the scene is what it was.
+    /// End the game and restore the scene.
     EndGame,
-    /// A fault on purpose. Refused unless the program was started for it.
+    /// Cause a fault on purpose. Refused unless the program was started with faults allowed.
     Inject {
-        /// Which.
+        /// The fault.
         fault: FaultKind,
     },
-    /// The engine starts anew on the same scene.
+    /// Start the engine again on the same scene.
     Restart,
 }
 
-/// Where the hand holds the tool. Its tip is to be `depth` under `point`, against `normal`.
+/// A pose of the hand: the tool's tip goes `depth` below `point`, against `normal`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Hand {
     /// A point of the skin at rest, m.
     pub point: Vec3,
-    /// The skin's outward normal there.
+    /// Outward normal of the skin at `point`.
     pub normal: Vec3,
-    /// How deep, m; negative is above the skin.
+    /// Depth below the skin at rest, m; negative is above the skin.
     pub depth: f64,
 }
 
-/// A change of one key of the scene file.
+/// A change to one key of the scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Edit {
-    /// JSON pointer into [`State::scene`], as "/layer/1/tissue/young"; "/lump/-" appends.
+    /// JSON pointer into [`State::scene`], such as "/layer/1/tissue/young"; "/lump/-" appends a
+    /// lump.
     pub path: String,
-    /// The new value, as in a scene file; null takes the key away.
+    /// The new value, as in a scene file; null removes the key.
     #[serde(default)]
     pub value: Value,
 }
 
-/// A field over the nodes that is too costly for a page.
+/// A field over the nodes, computed by the engine because it is too costly for a page.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Field {
-    /// None.
+    /// No field.
     #[default]
     None,
     /// Von Mises stress, Pa.
@@ -139,40 +142,40 @@ pub enum Field {
     Stretch,
 }
 
-/// A fault on purpose.
+/// A fault that is caused on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
     /// The tissue's thread panics.
     TissuePanic,
-    /// A patch with NaN.
+    /// A contact patch contains NaN.
     SpoiltPatch,
     /// The tissue pauses for half a second.
     TissuePause,
 }
 
-/// What a page is told, beside snapshots.
+/// The messages of the server to a client, besides snapshots.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Message {
-    /// First of all.
+    /// The first message on a connection.
     Hello(Hello),
-    /// All of the state, whenever any of it has changed.
+    /// The whole state, sent after every change.
     State(Box<State>),
-    /// How the engine fares, twice a second.
+    /// Figures of the engine, twice a second.
     Engine(Box<EngineFigures>),
-    /// Something that happened.
+    /// An event that a user should know of.
     Notice(Notice),
     /// The answer to a request.
     Reply(Reply),
 }
 
-/// Who is spoken to.
+/// The first message on a connection.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Hello {
     /// Version of the program.
     pub palpa: String,
-    /// Version of the snapshots; a page of another one must be loaded again.
+    /// Version of the snapshot format. A page with another version must be reloaded.
     pub snapshot_version: u32,
     /// The number of this connection.
     pub client: u64,
@@ -181,82 +184,82 @@ pub struct Hello {
 /// The answer to a request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Reply {
-    /// That of the request.
+    /// Number of the request.
     pub id: Option<u32>,
-    /// Why it is refused; none when it is done or under way.
+    /// The reason for a refusal; none if the request is done or under way.
     pub error: Option<String>,
 }
 
-/// Something that happened.
+/// An event that a user should know of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Notice {
-    /// How grave it is.
+    /// Severity.
     pub level: NoticeLevel,
-    /// In words.
+    /// The message, in English.
     pub text: String,
 }
 
-/// How grave a notice is.
+/// Severity of a notice.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum NoticeLevel {
-    /// Good to know.
+    /// For information.
     Info,
-    /// Not as it should be.
+    /// Something is not as it should be.
     Warning,
     /// Something failed.
     Error,
 }
 
-/// Something to know about the scene: its kind, and the names and numbers in it.
+/// A remark on the scene: its kind, and the names and numbers in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Note {
-    /// The kind of note. Pages have words for each kind in each of their languages.
+    /// Kind of note. Pages have a text for each kind in each of their languages.
     pub kind: String,
     /// Names and numbers, in SI units.
     pub values: serde_json::Map<String, Value>,
-    /// The note in English, for clients without words of their own.
+    /// The note in English, for clients without texts of their own.
     pub text: String,
 }
 
 /// Everything that pages show, except the moving body.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct State {
-    /// Grows with every change.
+    /// Grows with every change of the state.
     pub revision: u64,
-    /// Who controls: the number of a connection.
+    /// Number of the connection in control; null if no page is in control.
     pub controller: Option<u64>,
-    /// How many pages are connected.
+    /// Number of pages that are connected.
     pub n_clients: u32,
-    /// The scenes that can be chosen.
+    /// Scenes of the gallery.
     pub gallery: Vec<GalleryEntry>,
-    /// The one that was chosen; none for one's own.
+    /// Key of the loaded gallery scene; null for a scene from another source.
     pub gallery_key: Option<String>,
-    /// The scene in full, as a scene file says it; while a game is on, without its lumps.
+    /// The whole scene, with the keys of a scene file. During a game it has no lumps.
     pub scene: Value,
     /// The layers, from the skin down.
     pub layers: Vec<LayerInfo>,
-    /// The lumps where they lie at rest; while a game is on, none.
+    /// The lumps at their places at rest; empty during a game.
     pub lumps: Vec<LumpInfo>,
-    /// What presses.
+    /// The tool.
     pub tool: ToolInfo,
-    /// The place that the scene presses, and where the tool hangs over it.
+    /// Pose of the hand over the place that the scene presses.
     pub home: Hand,
-    /// How deep the scene's hand presses, m.
+    /// Depth of the scene's motion, m.
     pub usual_depth: f64,
-    /// The greatest depth that makes sense, m.
+    /// Largest depth that a page should offer, m.
     pub greatest_depth: f64,
     /// Largest force of the device, N.
     pub max_force: f64,
-    /// How the body answers.
+    /// The model of the body.
     pub method: Method,
-    /// What the engine does.
+    /// Phase of the engine.
     pub phase: Phase,
-    /// Why the last scene could not be built, or the engine stopped.
+    /// Reason why the last scene could not be built, or why the engine stopped.
     pub problem: Option<String>,
-    /// What a user should know of the scene.
+    /// Remarks on the scene for the user.
     pub notes: Vec<Note>,
     /// Whether the scene's motion runs.
     pub is_motion_running: bool,
@@ -264,55 +267,55 @@ pub struct State {
     pub field: Field,
     /// The recording.
     pub recording: RecordingInfo,
-    /// The game, if one is on.
+    /// The game, if one is under way.
     pub game: Option<GameInfo>,
-    /// Nodes of the body.
+    /// Number of nodes of the body.
     pub n_nodes: u32,
-    /// Whether faults on purpose are allowed.
+    /// Whether a page may cause faults on purpose.
     pub allows_faults: bool,
 }
 
-/// How the body answers.
+/// The model of the body.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Continuum finite elements, contact.
+    /// Continuum finite elements; the tool presses by contact.
     #[default]
     Tissue,
-    /// The network of bars of 2009, a node held.
+    /// The network of bars of 2009; the tool holds a single node.
     Reference,
 }
 
-/// What the engine does.
+/// Phase of the engine.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// A body is being built; the one before is still there.
+    /// A body is being built. The previous body is still there.
     #[default]
     Building,
     /// The engine runs.
     Running,
-    /// It does not, see [`State::problem`].
+    /// The engine does not run; see [`State::problem`].
     Stopped,
 }
 
 /// A scene of the gallery.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct GalleryEntry {
-    /// To choose it by.
+    /// Key for `load_scene`.
     pub key: String,
-    /// In words (English; a page may know the key in other languages).
+    /// Name in English. A page may have a translation for the key.
     pub name: String,
 }
 
 /// A layer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerInfo {
-    /// Its tissue.
+    /// Name of its tissue.
     pub name: String,
-    /// Its law, in a word.
+    /// Name of its elastic law.
     pub law: String,
-    /// Young's modulus at small strain, Pa; N/m of a bar in the reference method.
+    /// Young's modulus at small strain, Pa; in the reference method, stiffness of a bar, N/m.
     pub stiffness: f64,
     /// Mean thickness at rest, m.
     pub thickness: f64,
@@ -327,39 +330,39 @@ pub struct LumpInfo {
     pub shape: LumpForm,
     /// Its centre, m.
     pub centre: Vec3,
-    /// Its axes, three unit vectors.
+    /// Its axes: three unit vectors.
     pub axes: [Vec3; 3],
     /// Young's modulus at small strain, Pa.
     pub stiffness: f64,
 }
 
-/// The shape of a lump, m.
+/// The shape of a lump. Lengths in m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum LumpForm {
     /// An ellipsoid, or a ball.
     Ellipsoid {
-        /// Along its axes.
+        /// Radii along its axes.
         radii: Vec3,
     },
-    /// A cylinder along its first axis with round ends.
+    /// A cylinder along its first axis, with round ends.
     Capsule {
-        /// Of the cylinder and its ends.
+        /// Radius of the cylinder and its ends.
         radius: f64,
-        /// Of the straight part.
+        /// Length of the straight part.
         length: f64,
     },
-    /// A mesh, of which only this ball round it is told.
+    /// A surface mesh; only its bounding sphere is sent.
     Mesh {
-        /// Radius of the ball.
+        /// Radius of the bounding sphere.
         radius: f64,
     },
 }
 
-/// What presses. In its own frame its tip is the origin, and z points out of the tissue.
+/// The tool. In its own frame the tip is the origin, and z points out of the tissue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ToolInfo {
-    /// Its shape; null for a single node that is held.
+    /// Its shape; null if the tool holds a single node.
     pub shape: Option<ContactShape>,
     /// Coulomb's coefficient of friction.
     pub friction: f64,
@@ -368,113 +371,113 @@ pub struct ToolInfo {
 /// The recording.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordingInfo {
-    /// Whether one is under way.
+    /// Whether a recording is under way.
     pub is_recording: bool,
-    /// How long it is, s; 0 when there is none.
+    /// Its duration, s; 0 without a recording.
     pub duration: f64,
-    /// Whether it is shown.
+    /// Whether pages show the recording instead of the live body.
     pub is_replaying: bool,
-    /// Whether it goes on by itself.
+    /// Whether the recording plays by itself.
     pub is_playing: bool,
 }
 
-/// A round of finding lumps.
+/// A round of "find the lump".
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GameInfo {
-    /// The seed; with it the round can be had again.
+    /// The seed. The same seed gives the same round again.
     pub seed: u64,
-    /// How many lumps are hidden.
+    /// Number of hidden lumps.
     pub n_lumps: u32,
-    /// Where they are thought to be, points of the skin.
+    /// The user's marks, points of the skin, m.
     pub marks: Vec<Vec3>,
-    /// Seconds since the beginning, until the truth was shown.
+    /// Time since the start of the round, s; it stops when the lumps are revealed.
     pub seconds: f64,
-    /// The truth, once it is asked for.
+    /// The result, once the lumps are revealed.
     pub result: Option<GameResult>,
 }
 
-/// The truth of a round.
+/// The result of a round.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GameResult {
-    /// The lumps.
+    /// The lumps, each with its mark.
     pub lumps: Vec<FoundLump>,
-    /// Marks that belong to no lump.
+    /// Number of marks that belong to no lump.
     pub n_stray_marks: u32,
     /// Largest force used, N.
     pub max_force: f64,
-    /// Mean force while pressing, N.
+    /// Mean force during contact, N.
     pub mean_force: f64,
     /// Time in contact, s.
     pub contact_seconds: f64,
-    /// Share of the skin that could be pressed on and was, 0 to 1.
+    /// Share of the accessible skin area that was pressed, 0 to 1.
     pub covered: f64,
-    /// Where it was pressed: place on the skin (x, y, z, m) and the largest force there, N.
+    /// The places that were pressed: point of the skin (x, y, z, m) and largest force there (N).
     pub coverage: Vec<[f64; 4]>,
 }
 
-/// A lump and the mark that is nearest to it.
+/// A lump and the mark that belongs to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FoundLump {
     /// The lump.
     pub lump: LumpInfo,
-    /// The point of the skin over its centre.
+    /// The point of the skin nearest to its centre, m.
     pub over: Vec3,
-    /// Distance of the mark that was meant for it from that point, m; none without a mark.
+    /// Distance from that point to the lump's mark, m; null without a mark.
     pub error: Option<f64>,
 }
 
 /// Figures of the engine.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct EngineFigures {
-    /// Since its start, s.
+    /// Time since the engine's start, s.
     pub seconds: f64,
-    /// Steps of the tissue in the last second.
+    /// Steps of the tissue per second, since the last figures.
     pub tissue_rate: f64,
-    /// Ticks of the loop in the last second.
+    /// Ticks of the 1 kHz loop per second, since the last figures.
     pub tick_rate: f64,
-    /// Ticks left out since the start: missed deadlines.
+    /// Missed deadlines: ticks that were skipped since the start.
     pub missed: u64,
-    /// CPU time of a tick, s: half of them took less, 999 of 1,000, the longest.
+    /// CPU time of a tick, s: median, 99.9th percentile, maximum.
     pub tick_cpu: [f64; 3],
-    /// The same of lateness of ticks, s.
+    /// Lateness of ticks, s: median, 99.9th percentile, maximum.
     pub lateness: [f64; 3],
-    /// The same of CPU time of the tissue's steps, s.
+    /// CPU time of the tissue's steps, s: median, 99.9th percentile, maximum.
     pub step_cpu: [f64; 3],
-    /// Histogram of the CPU time of ticks: lower end, upper end (s), count.
+    /// Histogram of the CPU time of ticks: lower bound (s), upper bound (s), count.
     pub tick_histogram: Vec<(f64, f64, u64)>,
-    /// From taking the pose to the force that is made of it, s, now: age of the patch.
+    /// Age of the contact patch in use, s: time since its pose was read.
     pub latency: f64,
-    /// Nodes of the body.
+    /// Number of nodes of the body.
     pub n_nodes: u32,
-    /// Meshes taken up so far.
+    /// Meshes taken up since the start.
     pub n_meshes: u64,
-    /// Limits that the force met since the last figures, in words.
+    /// Names of the force limits that were reached since the last figures.
     pub limits: Vec<String>,
-    /// What was wrong since the last figures, in words.
+    /// Names of the faults since the last figures.
     pub faults: Vec<String>,
     /// Energy taken from the hand since the start, J.
     pub energy_in: f64,
-    /// Energy given to it, J.
+    /// Energy given to the hand since the start, J.
     pub energy_out: f64,
-    /// What may be given out beyond what was taken in, J.
+    /// Energy that the device may still give out beyond the energy taken in, J.
     pub energy_budget: f64,
-    /// How the last step of the tissue went.
+    /// Result of the tissue's last step.
     pub step_status: String,
-    /// What the threads were granted, in words.
+    /// Priorities and cores that the system granted to the threads, in words.
     pub granted: Vec<String>,
-    /// What happened last, newest last.
+    /// The latest events, newest last.
     pub events: Vec<EventInfo>,
-    /// Snapshots made in the last second.
+    /// Snapshots per second, since the last figures.
     pub snapshot_rate: f64,
 }
 
-/// Something of the engine's log.
+/// An entry of the engine's log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EventInfo {
-    /// Since its start, s.
+    /// Time since the engine's start, s.
     pub time: f64,
-    /// How grave it is.
+    /// Severity.
     pub level: NoticeLevel,
-    /// What.
+    /// The message.
     pub text: String,
 }

@@ -1,7 +1,9 @@
-//! Who may come in: pages of this server and programs on this machine; with a token, whoever knows it.
+//! Access control: pages of this server and programs on this machine are let in. With a token,
+//! every client that knows it is.
 //!
-//! A browser lets any page on the web open a WebSocket to 127.0.0.1, but says in `Origin` whose page it is, so strangers'
-//! pages are refused. A name that is made to point to 127.0.0.1 (DNS rebinding) shows in `Host`.
+//! A browser lets any web page open a WebSocket to 127.0.0.1, but names the page's site in
+//! `Origin`, so pages of other sites are refused. A foreign name that resolves to 127.0.0.1 (DNS
+//! rebinding) shows in `Host`.
 
 use crate::hub::Hub;
 use axum::{
@@ -14,21 +16,22 @@ use serde::Deserialize;
 use std::{net::IpAddr, sync::Arc};
 use subtle::ConstantTimeEq;
 
-/// Scripts, styles and connections of this server alone; styles may stand in elements.
+/// Scripts, styles and connections only from this server; inline styles are allowed.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; connect-src 'self' ws: wss:; \
     img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; object-src 'none'; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What a request must bring.
+/// Requirements on a request.
 #[derive(Debug)]
 pub(crate) struct Guard {
-    /// Whether only this machine can come: then it must have come by a name of this machine.
+    /// Whether the server listens on loopback only. Then `Host` must name this machine.
     pub(crate) is_loopback: bool,
-    /// What it must know.
+    /// The token that a request must carry.
     pub(crate) token: Option<String>,
 }
 
-/// For every route: whose request it is, and what a browser may do with the answer.
+/// Middleware for every route: checks the request's origin, and restricts what a browser may do
+/// with the answer.
 pub(crate) async fn origin(State(hub): State<Arc<Hub>>, request: Request, next: Next) -> Response {
     let mut response = match hub.guard.check_origin(request.headers()) {
         Ok(()) => next.run(request).await,
@@ -53,7 +56,7 @@ pub(crate) async fn origin(State(hub): State<Arc<Hub>>, request: Request, next: 
     response
 }
 
-/// For all that tells of the session or changes it: the token.
+/// Middleware for the routes that show or change the session: checks the token.
 pub(crate) async fn token(State(hub): State<Arc<Hub>>, request: Request, next: Next) -> Response {
     if hub
         .guard
@@ -103,7 +106,8 @@ impl Guard {
             .is_some_and(|(scheme, given)| {
                 scheme.eq_ignore_ascii_case(b"Bearer ") && is_it(given.trim_ascii())
             });
-        // A browser can send no header with a WebSocket or a download; a request that changes something always can.
+        // A browser cannot send a header with a WebSocket or a download. A request that changes
+        // something always can.
         let in_query = || {
             [Method::GET, Method::HEAD].contains(method)
                 && Query::<Asked>::try_from_uri(uri)
@@ -113,7 +117,7 @@ impl Guard {
     }
 }
 
-/// The one value of a header that may be given once.
+/// The single value of a header; an error if the header is given twice.
 fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Result<Option<&'a str>, String> {
     let mut values = headers.get_all(name).iter();
     let Some(value) = values.next() else {
@@ -125,7 +129,8 @@ fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Result<Option<&'a str>
     }
 }
 
-/// Whether a Host header names this machine's loopback. The port may be another: tunnels and proxies change it.
+/// Whether a Host header names this machine's loopback. Any port is allowed: tunnels and proxies
+/// change it.
 fn is_this_machine(host: &str) -> bool {
     let name = without_port(host);
     let name = name

@@ -1,45 +1,49 @@
-//! What the server asks of the session behind it.
+//! The interface between the server and the session behind it.
 
 use crate::control::Request;
 
-/// What the server asks of the session. No call may wait, as the server's one thread makes them; [`Host::file`] may.
+/// The session, as the server calls it. No call may block, because the server has one thread for
+/// them. [`Host::file`] may: it has its own thread.
 pub trait Host: Send + Sync + 'static {
-    /// A request of who controls; `answer` is called once, on any thread. [`Request::TakeControl`] is not among them: the
-    /// server knows who controls.
+    /// Handles a request of the client in control. `answer` must be called once, on any thread.
+    /// [`Request::TakeControl`] never arrives here: the server itself knows which client is in
+    /// control.
     fn request(&self, request: Request, answer: Answer);
 
-    /// Whether anyone is connected and who controls has changed. Told in order, before the first request of a new client.
+    /// Called when the number of clients or the client in control has changed. Calls come in order,
+    /// and before the first request of a new client.
     fn clients(&self, clients: Clients);
 
-    /// A file; may take its time, on a thread of its own.
+    /// Makes a file. This may take long; it runs on a thread of its own. `None` if there is no such
+    /// file yet.
     ///
     /// # Errors
-    /// Why it cannot be made, in words.
+    /// A text that says why the file cannot be made.
     fn file(&self, file: HostFile) -> Result<Option<Vec<u8>>, String>;
 
-    /// Why it is not well, if it is not.
+    /// The reason why the session does not work, if it does not.
     fn problem(&self) -> Option<String>;
 }
 
-/// Takes the outcome of a request: done or under way, or why it is refused. Dropped unused, the client is told that there was
-/// no answer.
+/// Takes the result of a request: `Ok` if it is done or under way, or the reason for a refusal. If
+/// it is dropped without a call, the client gets the message that there was no answer.
 pub type Answer = Box<dyn FnOnce(Result<(), String>) + Send>;
 
-/// Who is connected.
+/// The clients that are connected.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Clients {
-    /// How many.
+    /// Number of clients.
     pub n: usize,
-    /// The number of the connection that controls.
+    /// Number of the connection that is in control; `None` if no page is.
     pub controller: Option<u64>,
 }
 
-/// A file that is made when it is asked for.
+/// A file that is made on request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostFile {
     /// The scene, as a scene file with every default written out.
     Scene,
-    /// The body as it is pressed now (VTU).
+    /// The body in its present deformed state (VTU).
     Body,
     /// The recording (MCAP).
     RecordingLog,

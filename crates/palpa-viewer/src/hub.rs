@@ -1,4 +1,4 @@
-//! What the routes share: the board, the session, and who may ask it.
+//! The state that all routes share: the board, the session, and the access rules.
 
 use crate::{
     board::{Board, Controller},
@@ -13,20 +13,21 @@ use std::{
 };
 use tokio::sync::{Semaphore, watch};
 
-/// What the routes share.
+/// The state that all routes share.
 pub(crate) struct Hub {
     pub(crate) board: Arc<Board>,
     pub(crate) host: Arc<dyn Host>,
     pub(crate) guard: Guard,
-    /// A permit per client.
+    /// One permit per client.
     pub(crate) places: Arc<Semaphore>,
-    /// A permit per file that is being made.
+    /// One permit per file that is being made.
     pub(crate) files: Arc<Semaphore>,
-    /// Whether the server is to end.
+    /// True when the server shall end.
     pub(crate) closing: watch::Receiver<bool>,
-    /// Counts what programs ask by `/api/control`, all together.
+    /// Rate limit for requests through `/api/control`, all programs together.
     pub(crate) programs: Mutex<Gate>,
-    /// What the session knows of the clients. Held while it is told, so that it is told in order.
+    /// The clients as the session last heard of them. Locked during the call to the session, so
+    /// that the calls stay in order.
     told: Mutex<Clients>,
 }
 
@@ -49,7 +50,7 @@ impl Hub {
         }
     }
 
-    /// Tells the session who is connected, if it does not know.
+    /// Tells the session which clients are connected, if that has changed.
     pub(crate) fn tell_clients(&self) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let clients = self.board.clients();
@@ -59,7 +60,8 @@ impl Hub {
         }
     }
 
-    /// Does what is asked, if who asks may ask it. `answer` is called once, here or later on any thread.
+    /// Carries out the request if `who` is allowed to make it. `answer` is called once, here or
+    /// later on any thread.
     pub(crate) fn ask<F>(self: &Arc<Self>, who: Controller, request: Request, answer: F)
     where
         F: FnOnce(Result<(), String>) + Send + 'static,
@@ -88,7 +90,7 @@ impl Hub {
     fn may_ask(&self, who: Controller) -> Result<(), &'static str> {
         match (who, self.board.controller()) {
             (who, controller) if who == controller => Ok(()),
-            // A program needs no leave where there is nobody to disturb.
+            // A program may act without control while nobody is in control: it disturbs nobody.
             (Controller::Program, Controller::Nobody) => Ok(()),
             (_, Controller::Page(_)) => {
                 Err("another page controls and this one watches; take control first")
@@ -101,7 +103,7 @@ impl Hub {
     }
 }
 
-/// Calls what it holds once: with the outcome, or with words that there was none.
+/// Calls its function once: with the result, or with an error if it is dropped before.
 struct Once<F: FnOnce(Result<(), String>)>(Option<F>);
 
 impl<F: FnOnce(Result<(), String>)> Once<F> {

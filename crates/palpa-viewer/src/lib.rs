@@ -1,10 +1,11 @@
-//! What the viewer's page and the engine tell each other, and the web server between them.
+//! The messages between the viewer's page and the engine, and the web server that carries them.
 //!
 //! ```text
 //!  session (palpa) ── snapshots (bytes, latest wins), messages (JSON) ──► Server ──► pages (WebSocket)
 //!                  ◄── requests (JSON), of the page that controls ──────┘
 //! ```
-//! A page that is slow misses snapshots; it never holds the session, and the session never waits for a page.
+//! A slow page misses snapshots. It never delays the session, and the session never waits for a
+//! page.
 //!
 //! ```
 //! use palpa_viewer::{Answer, Clients, Host, HostFile, Server, ServerParams, control::Request, wire::FrameSnapshot};

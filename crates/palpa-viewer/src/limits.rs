@@ -1,62 +1,67 @@
-//! How much a client may ask, and how long it may take.
+//! Limits on a client's requests and response times.
 
 use std::time::{Duration, Instant};
 
-/// Pages at once. Each has its own copy of what its socket has not taken yet.
+/// Largest number of clients at once. Each has its own queue of unsent data.
 pub(crate) const MAX_CLIENTS: usize = 32;
-/// Connections at once, of pages, downloads and programs.
+/// Largest number of connections at once: pages, downloads and programs.
 pub(crate) const MAX_CONNECTIONS: usize = 256;
-/// A connection that nothing goes through is ended after so long. A page's is pinged; a file may take a while to make.
+/// A connection without traffic is closed after this time. Pages are pinged more often, and making
+/// a file takes less.
 pub(crate) const IDLE: Duration = Duration::from_mins(2);
-/// Files that are being made at once.
+/// Largest number of files that are made at once.
 pub(crate) const MAX_FILES: usize = 4;
-/// Longest message of a client, bytes: the text of a scene with its tissues written out has room in it many times.
+/// Longest message of a client, bytes. A scene with all tissues written out is many times shorter.
 pub(crate) const MAX_MESSAGE: usize = 1 << 20;
 /// Longest message that is not the text of a scene, bytes.
 pub(crate) const MAX_SMALL_MESSAGE: usize = 64 << 10;
-/// Malformed messages in a row: who sends so many does not speak our language.
+/// Malformed messages in a row after which the connection is closed: the client uses another
+/// protocol.
 pub(crate) const MAX_MALFORMED: u32 = 20;
-/// Answers that wait for a client to read them. At the allowed rate a client that reads nothing is dropped before.
+/// Answers that may wait for a client to read them. A client that reads nothing exceeds this at the
+/// allowed rate and is dropped.
 pub(crate) const MAX_ANSWERS: usize = 4096;
-/// How long a client may take for one message.
+/// Time that a client may take to accept one message.
 pub(crate) const SEND_WAIT: Duration = Duration::from_secs(10);
-/// How often a client is asked for a sign of life, and given one.
+/// Time between two pings to a client.
 pub(crate) const PING_EVERY: Duration = Duration::from_secs(4);
-/// A session that says nothing for so long is silent. With the time between pings it is less than the 6 s of the page.
+/// If the session sent nothing for this long, the server sends the state. Together with the time
+/// between pings this is less than the 6 s after which a page gives up.
 pub(crate) const QUIET: Duration = Duration::from_secs(1);
-/// A client that says nothing for so long is gone: three pings were not answered.
+/// A client that sends nothing for this long is gone: it has not answered three pings.
 pub(crate) const SILENCE: Duration = Duration::from_secs(14);
-/// How long nobody controls after who controlled has gone: a page that is loaded again is back by then.
+/// Time without a controller after the controlling client has gone. A page that reloads is back by
+/// then.
 pub(crate) const HEIR_WAIT: Duration = Duration::from_secs(3);
-/// How long a client may take to say good-bye.
+/// Time to wait for a client's answer to a close frame.
 pub(crate) const CLOSE_WAIT: Duration = Duration::from_millis(500);
 /// How long a program may wait for the answer to its request.
 pub(crate) const ANSWER_WAIT: Duration = Duration::from_secs(30);
-/// What the system may keep for a client that does not read, bytes. More than this is latency.
+/// Size of the system's send buffer per connection, bytes. More would only add latency.
 pub(crate) const SEND_BUFFER: u32 = 256 << 10;
 
-/// Requests per second, and at once. A hand asks 60 times a second.
+/// Requests per second, and in one burst. A moving hand sends 60 a second.
 const RATE: (f64, f64) = (200.0, 400.0);
-/// Refused requests per second, and at once, before the connection is closed.
+/// Refused requests per second, and in one burst, before the connection is closed.
 const REFUSED_RATE: (f64, f64) = (20.0, 400.0);
-/// A message costs one request, and one more for each so many bytes.
+/// A message costs one request, plus one for each this many bytes.
 const BYTES_PER_REQUEST: usize = 4096;
 
-/// Whether a message is taken.
+/// The decision on a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// It is.
+    /// It is accepted.
     Taken,
-    /// It is not; who asks is to be told, if it was not just now.
+    /// It is refused. The client gets a warning, at most once a second.
     Refused {
-        /// Whether it was not.
+        /// Whether to send the warning now.
         tell: bool,
     },
-    /// It goes on for too long.
+    /// The client exceeds the limit for too long.
     TooMuch,
 }
 
-/// Counts what a client asks.
+/// Rate limit of one client.
 #[derive(Debug)]
 pub(crate) struct Gate {
     requests: Bucket,
@@ -73,7 +78,7 @@ impl Gate {
         }
     }
 
-    /// Whether a message of so many bytes is taken.
+    /// Decides on a message of `bytes` bytes.
     pub(crate) fn ask(&mut self, bytes: usize, now: Instant) -> Verdict {
         let cost = 1.0 + (bytes / BYTES_PER_REQUEST) as f64;
         if self.requests.take(cost, now) {
@@ -92,7 +97,7 @@ impl Gate {
     }
 }
 
-/// Tokens that flow in at a rate, and are taken out.
+/// A token bucket: tokens flow in at `rate` per second, up to `capacity`.
 #[derive(Debug)]
 struct Bucket {
     rate: f64,
@@ -173,7 +178,8 @@ mod tests {
         }
     }
 
-    /// A page takes 6 s of silence for a lost connection, and a server must ask three times before it does so.
+    /// A page takes 6 s of silence for a lost connection, and the server sends three pings before
+    /// it drops a client.
     #[test]
     fn patience_fits_the_pings() {
         assert!(PING_EVERY + QUIET < Duration::from_secs(6));

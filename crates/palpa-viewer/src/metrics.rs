@@ -6,12 +6,12 @@ use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},
 };
 
-/// What the server counts since its start.
+/// The server's counters since its start.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
     /// Connections that became WebSockets.
     pub(crate) connections: Count,
-    /// Meshes sent, to all clients together.
+    /// Meshes sent, summed over all clients.
     pub(crate) meshes_sent: Count,
     /// Frames sent.
     pub(crate) frames_sent: Count,
@@ -19,17 +19,17 @@ pub(crate) struct Counts {
     pub(crate) frames_dropped: Count,
     /// Bytes of all messages sent.
     pub(crate) bytes_sent: Count,
-    /// Requests understood.
+    /// Requests parsed.
     pub(crate) requests: Count,
-    /// Requests refused, by the session too.
+    /// Requests refused, by the server or by the session.
     pub(crate) refused: Count,
-    /// Messages that were no requests.
+    /// Messages that could not be parsed as requests.
     pub(crate) malformed: Count,
-    /// Clients let go because they did not read, were silent, or asked too much.
+    /// Clients dropped because they did not read, were silent, or sent too much.
     pub(crate) dropped: Count,
 }
 
-/// A number that grows.
+/// A counter that only grows.
 #[derive(Debug, Default)]
 pub(crate) struct Count(AtomicU64);
 
@@ -43,7 +43,7 @@ impl Count {
     }
 }
 
-/// The page of figures.
+/// The text for Prometheus.
 pub(crate) fn text(board: &Board, is_well: bool) -> String {
     let mut page = Page(String::with_capacity(4096));
     page.gauge(
@@ -198,11 +198,11 @@ impl Page {
 
     fn one(&mut self, name: &str, help: &str, kind: &str, value: impl Display) {
         self.head(name, help, kind);
-        // Rust writes numbers, NaN and inf as Prometheus reads them.
+        // Rust writes numbers, NaN and inf in the format that Prometheus reads.
         let _ = writeln!(self.0, "{name} {value}");
     }
 
-    /// A gauge per quantile: no summary, which would need a sum and a count.
+    /// One gauge per quantile. A Prometheus summary would also need a sum and a count.
     fn quantiles(&mut self, name: &str, help: &str, values: [f64; 3]) {
         self.head(name, help, "gauge");
         for (quantile, value) in ["0.5", "0.999", "1"].iter().zip(values) {

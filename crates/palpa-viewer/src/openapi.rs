@@ -1,4 +1,4 @@
-//! The control API's document (OpenAPI 3.1), made from the types themselves.
+//! The control API's document (OpenAPI 3.1), generated from the types.
 
 use crate::control::{EngineFigures, Envelope, Message, Reply, State};
 use schemars::Schema;
@@ -105,7 +105,8 @@ fn body(
     json!({ "description": description, "content": { "application/json": { "schema": schema } } })
 }
 
-/// Moves the keys beside a reference into an `allOf`: `OpenAPI` tools ignore keys beside a reference.
+/// Moves the keys beside a reference into an `allOf`: `OpenAPI` tools ignore keys beside a
+/// reference.
 fn apart(schema: &mut Schema) {
     let Some(object) = schema.as_object_mut() else {
         return;

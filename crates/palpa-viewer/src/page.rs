@@ -1,4 +1,4 @@
-//! The page, which is in the binary.
+//! The web page's files, embedded in the binary.
 
 use axum::{
     body::Bytes,
@@ -8,7 +8,7 @@ use axum::{
 use rust_embed::RustEmbed;
 use std::{borrow::Cow, fmt::Write as _};
 
-/// What Vite made of `web/`. It may be missing where the library is built alone.
+/// The output of Vite from `web/`. It may be missing if this library is built alone.
 #[derive(RustEmbed)]
 #[folder = "../../web/dist"]
 #[allow_missing = true]
@@ -31,14 +31,15 @@ cd ..
 cargo build --release</pre>
 ";
 
-/// A file of the page.
+/// Serves one file of the page.
 pub(crate) async fn file(uri: Uri, headers: HeaderMap) -> Response {
     serve(uri.path().trim_start_matches('/'), &headers)
 }
 
 fn serve(path: &str, headers: &HeaderMap) -> Response {
     let path = if path.is_empty() { "index.html" } else { path };
-    // Names with a dot in front are not of the page: what keeps the folder in the repository.
+    // Names that start with a dot are not part of the page: they keep the empty folder in the
+    // repository.
     let found = (!path.starts_with('.')).then(|| Dist::get(path)).flatten();
     let Some(found) = found else {
         return if path == "index.html" {
@@ -49,7 +50,8 @@ fn serve(path: &str, headers: &HeaderMap) -> Response {
         };
     };
     let tag = tag(&found.metadata.sha256_hash()[..16]);
-    // Vite puts a hash of its content into the name of each file in `assets`.
+    // Vite puts a hash of the content into the name of each file in `assets`, so these never
+    // change.
     let keep = if path.starts_with("assets/") {
         "public, max-age=31536000, immutable"
     } else {

@@ -1,4 +1,4 @@
-//! What can be asked over HTTP.
+//! The HTTP routes.
 
 use crate::{
     api_page,
@@ -100,7 +100,8 @@ async fn socket(
         .on_upgrade(move |socket| client::serve(socket, hub, place))
 }
 
-/// A request of a program. Refused with 409 while a page controls, unless it takes control.
+/// A program's request. Refused with status 409 while a page is in control, unless it takes
+/// control.
 async fn control(
     State(hub): Shared,
     headers: HeaderMap,
@@ -122,7 +123,8 @@ async fn control(
         let why = "too many requests; at most 200 a second";
         return refuse(StatusCode::TOO_MANY_REQUESTS, None, why);
     }
-    // Forms of other pages cannot have this type, and scripts of theirs would have to ask for leave.
+    // Protection against other sites: their forms cannot send this content type, and their scripts
+    // would need CORS permission.
     let is_json = headers
         .get(header::CONTENT_TYPE)
         .and_then(|v| v.to_str().ok())
@@ -148,7 +150,7 @@ async fn control(
     let (answer, outcome) = oneshot::channel();
     let id = envelope.id;
     hub.ask(Controller::Program, envelope.request, move |outcome| {
-        // Nobody waits for it any more.
+        // The receiver may have timed out.
         let _ = answer.send(outcome);
     });
     match timeout(ANSWER_WAIT, outcome).await {
@@ -204,7 +206,7 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
     };
     let host = Arc::clone(&hub.host);
     let made = spawn_blocking(move || {
-        // Kept though who asked may be gone: the file is made all the same.
+        // Held until the file is made, even if the client has gone: the work goes on.
         let _permit = permit;
         host.file(file)
     })

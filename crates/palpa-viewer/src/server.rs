@@ -1,4 +1,4 @@
-//! The server: a thread of its own, which ends when the server is dropped.
+//! The server. It runs on a thread of its own and ends when it is dropped.
 
 use crate::{
     board::{Board, Publisher},
@@ -26,23 +26,23 @@ use tokio::{
 };
 
 const THREAD: &str = "palpa-web";
-/// Shorter tokens can be guessed.
+/// Minimum length of a token, in characters. Shorter ones can be guessed.
 const MIN_TOKEN: usize = 8;
-/// Threads that make files, at most.
+/// Largest number of threads that make files.
 const FILE_THREADS: usize = 2;
-/// Connections that wait to be taken.
+/// Connections that may wait to be accepted.
 const BACKLOG: u32 = 128;
-/// How long an answer that is under way may take when the server ends.
+/// Time that answers under way may still take when the server ends.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
-/// Where the server is, and who may come.
+/// The server's address and access rules.
 #[derive(Clone, PartialEq, Eq)]
 pub struct ServerParams {
-    /// The address to listen at; any but loopback needs a token.
+    /// The address to listen on. Any address except loopback needs a token.
     pub bind: IpAddr,
-    /// The port; 0 is any that is free.
+    /// The port; 0 for any free port.
     pub port: u16,
-    /// What who comes must know.
+    /// The token that every client must present.
     pub token: Option<String>,
 }
 
@@ -50,7 +50,7 @@ pub struct ServerParams {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServerError {
-    /// Anyone could come.
+    /// Without a token, everyone in the network could connect.
     #[error(
         "--bind {bind} lets everyone in the network see and control the session; give --token, or bind to 127.0.0.1"
     )]
@@ -58,13 +58,13 @@ pub enum ServerError {
         /// The address.
         bind: IpAddr,
     },
-    /// The token can be guessed.
+    /// The token is short enough to be guessed.
     #[error("a token of {found} bytes; expected {MIN_TOKEN} or more, as of `openssl rand -hex 16`")]
     ShortToken {
         /// Its length.
         found: usize,
     },
-    /// Another program listens there.
+    /// Another program listens on this port.
     #[error(
         "port {port} of {bind} is in use, maybe by another `palpa view`; end it, or give --port 0 for any free one"
     )]
@@ -74,10 +74,10 @@ pub enum ServerError {
         /// The port.
         port: u16,
     },
-    /// The system does not let us.
+    /// The system does not allow listening on this address.
     #[error("cannot listen at {address}: {source}; give another --port or --bind")]
     Listen {
-        /// Where.
+        /// The address.
         address: SocketAddr,
         /// The system's reason.
         source: io::Error,
@@ -90,7 +90,7 @@ pub enum ServerError {
     },
 }
 
-/// A server that runs. Dropped, it lets its clients go and ends.
+/// A running server. When it is dropped, it closes all connections and ends.
 pub struct Server {
     address: SocketAddr,
     token: Option<String>,
@@ -103,7 +103,7 @@ impl Server {
     /// Starts a server on a thread of its own.
     ///
     /// # Errors
-    /// [`ServerError`]: an address that cannot be had, or one that must not without a token.
+    /// [`ServerError`]: the address is not available, or needs a token.
     pub fn start(params: &ServerParams, host: Arc<dyn Host>) -> Result<Self, ServerError> {
         let guard = params.guard()?;
         let at_thread = |source| ServerError::Thread { source };
@@ -121,7 +121,8 @@ impl Server {
         let (listener, address) = match listening {
             Ok(listening) => listening,
             Err(source) => {
-                // Dropped, it would wait, which one who calls from another runtime must not.
+                // Dropping the runtime would block, which is not allowed inside a caller's own
+                // runtime.
                 runtime.shutdown_background();
                 return Err(params.refusal(source));
             }
@@ -142,12 +143,12 @@ impl Server {
         })
     }
 
-    /// Where it listens.
+    /// The address that the server listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What shows things to pages.
+    /// The handle through which the session sends to pages.
     pub fn publisher(&self) -> Publisher {
         self.publisher.clone()
     }
@@ -161,7 +162,7 @@ impl Server {
         })
     }
 
-    /// The same for who reaches this machine at that address.
+    /// The same URL, with the address `ip` under which another machine reaches this one.
     pub fn url_at(&self, ip: IpAddr) -> String {
         let mut url = format!("http://{}/", SocketAddr::new(ip, self.address.port()));
         if let Some(token) = &self.token {
@@ -182,7 +183,7 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.closing.send_replace(true);
         if let Some(thread) = self.thread.take() {
-            // A panic was reported where it happened.
+            // A panic has been reported where it happened.
             let _ = thread.join();
         }
     }
@@ -224,7 +225,7 @@ impl ServerParams {
     }
 }
 
-/// The token is nobody's business.
+/// Hides the token.
 impl fmt::Debug for ServerParams {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ServerParams")
@@ -240,11 +241,13 @@ fn listen(address: SocketAddr) -> io::Result<(TcpListener, SocketAddr)> {
         SocketAddr::V4(_) => TcpSocket::new_v4(),
         SocketAddr::V6(_) => TcpSocket::new_v6(),
     }?;
-    // As std does: a port whose last connections still fade can be had again. Elsewhere the option means another thing.
+    // As in the standard library: reuse a port whose last connections are still closing. On other
+    // systems the option has another meaning.
     if cfg!(unix) {
         socket.set_reuseaddr(true)?;
     }
-    // Connections inherit it. What waits in the system's buffers is old when it arrives.
+    // Accepted connections inherit the size. Data that waits in a large system buffer is old when
+    // it arrives.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     socket.bind(address)?;
     let listener = socket.listen(BACKLOG)?;
@@ -254,7 +257,7 @@ fn listen(address: SocketAddr) -> io::Result<(TcpListener, SocketAddr)> {
 
 fn run(runtime: Runtime, listener: TcpListener, hub: &Arc<Hub>) {
     runtime.block_on(serve(listener, hub));
-    // Files that are being made are not waited for longer than this.
+    // Do not wait longer than this for files that are being made.
     runtime.shutdown_timeout(LAST_ANSWERS);
     hub.tell_clients();
 }
@@ -272,7 +275,7 @@ async fn serve(listener: TcpListener, hub: &Arc<Hub>) {
             let _ = timeout(LAST_ANSWERS, serving).await;
         }
     }
-    // Each client says good-bye.
+    // Wait until each connection is closed.
     let all = hub.places.acquire_many(MAX_CLIENTS as u32);
     let _ = timeout(2 * CLOSE_WAIT, all).await;
 }

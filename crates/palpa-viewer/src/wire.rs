@@ -1,17 +1,19 @@
-//! Snapshots: what a page draws, as bytes. These types are the only definition of the wire; the page's reader is made of them.
+//! Snapshots: the binary messages with the picture. These types are the only definition of the
+//! format; the page's reader is generated from them.
 //!
-//! A snapshot is a message of its own: version (u32), kind (u32), then the fields in order, little-endian, each at a multiple of
-//! its own size (of its items' size, and at least 4, for lists), so that a page can look at lists in place. A list is its
-//! length (u32), then its items.
+//! Each snapshot is one message: version (u32), kind (u32), then the fields in order,
+//! little-endian. A number starts at a multiple of its own size. A list is its length (u32), then
+//! its items, which start at a multiple of their size. So a page can use lists in place, without a
+//! copy.
 
 use std::fmt::Write as _;
 
-/// Raised with every change of a field.
+/// Increased with every change of a field.
 pub const SNAPSHOT_VERSION: u32 = 2;
 
 /// A type that a snapshot can hold.
 trait Wire {
-    /// What a page calls it, and how it reads it.
+    /// Its type in TypeScript.
     const TYPE: &'static str;
     const READ: &'static str;
     fn put(&self, out: &mut Vec<u8>);
@@ -69,7 +71,7 @@ fixed! {
     4, "[number, number, number, number]", "[r.f64(), r.f64(), r.f64(), r.f64()]";
 }
 
-/// Makes a struct, its bytes, and its part of the page's reader.
+/// Defines a struct, its encoder, and its part of the page's reader.
 macro_rules! snapshot {
     ($(#[doc = $doc:literal])* $name:ident = $kind:literal { $($(#[doc = $field_doc:literal])* $field:ident: $type:ty,)* }) => {
         $(#[doc = $doc])*
@@ -77,7 +79,7 @@ macro_rules! snapshot {
         pub struct $name { $($(#[doc = $field_doc])* pub $field: $type,)* }
 
         impl $name {
-            /// As bytes.
+            /// The snapshot as bytes.
             pub fn encode(&self) -> Vec<u8> {
                 let mut out = Vec::new();
                 SNAPSHOT_VERSION.put(&mut out);
@@ -102,78 +104,84 @@ macro_rules! snapshot {
 }
 
 snapshot! {
-    /// A body at rest: sent to each page once, and again when the mesh changes.
+    /// A body at rest. Sent to each page once, and again when the mesh changes.
     MeshSnapshot = 1 {
-        /// Its number; frames say to which they belong.
+        /// Number of the mesh; each frame names the mesh that it belongs to.
         mesh: u32,
-        /// Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level 0 is the skin, the last is held by bone or base.
+        /// Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level
+        /// 0 is the skin, the last level is held by bone or base.
         n_levels: u32,
-        /// Nodes at rest, m: x, y, z one after the other.
+        /// Nodes at rest, m: x, y, z of each in turn.
         positions: Vec<f32>,
-        /// Triangles of the skin, outward: three vertices each. Under each stands a prism per interval between levels.
+        /// Triangles of the skin, oriented outward: three vertices each. Under each triangle is one
+        /// prism per interval between two levels.
         triangles: Vec<u32>,
-        /// The layer of each interval.
+        /// Index of the layer that each interval belongs to.
         interval_layer: Vec<u8>,
-        /// Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at `t * (n_levels - 1) + i`.
+        /// Young's modulus at small strain of every prism, Pa (N/m for bars): prism (t, i) at
+        /// `t * (n_levels - 1) + i`.
         stiffness: Vec<f32>,
         /// Vertices of the bones' surfaces, m; they do not move.
         bone_positions: Vec<f32>,
-        /// Their triangles.
+        /// Triangles of the bones' surfaces.
         bone_triangles: Vec<u32>,
     }
 }
 
 snapshot! {
-    /// A moment of a body that is pressed, and of who presses.
+    /// One moment of the pressed body and of the tool.
     FrameSnapshot = 2 {
-        /// The mesh that it belongs to.
+        /// Number of the mesh that the frame belongs to.
         mesh: u32,
-        /// Counts frames.
+        /// Counts the frames.
         sequence: u32,
-        /// Whether it is of a recording (1) or of now (0).
+        /// 1 for a frame of a recording, 0 for a live one.
         is_replay: u32,
-        /// The tick of the 1 kHz loop.
+        /// Number of the tick of the 1 kHz loop.
         tick: f64,
-        /// When that was, s since the engine's start; in a recording, since its beginning.
+        /// Time of the tick, s since the engine's start; in a recording, s since its start.
         time: f64,
-        /// Where the device is: the tip of the tool as the hand holds it, m.
+        /// Position of the device: the tip of the tool as the hand holds it, m.
         device: [f64; 3],
-        /// Where the tip of the tool is, m: stands off the device where the tissue is stiffer than the device can render.
+        /// Position of the tool's tip, m. It differs from the device where the tissue is stiffer
+        /// than the device can render.
         tool: [f64; 3],
-        /// How the tool is turned: quaternion i, j, k, w.
+        /// Orientation of the tool: quaternion i, j, k, w.
         orientation: [f64; 4],
-        /// Force on the hand, N, as commanded at this tick.
+        /// Force on the hand commanded at this tick, N.
         force: [f64; 3],
-        /// How far the tip is under the skin at rest, m.
+        /// Depth of the tip below the skin at rest, m.
         depth: f64,
-        /// Deepest that the hand goes there, m: what is under the skin is not thicker.
+        /// Largest depth that the hand presses there, m; the thickness of the tissue limits it.
         deepest: f64,
-        /// Share of the force that is let through; below 1 after a fault.
+        /// Factor on the force, 0 to 1; below 1 after a fault.
         gain: f64,
-        /// Vertices that touch.
+        /// Number of skin vertices in contact.
         n_active: u32,
-        /// How the tissue's last step went: 0 converged, 1 unfinished, 2 behind the tool, 3 settling, 4 failed.
+        /// Result of the tissue's last step: 0 converged, 1 unfinished, 2 behind the tool, 3
+        /// settling, 4 failed.
         step_status: u32,
-        /// What was wrong at this tick, as bits.
+        /// Faults at this tick, as bits.
         faults: u32,
-        /// Limits that the force met, as bits.
+        /// Force limits reached at this tick, as bits.
         limits: u32,
         /// Length of one unit of `displacements`, m.
         displacement_unit: f64,
-        /// Displacements of the nodes: x, y, z one after the other.
+        /// Displacements of the nodes: x, y, z of each in turn.
         displacements: Vec<i16>,
-        /// Which field follows: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch.
+        /// Field in `field_values`: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest
+        /// stretch.
         field: u32,
-        /// The field's value at 0.
+        /// Field value that 0 stands for.
         field_min: f64,
-        /// The field's value at 65535.
+        /// Field value that 65535 stands for.
         field_max: f64,
-        /// The field at the nodes; empty without one.
+        /// The field at the nodes; empty without a field.
         field_values: Vec<u16>,
     }
 }
 
-/// The page's reader of snapshots, as a TypeScript module.
+/// The page's reader of snapshots, as TypeScript source.
 pub fn typescript() -> String {
     let mut out = format!(
         "// Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.\n\n\

@@ -1,4 +1,4 @@
-//! From a scene to a layered body: surfaces read, made safe, cut and grown.
+//! From a scene to a layered body: surfaces are read, repaired, cut and grown.
 
 use std::path::{Path, PathBuf};
 
@@ -15,26 +15,29 @@ use palpa_scene::{
 
 use crate::note::Note;
 
-/// A place further from the skin than this share of the body's size is taken for a mistake in frame or unit.
+/// A place further from the skin than this share of the body's size is refused: its frame or unit
+/// is probably wrong.
 const FAR_FROM_SKIN: f64 = 0.25;
 
-/// Sizes of surfaces about which nothing is said, from a fingertip to a person. m
+/// Sizes of surfaces that need no note, from a fingertip to a person, m.
 const USUAL_SIZE: std::ops::Range<f64> = 0.003..4.0;
 
 /// A body ready to be pressed.
 #[derive(Debug)]
 pub struct BuiltBody {
-    /// The layered body and what its growth led to.
+    /// The layered body, and the results of its growth.
     pub growth: Growth,
     /// Bone surfaces, in metres.
     pub bones: Vec<Surface>,
     /// The skin vertex of the body that the scene presses on.
     pub press_vertex: usize,
-    /// Where on its skin the scene presses: the point nearest to the one that it names, which need not be a vertex. m
+    /// Place on the skin that the scene presses, m: the point nearest to the scene's target. It
+    /// need not be a vertex.
     pub press_at: Vec3,
-    /// For each lump of the scene the place on the skin that it lies under, if it is placed so. m
+    /// For each lump of the scene, the place on the skin above it, m; `None` if the scene places it
+    /// otherwise.
     pub lump_places: Vec<Option<Vec3>>,
-    /// What was done to the surfaces on the way and a user should know.
+    /// Remarks for the user on changes made to the surfaces.
     pub notes: Vec<Note>,
 }
 
@@ -46,10 +49,11 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
     build_within(scene, MAX_NODES)
 }
 
-/// The same for a body of so many nodes at most: a larger one is refused before it takes time and memory.
+/// As [`build`], but refuses a body with more than `max_nodes` nodes before it takes time and
+/// memory.
 ///
 /// # Errors
-/// As [`build`], and when the body is larger.
+/// As [`build`], and when the body has more nodes.
 pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody> {
     let mut notes = Vec::new();
     let (skin, bones) = match &scene.body.skin {
@@ -69,8 +73,8 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
         }
         Skin::Generated(generator) => generated(*generator),
     };
-    // Numbers of vertices count in the surface as it was read, before anything is mended or cut away: from here on
-    // places go by position.
+    // Vertex numbers refer to the surface as it was read, before repairs and cuts. From here on,
+    // places are positions.
     let press_at = point_of(&skin, &scene.press.target)?;
     let lumps_at = scene
         .lumps
@@ -135,13 +139,13 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
     })
 }
 
-/// The point that a target names on the skin as it was read; `None` for the middle.
+/// The point that a target names on the skin as it was read; `None` for the middle of the skin.
 fn point_of(skin: &Surface, target: &Target) -> anyhow::Result<Option<Vec3>> {
     match target {
         Target::Vertex(v) => match skin.points.get(*v as usize) {
             Some(p) => Ok(Some(*p)),
             None => bail!(
-                "skin vertex {v} is not there: the skin has {} vertices, numbered from 0",
+                "there is no skin vertex {v}: the skin has {} vertices, numbered from 0",
                 skin.points.len()
             ),
         },
@@ -154,7 +158,7 @@ fn point_of(skin: &Surface, target: &Target) -> anyhow::Result<Option<Vec3>> {
     }
 }
 
-/// The vertex of the body's skin at a place, refused where the place is not on the skin.
+/// The vertex of the body's skin at a place; an error if the place is not on the skin.
 fn vertex_at(skin: &Surface, at: Option<Vec3>, target: &Target) -> anyhow::Result<usize> {
     let point = at.unwrap_or_else(|| area_centroid(skin));
     let vertex = nearest(skin, point);
@@ -162,7 +166,7 @@ fn vertex_at(skin: &Surface, at: Option<Vec3>, target: &Target) -> anyhow::Resul
     let (lo, hi) = skin.bounds().unwrap_or_default();
     let size = (hi - lo).norm();
     match target {
-        // Welding moves a vertex by less than this.
+        // Welding moves a vertex by less than this distance.
         Target::Vertex(v) if distance > 1e-5 * size => bail!(
             "skin vertex {v} at ({}) mm is not part of the grown skin: it lies on a flat cut face or outside the \
              cut-out; press another vertex",
@@ -189,7 +193,7 @@ fn check_near(skin: &Surface, point: Vec3) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The refusal, with the files of the bones it speaks of.
+/// The error, with the file names of the bones that it mentions.
 fn with_bone_name(error: GrowthError, files: &[PathBuf]) -> anyhow::Error {
     let file = match &error {
         GrowthError::BoneOutside { bone, .. } | GrowthError::BoneApart { bone, .. } => {
@@ -212,7 +216,7 @@ pub(crate) fn nearest(skin: &Surface, point: Vec3) -> usize {
 
 /// A point in millimetres, for messages.
 pub fn in_mm(p: Vec3) -> String {
-    // Plus zero: no place is at "minus nothing".
+    // Adding zero turns -0 into 0.
     let [x, y, z] = [p.x, p.y, p.z].map(|c| (c * 1e4).round() / 10.0 + 0.0);
     format!("{x:.1}, {y:.1}, {z:.1}")
 }
@@ -228,7 +232,7 @@ fn area_centroid(surface: &Surface) -> Vec3 {
     if area > 0.0 { sum / area } else { sum }
 }
 
-/// Reads a surface; refuses one with a coordinate that is no number.
+/// Reads a surface. Refuses one with a coordinate that is not a finite number.
 pub(crate) fn read_in_metres(
     path: &Path,
     unit: LengthUnit,
@@ -264,7 +268,7 @@ pub(crate) fn read_in_metres(
     Ok(surface)
 }
 
-/// The surface with what is safe to repair repaired.
+/// The surface after all repairs that are safe.
 pub(crate) fn mended(surface: &Surface, path: &Path, notes: &mut Vec<Note>) -> Surface {
     let (mended, report) = repair(surface, &RepairOptions::default());
     if report.is_changed() {
@@ -314,7 +318,7 @@ fn layer_specs(scene: &Scene) -> anyhow::Result<Vec<LayerSpec>> {
     for layer in &scene.layers {
         let thickness = match &layer.thickness {
             Some(thickness) => Some(thickness_field(thickness, scene.body.unit)?),
-            // A block stands on a rigid base: its last layer takes what is left of the depth.
+            // A block stands on a rigid base: its last layer takes the remaining depth.
             None => match scene.body.skin {
                 Skin::Generated(Generator::Block { size, .. }) => {
                     Some(ThicknessField::Constant(size[2] - above))
@@ -324,7 +328,8 @@ fn layer_specs(scene: &Scene) -> anyhow::Result<Vec<LayerSpec>> {
         };
         match &thickness {
             Some(ThicknessField::Constant(d)) => above += d,
-            // The rest of a block is known only where the layers above are the same everywhere.
+            // The remaining depth of a block is known only if all layers above have uniform
+            // thickness.
             Some(_) if is_block && scene.layers.last().is_some_and(|l| l.thickness.is_none()) => {
                 bail!(
                     "layer \"{}\" of a block varies in thickness, so the last layer cannot take the rest of the depth; \
@@ -363,7 +368,7 @@ fn thickness_field(thickness: &Thickness, unit: LengthUnit) -> anyhow::Result<Th
     })
 }
 
-/// Says so when a cut-out's rim is so near that it would be felt.
+/// Adds a note if the rim of a cut-out is near enough to influence the force.
 fn note_margin(scene: &Scene, growth: &Growth, radius: f64, notes: &mut Vec<Note>) {
     const ENOUGH: f64 = 2.0;
     let tool = scene.tool.contact_radius();

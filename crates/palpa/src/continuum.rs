@@ -1,4 +1,4 @@
-//! From a scene to what the continuum model takes: materials, lumps, supports, tool.
+//! Converts a scene to the input of the continuum model: materials, lumps, supports, tool.
 
 use anyhow::{Context as _, bail};
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -20,14 +20,16 @@ use crate::build::{BuiltBody, in_mm, mended, read_in_metres};
 use crate::note::{Note, xyz};
 use crate::press::lump::share_inside;
 
-/// A lump of which less lies in the tissue is an error; of which less than that, worth a note.
+/// Least share of a lump's volume that must lie in the tissue; less is an error. A share between
+/// this and `FULL_SHARE` gives a note.
 const LEAST_SHARE: f64 = 0.01;
 const FULL_SHARE: f64 = 0.95;
 
-/// What the scene's tissues are: first those of the layers, then those of the lumps, each in its order.
+/// Materials of the layers, then of the lumps, each in the order of the scene.
 ///
 /// # Errors
-/// When a tissue is given by a spring stiffness, which no continuum has, or its law does not exist.
+/// When a tissue is given by a spring stiffness, which a continuum does not have, or its law is not
+/// valid.
 pub fn materials(scene: &Scene) -> anyhow::Result<Vec<Material>> {
     let layers = scene.layers.iter().map(|l| (&l.tissue, l.prestress));
     let lumps = scene.lumps.iter().map(|l| (&l.tissue, 0.0));
@@ -37,10 +39,10 @@ pub fn materials(scene: &Scene) -> anyhow::Result<Vec<Material>> {
         .collect()
 }
 
-/// A tissue as a material under this tension in its plane (Pa).
+/// The material of a tissue under tension `prestress` in its plane, Pa.
 ///
 /// # Errors
-/// When the tissue is given by a spring stiffness, or its law does not exist.
+/// When the tissue is given by a spring stiffness, or its law is not valid.
 pub fn material(tissue: &Tissue, prestress: f64) -> anyhow::Result<Material> {
     let in_tissue = || format!("tissue \"{}\"", tissue.name);
     let elastic = tissue.elastic().with_context(|| {
@@ -96,14 +98,14 @@ fn law(elastic: &Elastic) -> Result<Law, LawError> {
     })
 }
 
-/// The scene's lumps in their places under the body's skin, those that are meshes with their surface there (m). The material
-/// of the i-th is that of [`materials`] after those of the layers.
+/// The scene's lumps in their places under the body's skin. A lump that is a mesh comes with its
+/// surface there, m. The material of the i-th lump follows those of the layers in [`materials`].
 ///
 /// # Errors
-/// When a mesh cannot be read or has no inside, or a lump lies outside the body.
+/// When a mesh cannot be read or is not closed, or a lump lies outside the body.
 ///
 /// # Panics
-/// When `built` is not the scene's.
+/// When `built` is the body of another scene.
 pub fn lumps(
     scene: &Scene,
     built: &BuiltBody,
@@ -127,7 +129,7 @@ pub fn lumps(
             (LumpPlace::AsRead, LumpShape::Mesh(mesh)) => (mesh.centroid(), Vec3::zeros()),
             (LumpPlace::AsRead, _) => unreachable!("only a mesh is placed as it was read"),
         };
-        // A mesh stands as it was drawn.
+        // A mesh keeps the orientation of its file.
         let rotation = match &shape {
             LumpShape::Mesh(_) => UnitQuaternion::identity(),
             _ => turned_to(lump.axes(inward.into())),
@@ -136,7 +138,7 @@ pub fn lumps(
         let material = scene.layers.len() + i;
         let made = Lump::new(shape, pose, lump.transition, material).with_context(of_lump)?;
         check_place(&made, &lump.name, &built.growth.body, notes)?;
-        // A mesh is moved so that its centroid is in its place.
+        // A mesh is moved so that its centroid lies at the lump's place.
         let drawn = drawn.map(|mut surface| {
             if let LumpShape::Mesh(mesh) = made.shape() {
                 let shift = made.pose().translation.vector - mesh.centroid();
@@ -149,7 +151,7 @@ pub fn lumps(
     Ok(lumps)
 }
 
-/// Whether a lump lies in the tissue.
+/// Checks that a lump lies in the tissue.
 fn check_place(
     lump: &Lump,
     name: &str,
@@ -200,13 +202,13 @@ fn lump_shape(
     Ok((shape, None))
 }
 
-/// The rotation of a frame given by its three axes.
+/// The rotation to a frame given by its three axes.
 fn turned_to(axes: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
     let columns = Mat3::from_columns(&axes.map(Vec3::from));
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
 }
 
-/// A skin prepared for the question what is nearest.
+/// A skin with an index for nearest-point queries.
 struct Skin<'a> {
     surface: &'a Surface,
     index: SurfaceIndex,
@@ -222,7 +224,8 @@ impl<'a> Skin<'a> {
         }
     }
 
-    /// The point of the skin nearest to `p`, and the inward normal there, between those of the vertices.
+    /// The point of the skin nearest to `p`, and the inward normal there, interpolated between the
+    /// vertices.
     fn nearest(&self, p: Vec3) -> (Vec3, Vec3) {
         let Some(closest) = self.index.closest(p) else {
             return (p, -Vec3::z()); // a skin without triangles grows no body
@@ -230,7 +233,7 @@ impl<'a> Skin<'a> {
         let t = closest.triangle as usize;
         let [a, b, c] = self.surface.corners(t);
         let q = closest.point;
-        // Areas of the parts opposite to each corner are its weights.
+        // Barycentric weights: the area opposite to each corner.
         let part = |u: Vec3, v: Vec3| (u - q).cross(&(v - q)).norm();
         let weights = [part(b, c), part(c, a), part(a, b)];
         let normal: Vec3 = (self.surface.triangles[t].iter().zip(weights))
@@ -243,8 +246,8 @@ impl<'a> Skin<'a> {
     }
 }
 
-/// What holds the body: its base, and its cut faces as the scene says. Faces that cannot be held so are left free, with
-/// a note.
+/// The supports of the body: its base, and its cut faces as the scene says. Faces that cannot be
+/// held that way are left free, with a note.
 pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<Note>) -> Supports {
     let mut supports = Supports::on_base(body);
     for face in &body.cut_faces {
@@ -268,11 +271,11 @@ pub fn supports(cut_faces: CutFaces, body: &LayeredBody, notes: &mut Vec<Note>) 
     supports
 }
 
-/// The rigid tool of a scene, and where it stands when it moves along the unit vector `direction` and its tip is at
-/// `tip`.
+/// The rigid tool of a scene, and its pose with the tip at `tip` when it moves along the unit
+/// vector `direction`.
 ///
 /// # Errors
-/// When its sizes make no shape.
+/// When the sizes do not give a valid shape.
 pub fn tool(given: &ContactTool, direction: Vec3, tip: Vec3) -> anyhow::Result<(Tool, Pose)> {
     let shape = tool_shape(&given.shape)?;
     let pose = Pose::from_parts(tip.into(), turned_to(given.axes(direction.into())));

@@ -1,8 +1,10 @@
-//! Feel what lies beneath the skin: from a scene to a layered body that is pressed by script or touched live.
+//! Feel what lies beneath the skin: from a scene to a layered body that is pressed by script or
+//! touched live.
 //!
-//! A skin surface is grown inward into layers of triangular prisms, pressed with a tool, and pushes back in newtons.
-//! The parts are crates of their own, re-exported here. Pictures and files are in `palpa-plot`, the viewer in
-//! `palpa-viewer` and `palpa-session`, verification and benchmarks in `palpa-lab`, the command in `palpa-cli`.
+//! A skin surface is grown inward into layers of triangular prisms, pressed with a tool, and pushes
+//! back in newtons. The parts are crates of their own, re-exported here. Pictures and files are in
+//! `palpa-plot`, the viewer in `palpa-viewer` and `palpa-session`, verification and benchmarks in
+//! `palpa-lab`, the command in `palpa-cli`.
 //!
 //! ```
 //! use std::path::Path;

@@ -1,11 +1,13 @@
-//! What a user should know beside a result: typed, with the names and numbers inside.
+//! Remarks on a result for the user: typed, with names and numbers.
 //!
-//! [`Display`](fmt::Display) has the English words that the command prints and files keep. The page of the viewer gets the
-//! same notes as JSON and has words of its own in each of its languages.
+//! [`Display`](fmt::Display) gives the English text that the command prints and that files contain.
+//! The viewer's page gets the same notes as JSON and has its own texts, one for each of its
+//! languages.
 //!
-//! To add a note: a variant here with its numbers in SI units, its words in `fmt` below, and its words in both languages in
-//! `web/src/i18n/notes.ts`. Then run `PALPA_BLESS=1 cargo test -p palpa` and, in `web/`, `npm run generate`: without an
-//! entry the page does not compile.
+//! To add a note: add a variant here with its numbers in SI units, its English text in `fmt` below,
+//! and its texts in both languages in `web/src/i18n/notes.ts`. Then run
+//! `PALPA_BLESS=1 cargo test -p palpa` and, in `web/`, `npm run generate`: without the texts the
+//! page does not compile.
 
 use std::fmt;
 
@@ -14,7 +16,7 @@ use palpa_mesh::Vec3;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Something a user should know. Lengths in m, angles in rad, points `[x, y, z]` in m.
+/// A remark for the user. Lengths in m, angles in rad, points `[x, y, z]` in m.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -41,26 +43,26 @@ pub enum Note {
         n_welded: usize,
         /// Triangles without area that were dropped.
         n_degenerate: usize,
-        /// Triangles that were there twice.
+        /// Duplicate triangles that were dropped.
         n_duplicate: usize,
-        /// Vertices of no triangle that were dropped.
+        /// Unused vertices that were dropped.
         n_unused: usize,
         /// Triangles that were turned outward.
         n_flipped: usize,
     },
     /// Triangles of the body's base pass through each other.
     BaseOverlaps {
-        /// Pairs of triangles.
+        /// Number of pairs of triangles.
         n_pairs: usize,
     },
-    /// The rim of a cut-out is so near that it may be felt.
+    /// The rim of a cut-out is near enough to influence the force.
     CutoutNear {
         /// Radius of the cut-out, m.
         radius: f64,
-        /// Radius from which on the rim is not felt, m.
+        /// Radius from which the rim has no influence, m.
         enough: f64,
     },
-    /// The tool goes down at a slant.
+    /// The tool goes down at an angle to the skin's normal.
     ObliquePress {
         /// Angle to the inward normal of the skin, rad.
         angle: f64,
@@ -69,44 +71,44 @@ pub enum Note {
     PressOnCutFace,
     /// The skin could not be refined as far as wanted.
     SkinTooCoarse {
-        /// Triangles that are larger than wanted.
+        /// Number of triangles that are larger than wanted.
         n_triangles: usize,
-        /// The limit that was reached.
+        /// The limit on skin vertices that was reached.
         max_vertices: usize,
     },
     /// Levels could not be split as far as wanted.
     LevelsTooHigh {
-        /// The limit that was reached.
+        /// The limit on levels that was reached.
         max_levels: usize,
     },
-    /// The mesh is not refined round a lump that gives no size.
+    /// The mesh is not refined around a lump that has no size of its own.
     LumpNotRefined {
         /// Name of the lump.
         lump: String,
     },
-    /// A lump reaches out of the tissue.
+    /// A lump lies partly outside the tissue.
     LumpPartlyOutside {
         /// Name of the lump.
         lump: String,
-        /// Share of its volume in the tissue.
+        /// Share of its volume that lies in the tissue, 0 to 1.
         share: f64,
         /// Its middle, m.
         at: [f64; 3],
     },
     /// The edge of a bonded disc could not be cut into the skin's mesh.
     DiscNotImprinted {
-        /// Why, in English.
+        /// The reason, in English.
         why: String,
     },
-    /// Which skin a bonded disc holds where its edge is not part of the mesh.
+    /// The skin that a bonded disc holds if its edge is not part of the mesh.
     DiscPatch {
-        /// Vertices under the disc.
+        /// Number of vertices under the disc.
         n_vertices: usize,
         /// Radius of the disc, m.
         radius: f64,
-        /// Where it presses, m.
+        /// Place of the disc, m.
         at: [f64; 3],
-        /// Radius of the circle with the area that is held, m.
+        /// Radius of the circle with the held area, m.
         effective_radius: f64,
     },
     /// A cut face that is not flat cannot be a plane of symmetry.
@@ -114,68 +116,68 @@ pub enum Note {
         /// A point of the face, m.
         at: [f64; 3],
     },
-    /// Several speeds were asked for, and nothing depends on speed.
+    /// Several speeds were given, but nothing depends on the speed.
     SpeedsAlike,
     /// Many triangles of the skin have no partner to be paired with.
     SingleTriangles {
-        /// Triangles without a partner.
+        /// Number of triangles without a partner.
         n: usize,
-        /// All triangles.
+        /// Number of all triangles.
         n_all: usize,
     },
     /// The mesh under the tool is coarse for the size of the contact.
     CoarseUnderTool {
         /// Mean length of the skin's edges near the tool, m.
         edge: f64,
-        /// Radius of the tool that presses, m.
+        /// Radius of the tool's pressing part, m.
         radius: f64,
     },
     /// The mesh under the tool is coarse for its rounded edge.
     CoarseAtEdge {
         /// Mean length of the skin's edges near the tool, m.
         edge: f64,
-        /// Radius of the tool's edge, m.
+        /// Radius of the tool's rounded edge, m.
         edge_radius: f64,
     },
-    /// Free cut faces let go of the tension of a layer.
+    /// Free cut faces release the tension of a layer.
     TensionLost {
         /// Name of the layer's tissue.
         layer: String,
     },
-    /// Steps are long for friction.
+    /// Steps are too long for friction.
     LongFrictionSteps {
         /// Length of a step, m.
         step: f64,
-        /// Length that is short enough, m.
+        /// Largest step length that is short enough, m.
         enough: f64,
     },
-    /// Few vertices of the reference method lie under the disc.
+    /// Few vertices lie under the disc of the reference method.
     FewUnderDisc {
-        /// Vertices under the disc.
+        /// Number of vertices under the disc.
         n_vertices: usize,
         /// Radius of the disc, m.
         radius: f64,
         /// Mean length of the skin's edges near the tool, m.
         edge: f64,
     },
-    /// Bars have no tension at rest.
+    /// The reference method leaves out the tension of layers: bars have none at rest.
     TensionLeftOut,
-    /// Bars have no time.
+    /// The reference method runs the first speed only: bars have no time dependence.
     FirstSpeedOnly,
-    /// Levels are too flat or too tall for bars to stand for a Young's modulus.
+    /// Levels are too flat or too tall for bars to represent a Young's modulus.
     BarAspects {
-        /// The layers that are.
+        /// The layers with such levels.
         layers: Vec<LayerAspect>,
-        /// Smallest sound ratio.
+        /// Smallest ratio at which bars represent it.
         least: f64,
-        /// Largest sound ratio.
+        /// Largest ratio at which bars represent it.
         most: f64,
     },
-    /// The first steps of the tissue relax the tension of layers.
+    /// The tension of layers relaxes during the first steps of the tissue.
     TensionRelaxes,
     /// The motion leaves the skin.
     MotionOffSkin {
-        /// How far along the motion, m.
+        /// Distance along the motion at which it leaves the skin, m.
         far: f64,
         /// Length of the motion, m.
         length: f64,
@@ -184,10 +186,10 @@ pub enum Note {
     ToolReplaced {
         /// The scene's tool, in English.
         tool: String,
-        /// What presses instead, in English.
+        /// The tool used instead, in English.
         by: String,
     },
-    /// The mesh under the tool is coarser than a press by script would make it.
+    /// The mesh under the tool is coarser than for a scripted press.
     CoarserForTouch {
         /// Length of the skin's edges under the tool, m.
         edge: f64,
@@ -196,33 +198,33 @@ pub enum Note {
     StepFailed {
         /// Speed of the run, m/s.
         speed: f64,
-        /// Depth that was to be reached, m.
+        /// Depth that the step should have reached, m.
         depth: f64,
-        /// Why and where.
+        /// The reason, and the place in the body.
         #[schemars(skip)]
         outcome: Outcome,
     },
     /// Prisms have a corner that is turned inside out.
     TurnedPrisms {
-        /// How many.
+        /// Number of prisms.
         n: usize,
-        /// At which depth, m.
+        /// Depth at which it happened, m.
         depth: f64,
-        /// The middle of the worst, m.
+        /// The middle of the worst prism, m.
         at: [f64; 3],
     },
     /// Friction had to be smoothed.
     FrictionSmoothed {
-        /// In how many steps.
+        /// Number of steps with smoothed friction.
         n: usize,
-        /// Of how many.
+        /// Number of all steps.
         n_all: usize,
         /// Largest slip over which it was smoothed, m.
         slip: f64,
     },
     /// Few vertices touch the tool.
     FewTouching {
-        /// How many at most.
+        /// Largest number of vertices in contact.
         n_vertices: usize,
         /// Radius of the circle with the largest contact area, m.
         radius: f64,
@@ -241,9 +243,9 @@ pub struct LayerAspect {
 }
 
 impl Note {
-    /// Whether the note gives away that there is a lump, or where.
+    /// Whether the note reveals that there is a lump, or its place.
     pub fn is_about_lumps(&self) -> bool {
-        // Skin and levels may be too coarse just because of a lump.
+        // A lump alone can make skin or levels too coarse.
         matches!(
             self,
             Self::LumpNotRefined { .. }
@@ -259,12 +261,12 @@ pub fn note_schema() -> serde_json::Value {
     schemars::schema_for!(Note).to_value()
 }
 
-/// Three coordinates, for a note.
+/// A point as an array, for a note.
 pub(crate) fn xyz(p: Vec3) -> [f64; 3] {
     p.into()
 }
 
-/// A point in millimetres.
+/// Shows a point in millimetres.
 struct Mm([f64; 3]);
 
 impl fmt::Display for Mm {
@@ -494,17 +496,17 @@ impl fmt::Display for Note {
     }
 }
 
-/// Rounded down to a hundredth that is not zero.
+/// Rounds down to hundredths, but never to zero.
 fn rounded(mm: f64) -> f64 {
     ((mm * 100.0).floor() / 100.0).max(0.01)
 }
 
-/// Without the digits that binary fractions leave behind.
+/// Removes the digits that come from binary fractions.
 fn tidy(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
 }
 
-/// How a step ended, in words.
+/// The outcome of a step, in words.
 pub fn in_words(outcome: &Outcome) -> String {
     let near = |at: &[f64; 3]| Mm(*at).to_string();
     match outcome {

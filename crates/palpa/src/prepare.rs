@@ -1,4 +1,5 @@
-//! A scene made ready to be pressed: everything that a press by script, a live session, a viewer and an export share.
+//! Prepares a scene for pressing: the steps that a scripted press, a live session, a viewer and an
+//! export share.
 //!
 //! ```text
 //! Scene ─► GrownBody ─► lumps in their places ─► mesh, refined where it is pressed ─► Model (built when first asked for)
@@ -25,12 +26,13 @@ use crate::press::Place;
 use crate::press::lump::{lump_shares, surface_of_shape};
 use crate::press::mesh::PressedBody;
 
-/// How a scene is prepared.
+/// Parameters of the preparation.
 #[derive(Debug, Clone)]
 pub struct PrepareParams {
-    /// A body of more nodes than this is refused before it is grown.
+    /// A body with more nodes than this is refused before it is grown.
     pub max_nodes: usize,
-    /// The skin is also refined at these distances from the place, along the scene's motion. m
+    /// Distances from the pressed place along the scene's motion at which the skin is refined too,
+    /// m.
     pub way: Vec<f64>,
 }
 
@@ -43,22 +45,22 @@ impl Default for PrepareParams {
     }
 }
 
-/// A scene with its body grown and refined, its lumps and materials in their places.
+/// A scene with its body grown and refined, and its lumps and materials in place.
 #[derive(Debug)]
 pub struct Prepared {
     /// The scene.
     pub scene: Scene,
     /// The body as it was grown, with its bones.
     pub grown: Arc<BuiltBody>,
-    /// Materials of the layers, then of the lumps; and the lumps in their places.
+    /// Materials of the layers, then of the lumps, and the placed lumps.
     pub materials: Materials,
-    /// The body refined where it is pressed, and the place.
+    /// The refined body, and the place that is pressed.
     pub mesh: PressedBody,
-    /// What holds the body.
+    /// The supports: which nodes of the body are fixed.
     pub supports: Supports,
-    /// What a user should know, in the order in which it was found.
+    /// Remarks for the user, in the order in which they arose.
     pub notes: Vec<Note>,
-    /// For each lump that is a mesh its surface as it was drawn. m
+    /// For each lump that is a mesh, its surface in its place at rest, m; else `None`.
     drawn: Vec<Option<Surface>>,
     model: OnceLock<Arc<Model>>,
 }
@@ -67,12 +69,13 @@ impl Prepared {
     /// Grows the scene's body and refines it where it is pressed.
     ///
     /// # Errors
-    /// When a file cannot be read, the body cannot be grown, or place, depth, tissues or lumps do not fit it.
+    /// When a file cannot be read, the body cannot be grown, or place, depth, tissues or lumps do
+    /// not fit it.
     pub fn build(scene: &Scene) -> anyhow::Result<Self> {
         Self::with_params(scene, &PrepareParams::default())
     }
 
-    /// The same with other parameters.
+    /// As [`Self::build`], with other parameters.
     ///
     /// # Errors
     /// As [`Self::build`].
@@ -81,7 +84,8 @@ impl Prepared {
         Self::on(scene, Arc::new(grown), &params.way)
     }
 
-    /// The same on a body that was grown for this scene.
+    /// As [`Self::build`], on a body already grown for this scene. `way` is [`PrepareParams::way`],
+    /// m.
     ///
     /// # Errors
     /// When place, depth, tissues or lumps do not fit the body.
@@ -109,29 +113,29 @@ impl Prepared {
         })
     }
 
-    /// Where the scene presses.
+    /// The place that the scene presses.
     pub fn place(&self) -> &Place {
         &self.mesh.place
     }
 
-    /// The lumps in their places, in the order of the scene.
+    /// The placed lumps, in the order of the scene.
     pub fn lumps(&self) -> &[Lump] {
         &self.materials.lumps
     }
 
-    /// The surface of each lump at rest. m
+    /// Surface of each lump at rest, m.
     pub fn lump_surfaces(&self) -> Vec<Surface> {
         (self.lumps().iter().zip(&self.drawn))
             .map(|(lump, drawn)| drawn.clone().unwrap_or_else(|| surface_of_shape(lump)))
             .collect()
     }
 
-    /// Share of every prism that is lump, by volume; empty without lumps. `[n_prisms]`
+    /// Share of each prism's volume that belongs to lumps; empty without lumps. `[n_prisms]`
     pub fn lump_shares(&self) -> Vec<f64> {
         lump_shares(&self.mesh.body, self.lumps())
     }
 
-    /// The finite elements of the refined body; built once, when they are first asked for.
+    /// The finite elements of the refined body; built on the first call.
     ///
     /// # Errors
     /// When the body cannot be pressed.
@@ -146,7 +150,7 @@ impl Prepared {
         Ok(Arc::clone(self.model.get_or_init(|| Arc::new(model))))
     }
 
-    /// How near equilibrium a step must come.
+    /// Tolerances of a step's equilibrium.
     pub fn solve_params(&self) -> SolveParams {
         SolveParams {
             tolerance: self.scene.model.tolerance,
@@ -154,15 +158,15 @@ impl Prepared {
         }
     }
 
-    /// Whether any layer is under tension at rest.
+    /// Whether any layer has tension at rest.
     pub fn is_tense(&self) -> bool {
         self.scene.layers.iter().any(|layer| layer.prestress != 0.0)
     }
 
-    /// The state before anything presses: under the tension of its layers, relaxed.
+    /// The state before anything presses: in equilibrium with the tension of the layers, relaxed.
     ///
     /// # Errors
-    /// When the body cannot be pressed, or finds no rest.
+    /// When the body cannot be pressed, or no equilibrium at rest is found.
     pub fn rest(&self) -> anyhow::Result<State> {
         let model = self.model()?;
         let mut state = State::new(&model);
@@ -185,7 +189,7 @@ impl Prepared {
         );
         if report.outcome != Outcome::Converged {
             bail!(
-                "the body finds no rest under the tension of its layers: {}; make `prestress` smaller, or hold the body with \
+                "the body has no equilibrium under the pre-stress of its layers: {}; make `prestress` smaller, or hold the body with \
                  cut_faces = \"fixed\"",
                 in_words(&report.outcome)
             );
@@ -193,11 +197,11 @@ impl Prepared {
         Ok(state)
     }
 
-    /// How the tool comes down on the place; none for a tool that is bonded to the skin. `rest` is the body's state at rest,
-    /// which may be left out where no layer is under tension.
+    /// The tool's straight way down to the place; `None` if the tool is bonded to the skin. `rest`
+    /// is the body's state at rest; it is needed only if a layer has tension.
     ///
     /// # Errors
-    /// When the tool's sizes make no shape.
+    /// When the sizes of the tool do not give a valid shape.
     pub fn approach(&self, rest: Option<&State>) -> anyhow::Result<Option<Approach>> {
         let Tool::Contact(given) = &self.scene.tool else {
             return Ok(None);
@@ -215,21 +219,21 @@ impl Prepared {
     }
 }
 
-/// The straight way of a tool down on the skin.
+/// The straight way of a tool down to the skin.
 #[derive(Debug, Clone, Copy)]
 pub struct Approach {
-    /// What presses.
+    /// The tool.
     pub tool: RigidTool,
-    /// The tool with its tip at the place at rest.
+    /// Pose of the tool with its tip at the place at rest.
     pose: Pose,
-    /// Unit vector along which it goes.
+    /// Unit vector of its movement.
     direction: Vec3,
-    /// How far along its way from `pose` it touches first, m.
+    /// Distance along the way from `pose` to the first touch, m.
     touch: f64,
 }
 
 impl Approach {
-    /// The tool at a depth below the first touch, m; above it where the depth is negative.
+    /// The tool at a depth below the first touch, m; a negative depth is above it.
     pub fn at(&self, depth: f64) -> PosedTool {
         let way = self.direction * (self.touch + depth);
         let translation = self.pose.translation.vector + way;
@@ -240,8 +244,8 @@ impl Approach {
     }
 }
 
-/// How far the tool can go along its way from `pose` until it touches the skin: 0 where its tip touches first, less where
-/// the skin beside it is higher. m
+/// Distance that the tool can go along its way from `pose` until it touches the skin, m: 0 if its
+/// tip touches first, negative if the skin beside the tip is higher.
 fn first_touch(
     body: &LayeredBody,
     rest: Option<&State>,

@@ -1,6 +1,7 @@
-//! A scripted indentation: the tool goes down, rests and comes back, and the force is kept.
+//! A scripted indentation: the tool goes down, rests and comes back, and the force is recorded.
 //!
-//! [`mod@reference`] does it with the network of bars of 2009, [`tissue`] with the continuum; where and when is common to both.
+//! [`mod@reference`] uses the network of bars of 2009, [`tissue`] the continuum. Both share the
+//! place and the waypoints.
 
 pub mod lump;
 pub mod mesh;
@@ -13,7 +14,7 @@ pub use place::{Place, column_length};
 pub use programme::{Phase, Waypoint, n_steps, waypoints};
 pub(crate) use reference::nodes_under_disc;
 
-/// Without the digits that binary fractions leave behind.
+/// Removes the digits that come from binary fractions.
 fn tidy(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
 }

@@ -538,8 +538,9 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
-         * @description The shape of a rigid tool. All lengths in metres. In its own frame its tip is the origin, x points along its length, and
-         *     z out of the tissue. At depth 0 the tip, in the middle of its face, touches the skin at rest.
+         * @description The shape of a rigid tool. All lengths in metres. In its own frame the tip is the origin, x
+         *     points along the length, and z points out of the tissue. At depth 0 the tip, in the middle of
+         *     the face, touches the skin at rest.
          */
         ContactShape: {
             /** @constant */
@@ -552,7 +553,7 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Radius of its edge's rounding, no more than `radius`.
+             * @description Radius of its rounded edge, no more than `radius`.
              */
             edge_radius: number;
             /** @constant */
@@ -578,12 +579,12 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Radius of its edges' rounding, no more than half its smallest size.
+             * @description Radius of its rounded edges, no more than half its smallest size.
              */
             edge_radius: number;
             /** @constant */
             kind: "box";
-            /** @description Its whole size along x, y and z. */
+            /** @description Its full size along x, y and z. */
             size: number[];
         } | {
             /** @constant */
@@ -600,7 +601,7 @@ export interface components {
             kind: "cone";
             /**
              * Format: double
-             * @description Whole angle at its tip, in radians.
+             * @description Full angle at its tip, in radians.
              */
             opening_angle: number;
             /**
@@ -610,16 +611,19 @@ export interface components {
             radius: number;
             /**
              * Format: double
-             * @description Radius of its tip's rounding, no more than `radius`.
+             * @description Radius of its rounded tip, no more than `radius`.
              */
             tip_radius: number;
         };
-        /** @description A change of one key of the scene file. */
+        /** @description A change to one key of the scene file. */
         Edit: {
-            /** @description JSON pointer into [`State::scene`], as "/layer/1/tissue/young"; "/lump/-" appends. */
+            /**
+             * @description JSON pointer into [`State::scene`], such as "/layer/1/tissue/young"; "/lump/-" appends a
+             *     lump.
+             */
             path: string;
             /**
-             * @description The new value, as in a scene file; null takes the key away.
+             * @description The new value, as in a scene file; null removes the key.
              * @default null
              */
             value: unknown;
@@ -628,7 +632,7 @@ export interface components {
         EngineFigures: {
             /**
              * Format: double
-             * @description What may be given out beyond what was taken in, J.
+             * @description Energy that the device may still give out beyond the energy taken in, J.
              */
             energy_budget: number;
             /**
@@ -638,56 +642,56 @@ export interface components {
             energy_in: number;
             /**
              * Format: double
-             * @description Energy given to it, J.
+             * @description Energy given to the hand since the start, J.
              */
             energy_out: number;
-            /** @description What happened last, newest last. */
+            /** @description The latest events, newest last. */
             events: components["schemas"]["EventInfo"][];
-            /** @description What was wrong since the last figures, in words. */
+            /** @description Names of the faults since the last figures. */
             faults: string[];
-            /** @description What the threads were granted, in words. */
+            /** @description Priorities and cores that the system granted to the threads, in words. */
             granted: string[];
             /**
              * Format: double
-             * @description From taking the pose to the force that is made of it, s, now: age of the patch.
+             * @description Age of the contact patch in use, s: time since its pose was read.
              */
             latency: number;
-            /** @description The same of lateness of ticks, s. */
+            /** @description Lateness of ticks, s: median, 99.9th percentile, maximum. */
             lateness: number[];
-            /** @description Limits that the force met since the last figures, in words. */
+            /** @description Names of the force limits that were reached since the last figures. */
             limits: string[];
             /**
              * Format: uint64
-             * @description Ticks left out since the start: missed deadlines.
+             * @description Missed deadlines: ticks that were skipped since the start.
              */
             missed: number;
             /**
              * Format: uint64
-             * @description Meshes taken up so far.
+             * @description Meshes taken up since the start.
              */
             n_meshes: number;
             /**
              * Format: uint32
-             * @description Nodes of the body.
+             * @description Number of nodes of the body.
              */
             n_nodes: number;
             /**
              * Format: double
-             * @description Since its start, s.
+             * @description Time since the engine's start, s.
              */
             seconds: number;
             /**
              * Format: double
-             * @description Snapshots made in the last second.
+             * @description Snapshots per second, since the last figures.
              */
             snapshot_rate: number;
-            /** @description The same of CPU time of the tissue's steps, s. */
+            /** @description CPU time of the tissue's steps, s: median, 99.9th percentile, maximum. */
             step_cpu: number[];
-            /** @description How the last step of the tissue went. */
+            /** @description Result of the tissue's last step. */
             step_status: string;
-            /** @description CPU time of a tick, s: half of them took less, 999 of 1,000, the longest. */
+            /** @description CPU time of a tick, s: median, 99.9th percentile, maximum. */
             tick_cpu: number[];
-            /** @description Histogram of the CPU time of ticks: lower end, upper end (s), count. */
+            /** @description Histogram of the CPU time of ticks: lower bound (s), upper bound (s), count. */
             tick_histogram: [
                 number,
                 number,
@@ -695,20 +699,20 @@ export interface components {
             ][];
             /**
              * Format: double
-             * @description Ticks of the loop in the last second.
+             * @description Ticks of the 1 kHz loop per second, since the last figures.
              */
             tick_rate: number;
             /**
              * Format: double
-             * @description Steps of the tissue in the last second.
+             * @description Steps of the tissue per second, since the last figures.
              */
             tissue_rate: number;
         };
-        /** @description A request of a page, with a number of its own that the answer repeats. */
+        /** @description A request, with a number that the answer repeats. */
         Envelope: {
             /**
              * Format: uint32
-             * @description Repeated in the [`Reply`]; without it only a refusal is answered.
+             * @description Number of the request, repeated in the [`Reply`]. Without it, only a refusal gets a reply.
              */
             id?: number | null;
         } & ({
@@ -721,17 +725,17 @@ export interface components {
             /** @constant */
             type: "lift";
         } | {
-            /** @description Its key. */
+            /** @description Key of the scene. */
             key: string;
             /** @constant */
             type: "load_scene";
         } | {
-            /** @description The text (TOML). */
+            /** @description The scene file (TOML). */
             text: string;
             /** @constant */
             type: "load_text";
         } | {
-            /** @description In order. */
+            /** @description The edits, applied in order. */
             edits: components["schemas"]["Edit"][];
             /** @constant */
             type: "edit";
@@ -756,37 +760,37 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Since the recording's beginning, s.
+             * @description Time since the start of the recording, s.
              */
             time: number;
             /** @constant */
             type: "seek";
         } | {
-            /** @description Whether it goes on. */
+            /** @description True to play, false to pause. */
             on: boolean;
             /** @constant */
             type: "play";
         } | {
-            /** @description Which. */
+            /** @description The field. */
             field: components["schemas"]["Field"];
             /** @constant */
             type: "show_field";
         } | {
             /**
              * Format: uint32
-             * @description How many, 1 to 3.
+             * @description Number of lumps, 1 to 3.
              */
             n_lumps: number;
             /**
              * Format: uint64
-             * @description The same seed hides them at the same places; none is a new one.
+             * @description The same seed hides the lumps at the same places. Without it, a new seed is chosen.
              * @default null
              */
             seed: number | null;
             /** @constant */
             type: "start_game";
         } | {
-            /** @description A point of the skin at rest. */
+            /** @description A point of the skin at rest, m. */
             point: number[];
             /** @constant */
             type: "mark";
@@ -800,7 +804,7 @@ export interface components {
             /** @constant */
             type: "end_game";
         } | {
-            /** @description Which. */
+            /** @description The fault. */
             fault: components["schemas"]["FaultKind"];
             /** @constant */
             type: "inject";
@@ -808,78 +812,78 @@ export interface components {
             /** @constant */
             type: "restart";
         });
-        /** @description Something of the engine's log. */
+        /** @description An entry of the engine's log. */
         EventInfo: {
-            /** @description How grave it is. */
+            /** @description Severity. */
             level: components["schemas"]["NoticeLevel"];
-            /** @description What. */
+            /** @description The message. */
             text: string;
             /**
              * Format: double
-             * @description Since its start, s.
+             * @description Time since the engine's start, s.
              */
             time: number;
         };
-        /** @description A fault on purpose. */
+        /** @description A fault that is caused on purpose. */
         FaultKind: "tissue_panic" | "spoilt_patch" | "tissue_pause";
-        /** @description A field over the nodes that is too costly for a page. */
+        /** @description A field over the nodes, computed by the engine because it is too costly for a page. */
         Field: "none" | "von_mises" | "pressure" | "stretch";
-        /** @description A lump and the mark that is nearest to it. */
+        /** @description A lump and the mark that belongs to it. */
         FoundLump: {
             /**
              * Format: double
-             * @description Distance of the mark that was meant for it from that point, m; none without a mark.
+             * @description Distance from that point to the lump's mark, m; null without a mark.
              */
             error?: number | null;
             /** @description The lump. */
             lump: components["schemas"]["LumpInfo"];
-            /** @description The point of the skin over its centre. */
+            /** @description The point of the skin nearest to its centre, m. */
             over: number[];
         };
         /** @description A scene of the gallery. */
         GalleryEntry: {
-            /** @description To choose it by. */
+            /** @description Key for `load_scene`. */
             key: string;
-            /** @description In words (English; a page may know the key in other languages). */
+            /** @description Name in English. A page may have a translation for the key. */
             name: string;
         };
-        /** @description A round of finding lumps. */
+        /** @description A round of "find the lump". */
         GameInfo: {
-            /** @description Where they are thought to be, points of the skin. */
+            /** @description The user's marks, points of the skin, m. */
             marks: number[][];
             /**
              * Format: uint32
-             * @description How many lumps are hidden.
+             * @description Number of hidden lumps.
              */
             n_lumps: number;
-            /** @description The truth, once it is asked for. */
+            /** @description The result, once the lumps are revealed. */
             result?: components["schemas"]["GameResult"] | null;
             /**
              * Format: double
-             * @description Seconds since the beginning, until the truth was shown.
+             * @description Time since the start of the round, s; it stops when the lumps are revealed.
              */
             seconds: number;
             /**
              * Format: uint64
-             * @description The seed; with it the round can be had again.
+             * @description The seed. The same seed gives the same round again.
              */
             seed: number;
         };
-        /** @description The truth of a round. */
+        /** @description The result of a round. */
         GameResult: {
             /**
              * Format: double
              * @description Time in contact, s.
              */
             contact_seconds: number;
-            /** @description Where it was pressed: place on the skin (x, y, z, m) and the largest force there, N. */
+            /** @description The places that were pressed: point of the skin (x, y, z, m) and largest force there (N). */
             coverage: number[][];
             /**
              * Format: double
-             * @description Share of the skin that could be pressed on and was, 0 to 1.
+             * @description Share of the accessible skin area that was pressed, 0 to 1.
              */
             covered: number;
-            /** @description The lumps. */
+            /** @description The lumps, each with its mark. */
             lumps: components["schemas"]["FoundLump"][];
             /**
              * Format: double
@@ -888,28 +892,28 @@ export interface components {
             max_force: number;
             /**
              * Format: double
-             * @description Mean force while pressing, N.
+             * @description Mean force during contact, N.
              */
             mean_force: number;
             /**
              * Format: uint32
-             * @description Marks that belong to no lump.
+             * @description Number of marks that belong to no lump.
              */
             n_stray_marks: number;
         };
-        /** @description Where the hand holds the tool. Its tip is to be `depth` under `point`, against `normal`. */
+        /** @description A pose of the hand: the tool's tip goes `depth` below `point`, against `normal`. */
         Hand: {
             /**
              * Format: double
-             * @description How deep, m; negative is above the skin.
+             * @description Depth below the skin at rest, m; negative is above the skin.
              */
             depth: number;
-            /** @description The skin's outward normal there. */
+            /** @description Outward normal of the skin at `point`. */
             normal: number[];
             /** @description A point of the skin at rest, m. */
             point: number[];
         };
-        /** @description Who is spoken to. */
+        /** @description The first message on a connection. */
         Hello: {
             /**
              * Format: uint64
@@ -920,19 +924,19 @@ export interface components {
             palpa: string;
             /**
              * Format: uint32
-             * @description Version of the snapshots; a page of another one must be loaded again.
+             * @description Version of the snapshot format. A page with another version must be reloaded.
              */
             snapshot_version: number;
         };
         /** @description A layer. */
         LayerInfo: {
-            /** @description Its law, in a word. */
+            /** @description Name of its elastic law. */
             law: string;
-            /** @description Its tissue. */
+            /** @description Name of its tissue. */
             name: string;
             /**
              * Format: double
-             * @description Young's modulus at small strain, Pa; N/m of a bar in the reference method.
+             * @description Young's modulus at small strain, Pa; in the reference method, stiffness of a bar, N/m.
              */
             stiffness: number;
             /**
@@ -941,23 +945,23 @@ export interface components {
              */
             thickness: number;
         };
-        /** @description The shape of a lump, m. */
+        /** @description The shape of a lump. Lengths in m. */
         LumpForm: {
             /** @constant */
             kind: "ellipsoid";
-            /** @description Along its axes. */
+            /** @description Radii along its axes. */
             radii: number[];
         } | {
             /** @constant */
             kind: "capsule";
             /**
              * Format: double
-             * @description Of the straight part.
+             * @description Length of the straight part.
              */
             length: number;
             /**
              * Format: double
-             * @description Of the cylinder and its ends.
+             * @description Radius of the cylinder and its ends.
              */
             radius: number;
         } | {
@@ -965,13 +969,13 @@ export interface components {
             kind: "mesh";
             /**
              * Format: double
-             * @description Radius of the ball.
+             * @description Radius of the bounding sphere.
              */
             radius: number;
         };
         /** @description A lump at rest. */
         LumpInfo: {
-            /** @description Its axes, three unit vectors. */
+            /** @description Its axes: three unit vectors. */
             axes: number[][];
             /** @description Its centre, m. */
             centre: number[];
@@ -985,7 +989,7 @@ export interface components {
              */
             stiffness: number;
         };
-        /** @description What a page is told, beside snapshots. */
+        /** @description The messages of the server to a client, besides snapshots. */
         Message: (components["schemas"]["Hello"] & {
             /** @constant */
             type: "hello";
@@ -1002,132 +1006,132 @@ export interface components {
             /** @constant */
             type: "reply";
         });
-        /** @description How the body answers. */
+        /** @description The model of the body. */
         Method: "tissue" | "reference";
-        /** @description Something to know about the scene: its kind, and the names and numbers in it. */
+        /** @description A remark on the scene: its kind, and the names and numbers in it. */
         Note: {
-            /** @description The kind of note. Pages have words for each kind in each of their languages. */
+            /** @description Kind of note. Pages have a text for each kind in each of their languages. */
             kind: string;
-            /** @description The note in English, for clients without words of their own. */
+            /** @description The note in English, for clients without texts of their own. */
             text: string;
             /** @description Names and numbers, in SI units. */
             values: {
                 [key: string]: unknown;
             };
         };
-        /** @description Something that happened. */
+        /** @description An event that a user should know of. */
         Notice: {
-            /** @description How grave it is. */
+            /** @description Severity. */
             level: components["schemas"]["NoticeLevel"];
-            /** @description In words. */
+            /** @description The message, in English. */
             text: string;
         };
-        /** @description How grave a notice is. */
+        /** @description Severity of a notice. */
         NoticeLevel: "info" | "warning" | "error";
-        /** @description What the engine does. */
+        /** @description Phase of the engine. */
         Phase: "building" | "running" | "stopped";
         /** @description The recording. */
         RecordingInfo: {
             /**
              * Format: double
-             * @description How long it is, s; 0 when there is none.
+             * @description Its duration, s; 0 without a recording.
              */
             duration: number;
-            /** @description Whether it goes on by itself. */
+            /** @description Whether the recording plays by itself. */
             is_playing: boolean;
-            /** @description Whether one is under way. */
+            /** @description Whether a recording is under way. */
             is_recording: boolean;
-            /** @description Whether it is shown. */
+            /** @description Whether pages show the recording instead of the live body. */
             is_replaying: boolean;
         };
         /** @description The answer to a request. */
         Reply: {
-            /** @description Why it is refused; none when it is done or under way. */
+            /** @description The reason for a refusal; none if the request is done or under way. */
             error?: string | null;
             /**
              * Format: uint32
-             * @description That of the request.
+             * @description Number of the request.
              */
             id?: number | null;
         };
         /** @description Everything that pages show, except the moving body. */
         State: {
-            /** @description Whether faults on purpose are allowed. */
+            /** @description Whether a page may cause faults on purpose. */
             allows_faults: boolean;
             /**
              * Format: uint64
-             * @description Who controls: the number of a connection.
+             * @description Number of the connection in control; null if no page is in control.
              */
             controller?: number | null;
             /** @description The field that frames carry. */
             field: components["schemas"]["Field"];
-            /** @description The scenes that can be chosen. */
+            /** @description Scenes of the gallery. */
             gallery: components["schemas"]["GalleryEntry"][];
-            /** @description The one that was chosen; none for one's own. */
+            /** @description Key of the loaded gallery scene; null for a scene from another source. */
             gallery_key?: string | null;
-            /** @description The game, if one is on. */
+            /** @description The game, if one is under way. */
             game?: components["schemas"]["GameInfo"] | null;
             /**
              * Format: double
-             * @description The greatest depth that makes sense, m.
+             * @description Largest depth that a page should offer, m.
              */
             greatest_depth: number;
-            /** @description The place that the scene presses, and where the tool hangs over it. */
+            /** @description Pose of the hand over the place that the scene presses. */
             home: components["schemas"]["Hand"];
             /** @description Whether the scene's motion runs. */
             is_motion_running: boolean;
             /** @description The layers, from the skin down. */
             layers: components["schemas"]["LayerInfo"][];
-            /** @description The lumps where they lie at rest; while a game is on, none. */
+            /** @description The lumps at their places at rest; empty during a game. */
             lumps: components["schemas"]["LumpInfo"][];
             /**
              * Format: double
              * @description Largest force of the device, N.
              */
             max_force: number;
-            /** @description How the body answers. */
+            /** @description The model of the body. */
             method: components["schemas"]["Method"];
             /**
              * Format: uint32
-             * @description How many pages are connected.
+             * @description Number of pages that are connected.
              */
             n_clients: number;
             /**
              * Format: uint32
-             * @description Nodes of the body.
+             * @description Number of nodes of the body.
              */
             n_nodes: number;
-            /** @description What a user should know of the scene. */
+            /** @description Remarks on the scene for the user. */
             notes: components["schemas"]["Note"][];
-            /** @description What the engine does. */
+            /** @description Phase of the engine. */
             phase: components["schemas"]["Phase"];
-            /** @description Why the last scene could not be built, or the engine stopped. */
+            /** @description Reason why the last scene could not be built, or why the engine stopped. */
             problem?: string | null;
             /** @description The recording. */
             recording: components["schemas"]["RecordingInfo"];
             /**
              * Format: uint64
-             * @description Grows with every change.
+             * @description Grows with every change of the state.
              */
             revision: number;
-            /** @description The scene in full, as a scene file says it; while a game is on, without its lumps. */
+            /** @description The whole scene, with the keys of a scene file. During a game it has no lumps. */
             scene: unknown;
-            /** @description What presses. */
+            /** @description The tool. */
             tool: components["schemas"]["ToolInfo"];
             /**
              * Format: double
-             * @description How deep the scene's hand presses, m.
+             * @description Depth of the scene's motion, m.
              */
             usual_depth: number;
         };
-        /** @description What presses. In its own frame its tip is the origin, and z points out of the tissue. */
+        /** @description The tool. In its own frame the tip is the origin, and z points out of the tissue. */
         ToolInfo: {
             /**
              * Format: double
              * @description Coulomb's coefficient of friction.
              */
             friction: number;
-            /** @description Its shape; null for a single node that is held. */
+            /** @description Its shape; null if the tool holds a single node. */
             shape?: components["schemas"]["ContactShape"] | null;
         };
     };

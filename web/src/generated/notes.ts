@@ -7,7 +7,7 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description Something a user should know. Lengths in m, angles in rad, points `[x, y, z]` in m. */
+        /** @description A remark for the user. Lengths in m, angles in rad, points `[x, y, z]` in m. */
         Note: {
             /** @description Name of the file. */
             file: string;
@@ -37,7 +37,7 @@ export interface components {
             n_degenerate: number;
             /**
              * Format: uint
-             * @description Triangles that were there twice.
+             * @description Duplicate triangles that were dropped.
              */
             n_duplicate: number;
             /**
@@ -47,7 +47,7 @@ export interface components {
             n_flipped: number;
             /**
              * Format: uint
-             * @description Vertices of no triangle that were dropped.
+             * @description Unused vertices that were dropped.
              */
             n_unused: number;
             /**
@@ -60,13 +60,13 @@ export interface components {
             kind: "base_overlaps";
             /**
              * Format: uint
-             * @description Pairs of triangles.
+             * @description Number of pairs of triangles.
              */
             n_pairs: number;
         } | {
             /**
              * Format: double
-             * @description Radius from which on the rim is not felt, m.
+             * @description Radius from which the rim has no influence, m.
              */
             enough: number;
             /** @constant */
@@ -92,12 +92,12 @@ export interface components {
             kind: "skin_too_coarse";
             /**
              * Format: uint
-             * @description The limit that was reached.
+             * @description The limit on skin vertices that was reached.
              */
             max_vertices: number;
             /**
              * Format: uint
-             * @description Triangles that are larger than wanted.
+             * @description Number of triangles that are larger than wanted.
              */
             n_triangles: number;
         } | {
@@ -105,7 +105,7 @@ export interface components {
             kind: "levels_too_high";
             /**
              * Format: uint
-             * @description The limit that was reached.
+             * @description The limit on levels that was reached.
              */
             max_levels: number;
         } | {
@@ -126,16 +126,16 @@ export interface components {
             lump: string;
             /**
              * Format: double
-             * @description Share of its volume in the tissue.
+             * @description Share of its volume that lies in the tissue, 0 to 1.
              */
             share: number;
         } | {
             /** @constant */
             kind: "disc_not_imprinted";
-            /** @description Why, in English. */
+            /** @description The reason, in English. */
             why: string;
         } | {
-            /** @description Where it presses, m. */
+            /** @description Place of the disc, m. */
             at: [
                 number,
                 number,
@@ -143,14 +143,14 @@ export interface components {
             ];
             /**
              * Format: double
-             * @description Radius of the circle with the area that is held, m.
+             * @description Radius of the circle with the held area, m.
              */
             effective_radius: number;
             /** @constant */
             kind: "disc_patch";
             /**
              * Format: uint
-             * @description Vertices under the disc.
+             * @description Number of vertices under the disc.
              */
             n_vertices: number;
             /**
@@ -175,12 +175,12 @@ export interface components {
             kind: "single_triangles";
             /**
              * Format: uint
-             * @description Triangles without a partner.
+             * @description Number of triangles without a partner.
              */
             n: number;
             /**
              * Format: uint
-             * @description All triangles.
+             * @description Number of all triangles.
              */
             n_all: number;
         } | {
@@ -193,7 +193,7 @@ export interface components {
             kind: "coarse_under_tool";
             /**
              * Format: double
-             * @description Radius of the tool that presses, m.
+             * @description Radius of the tool's pressing part, m.
              */
             radius: number;
         } | {
@@ -204,7 +204,7 @@ export interface components {
             edge: number;
             /**
              * Format: double
-             * @description Radius of the tool's edge, m.
+             * @description Radius of the tool's rounded edge, m.
              */
             edge_radius: number;
             /** @constant */
@@ -217,7 +217,7 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Length that is short enough, m.
+             * @description Largest step length that is short enough, m.
              */
             enough: number;
             /** @constant */
@@ -237,7 +237,7 @@ export interface components {
             kind: "few_under_disc";
             /**
              * Format: uint
-             * @description Vertices under the disc.
+             * @description Number of vertices under the disc.
              */
             n_vertices: number;
             /**
@@ -254,16 +254,16 @@ export interface components {
         } | {
             /** @constant */
             kind: "bar_aspects";
-            /** @description The layers that are. */
+            /** @description The layers with such levels. */
             layers: components["schemas"]["LayerAspect"][];
             /**
              * Format: double
-             * @description Smallest sound ratio.
+             * @description Smallest ratio at which bars represent it.
              */
             least: number;
             /**
              * Format: double
-             * @description Largest sound ratio.
+             * @description Largest ratio at which bars represent it.
              */
             most: number;
         } | {
@@ -272,7 +272,7 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description How far along the motion, m.
+             * @description Distance along the motion at which it leaves the skin, m.
              */
             far: number;
             /** @constant */
@@ -283,7 +283,7 @@ export interface components {
              */
             length: number;
         } | {
-            /** @description What presses instead, in English. */
+            /** @description The tool used instead, in English. */
             by: string;
             /** @constant */
             kind: "tool_replaced";
@@ -300,7 +300,7 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Depth that was to be reached, m.
+             * @description Depth that the step should have reached, m.
              */
             depth: number;
             /** @constant */
@@ -311,7 +311,7 @@ export interface components {
              */
             speed: number;
         } | {
-            /** @description The middle of the worst, m. */
+            /** @description The middle of the worst prism, m. */
             at: [
                 number,
                 number,
@@ -319,14 +319,14 @@ export interface components {
             ];
             /**
              * Format: double
-             * @description At which depth, m.
+             * @description Depth at which it happened, m.
              */
             depth: number;
             /** @constant */
             kind: "turned_prisms";
             /**
              * Format: uint
-             * @description How many.
+             * @description Number of prisms.
              */
             n: number;
         } | {
@@ -334,12 +334,12 @@ export interface components {
             kind: "friction_smoothed";
             /**
              * Format: uint
-             * @description In how many steps.
+             * @description Number of steps with smoothed friction.
              */
             n: number;
             /**
              * Format: uint
-             * @description Of how many.
+             * @description Number of all steps.
              */
             n_all: number;
             /**
@@ -357,7 +357,7 @@ export interface components {
             kind: "few_touching";
             /**
              * Format: uint
-             * @description How many at most.
+             * @description Largest number of vertices in contact.
              */
             n_vertices: number;
             /**

@@ -8,7 +8,7 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
-         * @description A scene of Palpa: the body that is pressed, its layers, the tool and the press.
+         * @description A scene of Palpa: the body, its layers, the tool and the press.
          *
          *     Every quantity is a text with a unit, such as "1.5 mm" or "12 kPa". Paths are relative to the folder of this file.
          */
@@ -16,7 +16,7 @@ export interface components {
             /** @description The body: a surface mesh and its bones, or a body made by formula. */
             body: components["schemas"]["BodyTable"];
             /**
-             * @description The haptic device that presses in real time, and how it is held.
+             * @description The haptic device used in real time, and the grip of the hand on it.
              * @default {
              *       "grip": "medium",
              *       "kind": "simulated",
@@ -29,10 +29,10 @@ export interface components {
              * @default []
              */
             layer?: components["schemas"]["LayerTable"][];
-            /** @description Lumps in the layers, 64 at most; where two overlap, the later one counts. */
+            /** @description Lumps in the layers, 64 at most. Where two overlap, the later one counts. */
             lump?: components["schemas"]["LumpTable"][];
             /**
-             * @description How fine the body is made where it matters.
+             * @description Mesh size of the body near the tool and lumps.
              * @default {
              *       "growth": 0.5,
              *       "max_vertices": 20000,
@@ -42,7 +42,7 @@ export interface components {
              */
             mesh?: components["schemas"]["MeshTable"];
             /**
-             * @description How the body answers.
+             * @description The model of the body.
              * @default {
              *       "alpha": 0.8,
              *       "dynamics": "quasi-static",
@@ -52,7 +52,7 @@ export interface components {
              */
             model?: components["schemas"]["ModelTable"];
             /**
-             * @description How the simulated hand moves in real time.
+             * @description The motion of the simulated hand in real time.
              * @default {
              *       "above": "5 mm",
              *       "hold": "0.5 s",
@@ -65,7 +65,7 @@ export interface components {
              */
             motion?: components["schemas"]["MotionTable"];
             /**
-             * @description Where, how deep and how fast it presses.
+             * @description Place, depth and speed of the press.
              * @default {
              *       "cycles": 1,
              *       "depth": "8 mm",
@@ -86,7 +86,7 @@ export interface components {
              */
             reference?: components["schemas"]["ReferenceTable"];
             /**
-             * @description What presses. Default: a disc of radius 8 mm, bonded to the skin.
+             * @description The tool. Default: a disc of radius 8 mm, bonded to the skin.
              * @default {
              *       "shape": "disc"
              *     }
@@ -95,16 +95,16 @@ export interface components {
         };
         /** @description An axis of the body's frame. */
         AxisName: "x" | "y" | "z";
-        /** @description The body. Exactly one of `surface` and `generator` is given. */
+        /** @description The body. Give exactly one of `surface` and `generator`. */
         BodyTable: {
-            /** @description The bones, triangle meshes in the same frame as the skin; 64 at most. Only with `surface`. Default: none. */
+            /** @description The bones: triangle meshes in the same frame as the skin; 64 at most. Only with `surface`. Default: none. */
             bones?: string[];
             /**
-             * @description How the faces are held at which the body was cut from the rest (the ends of a limb, the rim of a cut-out). Default: "free".
+             * @description Support of the cut faces, where the body was cut from the rest (the ends of a limb, the rim of a cut-out). Default: "free".
              * @default free
              */
             cut_faces?: components["schemas"]["CutFaces"];
-            /** @description The middle of the part that is kept, each coordinate within 10 m. Default: where the tool presses (`press.at` or `press.vertex`). */
+            /** @description Centre of the part that is kept, each coordinate within 10 m. Default: where the tool presses (`press.at` or `press.vertex`). */
             cutout_at?: [
                 string,
                 string,
@@ -115,7 +115,7 @@ export interface components {
              * @example 1.5 mm
              */
             cutout_radius?: string;
-            /** @description A body made by formula instead of read from a file. */
+            /** @description A body made by formula, instead of one from a file. */
             generator?: components["schemas"]["GeneratorTable"];
             /** @description The skin: a triangle mesh (PLY, OBJ, STL, GLB, glTF or OFF). */
             surface?: string;
@@ -125,18 +125,18 @@ export interface components {
              */
             unit?: components["schemas"]["LengthUnit"];
         };
-        /** @description How the cut faces are held. */
+        /** @description Support of the cut faces. */
         CutFaces: "free" | "fixed" | "symmetric";
         /** @description Rayleigh damping: the damping matrix is `mass` times the mass matrix and `stiffness` times the stiffness matrix. */
         DampingTable: {
             /**
-             * @description The factor of the mass, 0 1/s to 100000 1/s: damps slow motion. Default: "0 1/s".
+             * @description Factor of the mass matrix, 0 1/s to 100000 1/s: damps slow motion. Default: "0 1/s".
              * @default 0 1/s
              * @example 5 1/s
              */
             mass?: string;
             /**
-             * @description The factor of the stiffness, 0 s to 10 s: damps fast motion. Default: "0 s".
+             * @description Factor of the stiffness matrix, 0 s to 10 s: damps fast motion. Default: "0 s".
              * @default 0 s
              * @example 0.5 s
              */
@@ -144,12 +144,12 @@ export interface components {
         };
         /** @description How a device is driven. */
         DeviceKind: "simulated";
-        /** @description The devices whose figures are known. */
+        /** @description The devices with known data. */
         DevicePreset: "falcon" | "touch" | "inverse3" | "ideal";
-        /** @description The haptic device that presses in real time (`palpa loop-report`), and how it is held. */
+        /** @description The haptic device used in real time (`palpa loop-report`), and the grip of the hand on it. */
         DeviceTable: {
             /**
-             * @description How a simulated hand holds it. Default: "medium".
+             * @description The grip of the simulated hand. Default: "medium".
              * @default medium
              */
             grip?: components["schemas"]["Grip"];
@@ -159,37 +159,37 @@ export interface components {
              */
             kind?: components["schemas"]["DeviceKind"];
             /**
-             * @description Which device. Default: "falcon".
+             * @description The model of the device. Default: "falcon".
              * @default falcon
              */
             preset?: components["schemas"]["DevicePreset"];
         };
-        /** @description Whether mass and damping count. */
+        /** @description Whether inertia and damping are included. */
         DynamicsName: "quasi-static" | "implicit";
-        /** @description The shapes that are made by formula. */
+        /** @description The bodies that can be made by formula. */
         GeneratorKind: "block" | "cylinder" | "forearm";
-        /** @description A body made by formula. The layers of the scene apply to it as to a surface. */
+        /** @description A body made by formula. The layers of the scene apply to it as to a surface from a file. */
         GeneratorTable: {
             /**
-             * @description Cylinder only: the radius of its bone, 0.5 mm to 1 m and less than `radius`. Default: "10 mm".
+             * @description Cylinder only: the radius of the bone, 0.5 mm to 1 m and less than `radius`. Default: "10 mm".
              * @example 1.5 mm
              */
             bone_radius?: string;
-            /** @description Its shape: a flat block, a cylinder round one bone, or a forearm with ulna and radius. */
+            /** @description Shape of the body: a flat block, a cylinder around one bone, or a forearm with ulna and radius. */
             kind: components["schemas"]["GeneratorKind"];
             /**
-             * @description Cylinder only: its length, 1 mm to 2 m. Default: "200 mm".
+             * @description Cylinder only: the length, 1 mm to 2 m. Default: "200 mm".
              * @example 1.5 mm
              */
             length?: string;
             /**
-             * @description Cylinder only: the radius of its skin, 1 mm to 1 m. Default: "40 mm".
+             * @description Cylinder only: the radius of the skin, 1 mm to 1 m. Default: "40 mm".
              * @example 1.5 mm
              */
             radius?: string;
             /**
              * Format: double
-             * @description Forearm only: its size relative to an average adult's, 0.2 to 3. Default: 1.
+             * @description Forearm only: the size relative to an average adult's, 0.2 to 3. Default: 1.
              */
             scale?: number;
             /** @description Block only: width, length and depth, each 1 mm to 2 m. Default: ["100 mm", "100 mm", "40 mm"]. */
@@ -199,44 +199,44 @@ export interface components {
                 string
             ];
             /**
-             * @description Distance of neighbouring skin vertices, 0.5 mm to 100 mm. Default: "5 mm".
+             * @description Distance between neighbouring skin vertices, 0.5 mm to 100 mm. Default: "5 mm".
              * @default 5 mm
              * @example 1.5 mm
              */
             spacing?: string;
         };
-        /** @description How fast a hand holds a device. */
+        /** @description How firmly a hand holds a device. */
         Grip: "soft" | "medium" | "stiff";
-        /** @description Material of the bars in a level between two layers. */
+        /** @description Stiffness of the bars in the level between two layers. */
         InPlane: "above" | "below" | "mean";
-        /** @description The elastic laws that a tissue can be given. */
+        /** @description The elastic laws for a tissue. */
         LawName: "linear" | "st-venant-kirchhoff" | "neo-hookean" | "mooney-rivlin" | "yeoh" | "ogden" | "fung" | "gent";
         /** @description One layer of tissue. */
         LayerTable: {
             /**
              * Format: uint32
-             * @description Into how many element levels the layer is divided over its thickness, 1 to 64. Default: 1.
+             * @description Number of element levels through the thickness of the layer, 1 to 64. Default: 1.
              * @default 1
              */
             levels?: number;
             /**
-             * @description How thin the layer may become where the body has no room for it, 1 µm to 100 mm and no more than the thickness. Default: a fifth of the (smallest) thickness, or "0.5 mm" when that is not known beforehand.
+             * @description Least thickness of the layer where the body has no room for more, 1 µm to 100 mm and no more than the thickness. Default: a fifth of the (smallest) thickness, or "0.5 mm" when that is not known beforehand.
              * @example 1.5 mm
              */
             min_thickness?: string;
             /**
-             * @description The tension in every direction of the layer's plane before anything presses, 0 Pa to 1 MPa. Skin on a living forearm is under 28-92 kPa or 6.2-11.4 N/m (Flynn et al., abstracts). Default: "0 Pa".
+             * @description Tension in every direction of the layer's plane before anything presses, 0 Pa to 1 MPa. Skin on a living forearm has 28-92 kPa or 6.2-11.4 N/m (Flynn et al., abstracts). Default: "0 Pa".
              * @example 12 kPa
              */
             prestress?: string;
-            /** @description How thick the layer is, 10 µm to 500 mm: one value, a table along an axis, or a file. Only the last layer may go without: it reaches down to the bone (or to the base of a generated body). */
+            /** @description Thickness of the layer, 10 µm to 500 mm: one value, a table along an axis, or a file. Only the last layer may have none: it then reaches down to the bone (or to the base of a generated body). */
             thickness?: string | components["schemas"]["ThicknessTable"];
-            /** @description Where the thickness is from, in words. Default: nothing said. */
+            /** @description Source of the thickness, in words. Default: nothing said. */
             thickness_source?: string;
-            /** @description How far the thickness is to be trusted. Default: "given" (by this scene). */
+            /** @description How reliable the thickness is. Default: "given" (by this scene). */
             thickness_status?: components["schemas"]["Status"];
             /**
-             * @description The name of a tissue in the catalogue, or a table with its elasticity.
+             * @description Name of a tissue in the catalogue, or a table with its values.
              * @example skin
              * @example stiffening skin
              * @example epidermis
@@ -259,21 +259,21 @@ export interface components {
         LengthUnit: "m" | "cm" | "mm" | "in";
         /** @description The shapes of lumps. */
         LumpShapeName: "sphere" | "ellipsoid" | "capsule" | "mesh";
-        /** @description A lump in the layers. It lies below a place of the skin (`depth`, with `below` or where the tool presses) or in a place of the body (`at`); a mesh may also stay where it is. */
+        /** @description A lump in the layers. It lies either below a place of the skin (`depth`, with `below` or where the tool presses), or at a point of the body (`at`). A mesh may also keep the position in its file. */
         LumpTable: {
-            /** @description In place of `depth`: where the lump's centre is, each coordinate within 10 m. */
+            /** @description Instead of `depth`: the centre of the lump, each coordinate within 10 m. */
             at?: [
                 string,
                 string,
                 string
             ];
-            /** @description Ellipsoid and capsule: the direction of the first radius, or of the length. Default: along the skin, as near to x as it goes, or to y where the skin looks along x. */
+            /** @description Ellipsoid and capsule: the direction of the first radius, or of the length. Default: along the skin, as near to x as possible, or to y if the skin's normal is along x. */
             axis?: components["schemas"]["AxisName"] | [
                 number,
                 number,
                 number
             ];
-            /** @description With `depth`: the point whose nearest point of the skin the lump is below, each coordinate within 10 m. Default: where the tool presses (`press.at`, `press.vertex` or the middle of the skin). */
+            /** @description With `depth`: the lump lies below the point of the skin nearest to this point, each coordinate within 10 m. Default: where the tool presses (`press.at`, `press.vertex` or the middle of the skin). */
             below?: [
                 string,
                 string,
@@ -281,44 +281,44 @@ export interface components {
             ];
             /**
              * Format: uint32
-             * @description With `depth`, in place of `below`: the skin vertex that the lump is below, by its number, from 0.
+             * @description With `depth`, instead of `below`: number of the skin vertex that the lump lies below, from 0.
              */
             below_vertex?: number;
             /**
-             * @description How deep the lump's centre is below the skin at rest, along its inward normal, 0.1 mm to 500 mm.
+             * @description Depth of the lump's centre below the skin at rest, along the inward normal, 0.1 mm to 500 mm.
              * @example 1.5 mm
              */
             depth?: string;
             /** @description Mesh only: a closed triangle mesh in the frame and unit of the body. */
             file?: string;
             /**
-             * @description Capsule only: the length of its straight part, 0.1 mm to 400 mm; from end to end it is two radii longer.
+             * @description Capsule only: the length of the straight part, 0.1 mm to 400 mm. The total length is two radii more.
              * @example 1.5 mm
              */
             length?: string;
             /**
-             * @description What the lump is called in reports. Default: "lump".
+             * @description Name of the lump in reports. Default: "lump".
              * @default lump
              */
             name?: string;
-            /** @description Ellipsoid only: its three radii, each 0.1 mm to 200 mm: along `axis`, across it, and into the depth. */
+            /** @description Ellipsoid only: the three radii, each 0.1 mm to 200 mm: along `axis`, across it, and into the depth. */
             radii?: [
                 string,
                 string,
                 string
             ];
             /**
-             * @description Sphere and capsule: its radius, 0.1 mm to 200 mm.
+             * @description Sphere and capsule: the radius, 0.1 mm to 200 mm.
              * @example 1.5 mm
              */
             radius?: string;
             /**
-             * @description Its shape. Default: "sphere".
+             * @description Shape of the lump. Default: "sphere".
              * @default sphere
              */
             shape?: components["schemas"]["LumpShapeName"];
             /**
-             * @description The name of a tissue in the catalogue, or a table with its elasticity.
+             * @description Name of a tissue in the catalogue, or a table with its values.
              * @example skin
              * @example stiffening skin
              * @example epidermis
@@ -337,150 +337,150 @@ export interface components {
              */
             tissue: string | components["schemas"]["TissueTable"];
             /**
-             * @description The width over which the lump passes into what is round it, with its surface in the middle, 0 m to 50 mm and no more than twice its smallest radius. Default: "0 m", a sharp edge.
+             * @description Width of the transition between the lump's tissue and the tissue around it, centred on the lump's surface, 0 m to 50 mm and no more than twice the smallest radius. Default: "0 m", a sharp edge.
              * @example 1.5 mm
              */
             transition?: string;
         };
-        /** @description How fine the body is made where it matters. Nothing is made coarser than it was. */
+        /** @description Mesh size near the tool and lumps. The mesh is never made coarser than the body's own. */
         MeshTable: {
             /**
              * Format: double
-             * @description By which share of the distance from tool or lump the wanted length grows, 0.02 to 5. Default: 0.5.
+             * @description Increase of the wanted length with the distance from the tool or lump, as a share of that distance, 0.02 to 5. Default: 0.5.
              * @default 0.5
              */
             growth?: number;
             /**
              * Format: uint32
-             * @description Most skin vertices that refinement may lead to, 100 to 500000; then the body stays as fine as they allow. Default: 20000.
+             * @description Largest number of skin vertices after refinement, 100 to 500000. At this limit refinement stops. Default: 20000.
              * @default 20000
              */
             max_vertices?: number;
             /**
-             * @description Whether in real time what is fine near the tool moves with it, so that the hand may go anywhere; else the body is fine along the whole way of the scene's motion. Default: false.
+             * @description Whether the fine part near the tool moves with it in real time, so that the hand may go anywhere. If false, the body is fine along the whole way of the scene's motion. Default: false.
              * @default false
              */
             moves?: boolean;
             /**
-             * @description The wanted length of edges and height of levels in and round lumps, 0.1 mm to 100 mm. Default: half of a lump's smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
+             * @description Wanted length of edges and height of levels in and around lumps, 0.1 mm to 100 mm. Default: half of a lump's smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
              * @example 1.5 mm
              */
             near_lumps?: string;
             /**
-             * @description The wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm, and 4/3 of that in real time; nothing under a node.
+             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm, and 4/3 of that in real time; nothing under a node.
              * @example 1.5 mm
              */
             near_tool?: string;
             /**
-             * @description Whether the body is refined near the tool and lumps; else it is taken as it was grown. Default: true.
+             * @description Whether the mesh is refined near the tool and lumps; if false, it stays as it was grown. Default: true.
              * @default true
              */
             refine?: boolean;
         };
-        /** @description The models of response. */
+        /** @description The models of the body. */
         ModelKind: "tissue" | "reference";
-        /** @description How the body answers. */
+        /** @description The model of the body. */
         ModelTable: {
             /**
              * Format: double
-             * @description The share of the strain that two paired prisms take as their mean, 0 to 0.95. More is softer and nearer to the truth on a coarse mesh, but lets a node that is pressed alone move against its neighbours. Default: 0.8.
+             * @description Share of the strain that two paired prisms average, 0 to 0.95. A larger share is softer and more accurate on a coarse mesh, but a node that is pressed alone can then move against its neighbours. Default: 0.8.
              * @default 0.8
              */
             alpha?: number;
-            /** @description Damping beside that of relaxation; only with dynamics = "implicit". Default: none. */
+            /** @description Damping in addition to relaxation; only with dynamics = "implicit". Default: none. */
             damping?: components["schemas"]["DampingTable"];
             /**
-             * @description Whether mass and damping count. Default: "quasi-static".
+             * @description Whether inertia and damping are included. Default: "quasi-static".
              * @default quasi-static
              */
             dynamics?: components["schemas"]["DynamicsName"];
             /**
-             * @description Which model answers. Default: "tissue".
+             * @description Kind of model. Default: "tissue".
              * @default tissue
              */
             kind?: components["schemas"]["ModelKind"];
             /**
              * Format: double
-             * @description The largest force left over at a free node in equilibrium, relative to the forces in the body, 0.000000000001 to 0.001. Default: 0.00000001.
+             * @description Tolerance of the force balance: the largest unbalanced force at a free node, relative to the forces in the body, 0.000000000001 to 0.001. Default: 0.00000001.
              * @default 1e-8
              */
             tolerance?: number;
         };
-        /** @description At which end of its relaxation a tissue has the moduli of its law. */
+        /** @description State of relaxation at which the moduli of a tissue's law hold. */
         Moduli: "long-term" | "instantaneous";
         /** @description The motions of a hand. */
         MotionKind: "press" | "stroke" | "drag" | "tap" | "palpate";
-        /** @description How the simulated hand moves in real time, over and over. */
+        /** @description The motion of the simulated hand in real time. It is repeated. */
         MotionTable: {
             /**
-             * @description How high over the skin it begins and ends, 0.1 mm to 100 mm. Default: "5 mm".
+             * @description Height of the tool above the skin at the start and end, 0.1 mm to 100 mm. Default: "5 mm".
              * @default 5 mm
              * @example 1.5 mm
              */
             above?: string;
-            /** @description The direction in which it does: "x", "y", "z" or three numbers, of which the part along the skin counts. Default: the tool's `axis`, or any. */
+            /** @description Direction of a stroke, drag or palpation: "x", "y", "z" or three numbers. Only the part along the skin counts. Default: the tool's `axis`, or any. */
             along?: components["schemas"]["AxisName"] | [
                 number,
                 number,
                 number
             ];
             /**
-             * @description How far down the hand goes, from where the tool first touches, 1 µm to 500 mm. The tool stays higher, since the hand gives way. Default: as in [press].
+             * @description Depth that the hand moves to, from the first touch of the tool, 1 µm to 500 mm. The tool stays higher, because the hand gives way. Default: as in [press].
              * @example 1.5 mm
              */
             depth?: string;
             /**
-             * @description How long it rests at the depth, 0 s to 600 s. Default: "0.5 s".
+             * @description Time that the hand rests at the depth, 0 s to 600 s. Default: "0.5 s".
              * @default 0.5 s
              * @example 0.5 s
              */
             hold?: string;
             /**
-             * @description What it does. Default: "press".
+             * @description Kind of motion. Default: "press".
              * @default press
              */
             kind?: components["schemas"]["MotionKind"];
             /**
-             * @description How far it strokes, drags or palpates across the skin, 0.1 mm to 500 mm, half of it on each side of the place that is pressed. Default: "20 mm".
+             * @description Length of a stroke, drag or palpation across the skin, 0.1 mm to 500 mm. Half of it lies on each side of the pressed place. Default: "20 mm".
              * @default 20 mm
              * @example 1.5 mm
              */
             length?: string;
             /**
-             * @description Its largest speed, 0.01 mm/s to 1 m/s. Default: "50 mm/s".
+             * @description Largest speed of the hand, 0.01 mm/s to 1 m/s. Default: "50 mm/s".
              * @default 50 mm/s
              * @example 10 mm/s
              */
             speed?: string;
             /**
              * Format: uint32
-             * @description How often it taps or drags there and back, or at how many places it palpates, 1 to 100. Default: 3.
+             * @description Number of taps, of drags there and back, or of palpated places, 1 to 100. Default: 3.
              * @default 3
              */
             times?: number;
             /**
-             * @description How much the hand trembles, root of the mean square of 8 to 12 Hz, 0 m to 5 mm; a healthy hand 0.05 mm to 0.2 mm. Default: "0 mm".
+             * @description Tremor of the hand, as the root mean square of a motion at 8 to 12 Hz, 0 m to 5 mm. A healthy hand has 0.05 mm to 0.2 mm. Default: "0 mm".
              * @default 0 m
              * @example 1.5 mm
              */
             tremor?: string;
         };
-        /** @description A term of Ogden's energy, 2 mu/alpha² (λ1^alpha + λ2^alpha + λ3^alpha − 3) of the isochoric stretches, as in Abaqus and CalculiX. Others write mu·alpha/2 for what is `mu` here. */
+        /** @description A term of Ogden's energy, 2 mu/alpha² (λ1^alpha + λ2^alpha + λ3^alpha − 3), in the isochoric stretches, as in Abaqus and CalculiX. Other definitions use mu·alpha/2 where this one has `mu`. */
         OgdenTable: {
             /**
              * Format: double
-             * @description Its exponent, of either sign and a size of 0.001 to 100.
+             * @description The exponent, positive or negative, with an absolute value of 0.001 to 100.
              */
             alpha: number;
             /**
-             * @description What the term adds to the shear modulus, 1 Pa to 1 GPa.
+             * @description Contribution of the term to the shear modulus, 1 Pa to 1 GPa.
              * @example 12 kPa
              */
             mu: string;
         };
-        /** @description Where, how deep and how fast the tool presses. Either `at` or `vertex` is given, or none of them. */
+        /** @description Place, depth and speed of the press. Give `at` or `vertex`, or neither. */
         PressTable: {
-            /** @description The point whose nearest point of the skin is pressed, each coordinate within 10 m. Default: the skin vertex nearest to the skin's centroid. */
+            /** @description The tool presses the point of the skin nearest to this point, each coordinate within 10 m. Default: the skin vertex nearest to the skin's centroid. */
             at?: [
                 string,
                 string,
@@ -488,24 +488,24 @@ export interface components {
             ];
             /**
              * Format: uint32
-             * @description How often the tool goes down, rests and comes back, 1 to 100; more than once only with `retract`. Default: 1.
+             * @description Number of cycles of going down, resting and coming back, 1 to 100; more than one only with `retract`. Default: 1.
              * @default 1
              */
             cycles?: number;
             /**
-             * @description How deep the tool goes, 1 µm to 500 mm. Default: "8 mm".
+             * @description Depth of the press, 1 µm to 500 mm. Default: "8 mm".
              * @default 8 mm
              * @example 1.5 mm
              */
             depth?: string;
-            /** @description The direction in which the tool moves; its length does not matter. Default: the inward normal of the skin. */
+            /** @description Direction of the tool's movement; its length does not matter. Default: the inward normal of the skin. */
             direction?: [
                 number,
                 number,
                 number
             ];
             /**
-             * @description How long the tool rests at its depth, 0 s to 600 s. Default: "0.5 s".
+             * @description Time that the tool rests at its depth, 0 s to 600 s. Default: "0.5 s".
              * @default 0.5 s
              * @example 0.5 s
              */
@@ -516,34 +516,34 @@ export interface components {
              */
             retract?: boolean;
             /**
-             * @description How fast the tool goes down and up, 0.01 mm/s to 1 m/s. Default: "10 mm/s".
+             * @description Speed of the tool down and up, 0.01 mm/s to 1 m/s. Default: "10 mm/s".
              * @example 10 mm/s
              */
             speed?: string;
-            /** @description Speeds to compare, in place of `speed`: the whole press is run at each; 16 at most, each 0.01 mm/s to 1 m/s. Default: none. */
+            /** @description Speeds to compare, instead of `speed`: the whole press is run at each; 16 at most, each 0.01 mm/s to 1 m/s. Default: none. */
             speeds?: string[];
             /**
-             * @description By how much the depth grows from one result to the next: no more than the depth and no less than a 5000th of it. Default: a 32nd of the depth.
+             * @description Increase of the depth from one result to the next: no more than the depth and no less than a 5000th of it. Default: a 32nd of the depth.
              * @example 1.5 mm
              */
             step?: string;
             /**
              * Format: uint32
-             * @description The skin vertex that is pressed, by its number in the skin surface, from 0.
+             * @description Number of the skin vertex that the tool presses, as counted in the skin surface, from 0.
              */
             vertex?: number;
         };
-        /** @description Relaxation as a Prony series: held at a strain, the stress falls by the share `g` of each term with its time constant. */
+        /** @description Relaxation as a Prony series: at constant strain, each term reduces the stress by its share `g` with its time constant. */
         PronyTable: {
             /**
-             * @description Whether the law's moduli are those at rest, after all relaxation, or at once, before any. Default: "long-term".
+             * @description Whether the law's moduli are the long-term ones, after all relaxation, or the instantaneous ones, before any. Default: "long-term".
              * @default long-term
              */
             moduli?: components["schemas"]["Moduli"];
-            /** @description 1 to 12 terms, whose `g` are 0.99 at most together. */
+            /** @description 1 to 12 terms. The sum of their `g` is 0.99 at most. */
             terms: components["schemas"]["PronyTermTable"][];
             /**
-             * @description Whether the resistance to a change of volume relaxes, too. Default: false.
+             * @description Whether the resistance to a change of volume relaxes too. Default: false.
              * @default false
              */
             volume?: boolean;
@@ -552,11 +552,11 @@ export interface components {
         PronyTermTable: {
             /**
              * Format: double
-             * @description The share of the stiffness at once that relaxes, 0.001 to 0.99.
+             * @description Share of the instantaneous stiffness that relaxes, 0.001 to 0.99.
              */
             g: number;
             /**
-             * @description Its time constant, 0.1 ms to 100000 s.
+             * @description The time constant, 0.1 ms to 100000 s.
              * @example 0.5 s
              */
             tau: string;
@@ -564,37 +564,37 @@ export interface components {
         /** @description Parameters of the reference method. */
         ReferenceTable: {
             /**
-             * @description Whose stiffness the bars in a level between two layers have. Default: "below".
+             * @description Layer whose stiffness the bars in the level between two layers have. Default: "below".
              * @default below
              */
             in_plane?: components["schemas"]["InPlane"];
             /**
              * Format: double
-             * @description The share of the way to its place at rest by which the restoring correction (3.22) moves a node after each step, 0 to 1; 0 switches it off. Any other makes a held body creep back under the tool. Default: 0.
+             * @description Share of the way back to its place at rest by which the restoring correction (3.22) moves a node after each step, 0 to 1; 0 switches it off. With any other value a held body creeps back under the tool. Default: 0.
              * @default 0
              */
             shape_gain?: number;
             /**
-             * @description How a sub-step is solved. Default: "sparse".
+             * @description Solver of a sub-step. Default: "sparse".
              * @default sparse
              */
             solver?: components["schemas"]["Solver"];
             /**
              * Format: double
-             * @description The share of a spring's change of length that the restoring correction (3.21) takes back after each step, 0 to 1; 0 switches it off. It acts once per step, so with it the force depends on the step: at 4 mm on a real forearm 0.56 N in steps of 1 mm and 0.48 N in steps of 0.1 mm, without it 0.55 N in both. Default: 0.
+             * @description Share of a spring's change of length that the restoring correction (3.21) takes back after each step, 0 to 1; 0 switches it off. It acts once per step, so with it the force depends on the step size: at 4 mm on a real forearm 0.56 N in steps of 1 mm and 0.48 N in steps of 0.1 mm, without it 0.55 N in both. Default: 0.
              * @default 0
              */
             spring_gain?: number;
             /**
              * Format: uint32
-             * @description Into how many equal parts each step of the tool is divided, 1 to 1024. Default: 4.
+             * @description Number of equal parts into which each step of the tool is divided, 1 to 1024. Default: 4.
              * @default 4
              */
             substeps?: number;
         };
-        /** @description How a sub-step of the reference method is solved. */
+        /** @description The solvers of a sub-step of the reference method. */
         Solver: "sparse" | "dense-inverse" | "euler";
-        /** @description How far a number is to be trusted. */
+        /** @description How reliable a number is. */
         Status: "measured" | "literature" | "assumed" | "given";
         /** @description A thickness that varies: either `axis` with `table`, or `file`. */
         ThicknessTable: {
@@ -606,13 +606,13 @@ export interface components {
             ];
             /** @description A CSV file with the columns x, y, z and thickness, in the unit of the body. */
             file?: string;
-            /** @description Pairs of a position along the axis (within 10 m, ascending) and the thickness there (10 µm to 500 mm), 1000 pairs at most; linear between them, constant before the first and after the last. */
+            /** @description Pairs of a position along the axis (within 10 m, ascending) and the thickness there (10 µm to 500 mm), 1000 pairs at most. Linear between them, constant before the first and after the last. */
             table?: [
                 string,
                 string
             ][];
         };
-        /** @description A tissue by its values: a law with its parameters, or `spring`. The simplest is `young` with `poisson`. */
+        /** @description A tissue given by its values: either a law with its parameters, or `spring`. The simplest form is `young` with `poisson`. */
         TissueTable: {
             /**
              * Format: double
@@ -659,10 +659,10 @@ export interface components {
              * @description Gent: the I1 − 3 beyond which the tissue cannot be stretched, 0.01 to 10000. A pull to the stretch λ at constant volume is I1 − 3 = λ² + 2/λ − 3.
              */
             jm?: number;
-            /** @description The elastic law, which says what parameters the tissue takes. All laws are alike at small strain. Default: "neo-hookean". */
+            /** @description The elastic law. It determines which parameters the tissue takes. All laws agree at small strain. Default: "neo-hookean". */
             law?: components["schemas"]["LawName"];
             /**
-             * @description What the tissue is called in reports. Default: "given in the scene".
+             * @description Name of the tissue in reports. Default: "given in the scene".
              * @default given in the scene
              */
             name?: string;
@@ -671,23 +671,23 @@ export interface components {
              * @description Poisson's ratio at small strain, 0 to 0.4999. Default: 0.45, customary in limb indentation.
              */
             poisson?: number;
-            /** @description How the tissue relaxes while it is held. Default: not at all. */
+            /** @description Relaxation of the stress at constant strain. Default: not at all. */
             prony?: components["schemas"]["PronyTable"];
             /**
              * @description The shear modulus at small strain, 1 Pa to 1 GPa.
              * @example 12 kPa
              */
             shear?: string;
-            /** @description Where the values are from, in words. Default: nothing said. */
+            /** @description Source of the values, in words. Default: nothing said. */
             source?: string;
             /**
-             * @description The stiffness of every bar of the layer, 1 µN/m to 1 MN/m; for the reference method only, without any law.
+             * @description Stiffness of every bar of the layer, 1 µN/m to 1 MN/m. For the reference method only, and without a law.
              * @example 90 dyn/cm
              */
             spring?: string;
-            /** @description Ogden: 1 to 6 terms; the shear modulus is the sum of their `mu`. */
+            /** @description Ogden only: 1 to 6 terms. The sum of their `mu` is the shear modulus. */
             terms?: components["schemas"]["OgdenTable"][];
-            /** @description How the energy of a change of volume grows; the linear and the St. Venant-Kirchhoff law have the quadratic one. Default: "quadratic". */
+            /** @description The energy of a change of volume. The linear and the St. Venant-Kirchhoff law always use the quadratic one. Default: "quadratic". */
             volume?: components["schemas"]["Volume"];
             /**
              * @description Young's modulus at small strain, 10 Pa to 1 GPa. Stands in place of `c10`, `shear` or an Ogden term's `mu`.
@@ -697,63 +697,63 @@ export interface components {
         };
         /** @description The shapes of tools. */
         ToolShape: "disc" | "node" | "sphere" | "flat-punch" | "capsule" | "box" | "fingertip" | "cone";
-        /** @description What presses. A disc and a node hold the skin; the other shapes press by contact. */
+        /** @description The tool. A disc and a node are bonded to the skin; all other shapes press by contact. */
         ToolTable: {
-            /** @description Capsule, box and fingertip: the direction that the tool's length points along, as nearly as it can lying across the press. Default: as near to x as it goes, or to y where the press is along x. */
+            /** @description Capsule, box and fingertip: the direction of the tool's length. Only the part across the press counts. Default: as near to x as possible, or to y if the press is along x. */
             axis?: components["schemas"]["AxisName"] | [
                 number,
                 number,
                 number
             ];
             /**
-             * @description Flat punch, box and cone: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the radius of punch or cone or half the box's smallest size. Default: 0.3 of these.
+             * @description Flat punch, box and cone: the radius of the rounded edges, 1 µm to 200 mm. It is limited to the radius of the punch or cone, or to half the smallest size of the box. Default: 0.3 of these.
              * @example 1.5 mm
              */
             edge_radius?: string;
             /**
              * Format: double
-             * @description All but disc and node: Coulomb's coefficient of friction with the skin, 0 to 5. Default: 0, without friction.
+             * @description All shapes except disc and node: Coulomb's coefficient of friction with the skin, 0 to 5. Default: 0, without friction.
              */
             friction?: number;
             /**
-             * @description Capsule only: the length of its straight part, 0.1 mm to 400 mm. Default: "20 mm".
+             * @description Capsule only: the length of the straight part, 0.1 mm to 400 mm. Default: "20 mm".
              * @example 1.5 mm
              */
             length?: string;
             /**
-             * @description Cone only: the whole angle at its tip, 20 deg to 160 deg. Default: "120 deg".
+             * @description Cone only: the full angle at the tip, 20 deg to 160 deg. Default: "120 deg".
              * @example 30 deg
              */
             opening_angle?: string;
-            /** @description Fingertip only: the radii of the pad along the finger, across it and in the direction of the press, each 0.1 mm to 200 mm. Default: ["8 mm", "7 mm", "7 mm"], which curve by 9.1 mm along and 7 mm across; pads of index fingers have 7-10 mm and 6-8 mm (from memory, after Serina et al. 1998). */
+            /** @description Fingertip only: the radii of the pad along the finger, across it and in the direction of the press, each 0.1 mm to 200 mm. Default: ["8 mm", "7 mm", "7 mm"], with radii of curvature of 9.1 mm along and 7 mm across the finger. The pads of index fingers have 7-10 mm and 6-8 mm (from memory, after Serina et al. 1998). */
             radii?: [
                 string,
                 string,
                 string
             ];
             /**
-             * @description Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Cone: that of its shaft. Default: "8 mm".
+             * @description Disc, sphere, flat punch and capsule: the radius, 0.1 mm to 200 mm. Cone: the radius of its shaft. Default: "8 mm".
              * @example 1.5 mm
              */
             radius?: string;
             /**
-             * @description Its shape. Default: "disc".
+             * @description Shape of the tool. Default: "disc".
              * @default disc
              */
             shape?: components["schemas"]["ToolShape"];
-            /** @description Box only: its whole size along, across and in the direction of the press, each 0.2 mm to 400 mm. Default: ["16 mm", "16 mm", "16 mm"]. */
+            /** @description Box only: the full size along, across and in the direction of the press, each 0.2 mm to 400 mm. Default: ["16 mm", "16 mm", "16 mm"]. */
             size?: [
                 string,
                 string,
                 string
             ];
             /**
-             * @description Cone only: the radius by which its tip is rounded, 1 µm to 200 mm, no more than `radius`. Default: "3 mm", or `radius` if that is less.
+             * @description Cone only: the radius of the rounded tip, 1 µm to 200 mm, no more than `radius`. Default: "3 mm", or `radius` if that is less.
              * @example 1.5 mm
              */
             tip_radius?: string;
         };
-        /** @description How the volumetric part of an energy grows with the volume ratio `v`, which is `det F` but in the linear law (its small-strain likeness `1 + tr ε`) and in St. Venant–Kirchhoff's (`1 + tr E`). */
+        /** @description Form of the volumetric energy as a function of the volume ratio `v`. `v` is `det F`, except in the linear law (`1 + tr ε`) and in St. Venant–Kirchhoff's (`1 + tr E`). */
         Volume: "quadratic" | "logarithmic";
     };
     responses: never;

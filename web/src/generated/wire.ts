@@ -42,24 +42,24 @@ class Reader {
   }
 }
 
-/** A body at rest: sent to each page once, and again when the mesh changes. */
+/** A body at rest. Sent to each page once, and again when the mesh changes. */
 export interface MeshSnapshot {
   kind: 1;
-  /** Its number; frames say to which they belong. */
+  /** Number of the mesh; each frame names the mesh that it belongs to. */
   mesh: number;
-  /** Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level 0 is the skin, the last is held by bone or base. */
+  /** Nodes in a column. Node (v, l) of skin vertex v has the index `v * n_levels + l`; level 0 is the skin, the last level is held by bone or base. */
   n_levels: number;
-  /** Nodes at rest, m: x, y, z one after the other. */
+  /** Nodes at rest, m: x, y, z of each in turn. */
   positions: Float32Array;
-  /** Triangles of the skin, outward: three vertices each. Under each stands a prism per interval between levels. */
+  /** Triangles of the skin, oriented outward: three vertices each. Under each triangle is one prism per interval between two levels. */
   triangles: Uint32Array;
-  /** The layer of each interval. */
+  /** Index of the layer that each interval belongs to. */
   interval_layer: Uint8Array;
-  /** Young's modulus at small strain of every prism, Pa (or N/m of bars): prism (t, i) at `t * (n_levels - 1) + i`. */
+  /** Young's modulus at small strain of every prism, Pa (N/m for bars): prism (t, i) at `t * (n_levels - 1) + i`. */
   stiffness: Float32Array;
   /** Vertices of the bones' surfaces, m; they do not move. */
   bone_positions: Float32Array;
-  /** Their triangles. */
+  /** Triangles of the bones' surfaces. */
   bone_triangles: Uint32Array;
 }
 
@@ -77,52 +77,52 @@ function readMeshSnapshot(r: Reader): MeshSnapshot {
   };
 }
 
-/** A moment of a body that is pressed, and of who presses. */
+/** One moment of the pressed body and of the tool. */
 export interface FrameSnapshot {
   kind: 2;
-  /** The mesh that it belongs to. */
+  /** Number of the mesh that the frame belongs to. */
   mesh: number;
-  /** Counts frames. */
+  /** Counts the frames. */
   sequence: number;
-  /** Whether it is of a recording (1) or of now (0). */
+  /** 1 for a frame of a recording, 0 for a live one. */
   is_replay: number;
-  /** The tick of the 1 kHz loop. */
+  /** Number of the tick of the 1 kHz loop. */
   tick: number;
-  /** When that was, s since the engine's start; in a recording, since its beginning. */
+  /** Time of the tick, s since the engine's start; in a recording, s since its start. */
   time: number;
-  /** Where the device is: the tip of the tool as the hand holds it, m. */
+  /** Position of the device: the tip of the tool as the hand holds it, m. */
   device: [number, number, number];
-  /** Where the tip of the tool is, m: stands off the device where the tissue is stiffer than the device can render. */
+  /** Position of the tool's tip, m. It differs from the device where the tissue is stiffer than the device can render. */
   tool: [number, number, number];
-  /** How the tool is turned: quaternion i, j, k, w. */
+  /** Orientation of the tool: quaternion i, j, k, w. */
   orientation: [number, number, number, number];
-  /** Force on the hand, N, as commanded at this tick. */
+  /** Force on the hand commanded at this tick, N. */
   force: [number, number, number];
-  /** How far the tip is under the skin at rest, m. */
+  /** Depth of the tip below the skin at rest, m. */
   depth: number;
-  /** Deepest that the hand goes there, m: what is under the skin is not thicker. */
+  /** Largest depth that the hand presses there, m; the thickness of the tissue limits it. */
   deepest: number;
-  /** Share of the force that is let through; below 1 after a fault. */
+  /** Factor on the force, 0 to 1; below 1 after a fault. */
   gain: number;
-  /** Vertices that touch. */
+  /** Number of skin vertices in contact. */
   n_active: number;
-  /** How the tissue's last step went: 0 converged, 1 unfinished, 2 behind the tool, 3 settling, 4 failed. */
+  /** Result of the tissue's last step: 0 converged, 1 unfinished, 2 behind the tool, 3 settling, 4 failed. */
   step_status: number;
-  /** What was wrong at this tick, as bits. */
+  /** Faults at this tick, as bits. */
   faults: number;
-  /** Limits that the force met, as bits. */
+  /** Force limits reached at this tick, as bits. */
   limits: number;
   /** Length of one unit of `displacements`, m. */
   displacement_unit: number;
-  /** Displacements of the nodes: x, y, z one after the other. */
+  /** Displacements of the nodes: x, y, z of each in turn. */
   displacements: Int16Array;
-  /** Which field follows: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch. */
+  /** Field in `field_values`: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch. */
   field: number;
-  /** The field's value at 0. */
+  /** Field value that 0 stands for. */
   field_min: number;
-  /** The field's value at 65535. */
+  /** Field value that 65535 stands for. */
   field_max: number;
-  /** The field at the nodes; empty without one. */
+  /** The field at the nodes; empty without a field. */
   field_values: Uint16Array;
 }
 

@@ -1,4 +1,4 @@
-//! What a command is given: where to write, whom to tell, whether to stop.
+//! The context of a command: output folder, messages, interruption.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write as _};
@@ -14,10 +14,11 @@ use serde::Serialize;
 use super::Options;
 use palpa_plot::output::OutDir;
 
-/// The surroundings of a running command.
+/// The context of a running command.
 ///
-/// A long command polls [`is_interrupted`](Self::is_interrupted) in its loop and, when it is set, finishes the files of
-/// what it has and returns [`Outcome::Interrupted`](crate::commands::Outcome::Interrupted).
+/// A long command polls [`is_interrupted`](Self::is_interrupted) in its loop. When it is set, the
+/// command completes its files with the results so far and returns
+/// [`Outcome::Interrupted`](crate::commands::Outcome::Interrupted).
 #[derive(Debug)]
 pub struct Context {
     is_json: bool,
@@ -29,7 +30,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// Surroundings of the command named `command`; its default output folder is `out/<command>`.
+    /// Context of the command named `command`; its default output folder is `out/<command>`.
     pub fn new(options: Options, command: &'static str) -> Self {
         Self {
             is_json: options.json,
@@ -41,7 +42,7 @@ impl Context {
         }
     }
 
-    /// Whether standard output is for a machine.
+    /// Whether standard output is JSON (`--json`).
     pub fn is_json(&self) -> bool {
         self.is_json
     }
@@ -51,10 +52,11 @@ impl Context {
         self.out.is_some()
     }
 
-    /// The output folder, made if it is not there yet. Ask for it before the long work, not after.
+    /// The output folder; created if it does not exist. Call this before the long work, so that an
+    /// error comes early.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to.
+    /// If the folder cannot be created or written to.
     pub fn out_dir(&self) -> anyhow::Result<&OutDir> {
         if let Some(dir) = self.opened.get() {
             return Ok(dir);
@@ -71,11 +73,11 @@ impl Context {
         self.opened.get().map(OutDir::path)
     }
 
-    /// Prints a line of the readable report on standard output; nothing with `--json`. A reader that has had enough
-    /// (`palpa … | head`) does not keep the command from its work.
+    /// Prints a line of the readable report on standard output; nothing with `--json`. If the
+    /// reader has closed the output (`palpa … | head`), the command goes on.
     ///
     /// # Errors
-    /// When standard output is full.
+    /// If standard output is full.
     pub fn say(&self, line: impl Display) -> anyhow::Result<()> {
         if self.is_json {
             return Ok(());
@@ -83,10 +85,10 @@ impl Context {
         unless_closed(writeln!(io::stdout().lock(), "{line}"))
     }
 
-    /// Prints the result for machines, with `--json` only.
+    /// Prints the result as JSON, with `--json` only.
     ///
     /// # Errors
-    /// When standard output is full.
+    /// If standard output is full.
     pub fn json(&self, result: &impl Serialize) -> anyhow::Result<()> {
         if !self.is_json {
             return Ok(());
@@ -96,17 +98,18 @@ impl Context {
         unless_closed(written.and_then(|()| writeln!(stdout)))
     }
 
-    /// Tells people something beside the result, on standard error.
+    /// Prints a note for people on standard error, beside the result.
     pub fn note(&self, line: impl Display) {
         super::eprint_quietly(&line.to_string());
     }
 
-    /// Whether the person has asked to stop (Ctrl-C).
+    /// Whether the user has asked to stop (Ctrl-C).
     pub fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
     }
 
-    /// A progress bar over `len` steps, seen only where standard error is a terminal. It vanishes when dropped.
+    /// A progress bar over `len` steps, shown only if standard error is a terminal. It vanishes
+    /// when dropped.
     pub fn progress(&self, len: usize, what: &'static str) -> ProgressBar {
         if self.is_json || !io::stderr().is_terminal() {
             return ProgressBar::hidden();
@@ -121,8 +124,9 @@ impl Context {
         bar
     }
 
-    /// From here on an interrupt leaves what was done: the command polls
-    /// [`is_interrupted`](Self::is_interrupted). Before, there is nothing to keep, and Ctrl-C ends the command at once.
+    /// From this call on, an interrupt keeps the results so far: the command polls
+    /// [`is_interrupted`](Self::is_interrupted). Before it there is nothing to keep, and Ctrl-C
+    /// ends the command at once.
     pub fn begin_recording(&self) {
         self.is_recording.store(true, Ordering::Relaxed);
     }
@@ -141,7 +145,7 @@ impl Context {
     }
 }
 
-/// Success also when nobody reads standard output any more.
+/// Treats a closed standard output as success.
 fn unless_closed(written: io::Result<()>) -> anyhow::Result<()> {
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

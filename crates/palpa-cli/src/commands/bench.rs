@@ -1,4 +1,4 @@
-//! `palpa bench`: rates of the moving step, with the errors that it has at them.
+//! `palpa bench`: rates of the moving step, and its errors at these rates.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +15,7 @@ use palpa_lab::bench::refined::Problem;
 use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
 use palpa_lab::bench::{BenchReport, BenchRow, Mode, growth, picture};
 
-/// How the table is measured, for the report.
+/// Description for the report of how the table is measured.
 const METHOD: &str = "thread-CPU time of Live::step alone, one core; a frictionless sphere comes down at up to 50 mm/s and no \
     more than 0.25 mm a step, presses 5 mm deep, strokes 20 mm sideways and lifts (the graded bodies: presses and lifts); \
     median and 99th percentile over all steps in contact; background work runs apart, is taken over as many steps later as \
@@ -24,23 +24,23 @@ const METHOD: &str = "thread-CPU time of Live::step alone, one core; a frictionl
     those on a refined mesh, while pressing; total error: forces of the moving step against those on the refined mesh, \
     while pressing";
 
-/// Measure the moving step: steps per second with the errors that they have
+/// Measure the speed and the error of the moving step
 ///
-/// A tool presses, strokes and lifts at the step's own rate, with contact that changes and zones that are left, on bodies of 1k to
-/// 64k nodes and on meshes that are graded toward the tool; rates are medians of thread-CPU time on one core. Writes
-/// bench.json, bench.csv, and bench.svg and .png.
+/// A tool presses, strokes and lifts on bodies of 1,000 to 64,000 nodes and on meshes graded toward
+/// the tool. Contact changes on the way, and the tool leaves the zones. Rates are medians of
+/// thread-CPU time on one core. Writes bench.json, bench.csv, bench.svg and bench.png.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only this case, by name; may be repeated [default: all]
+    /// Run only this case; may be repeated [default: all]
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
-    /// Small bodies only, for a look that takes seconds
+    /// Use small bodies only; takes seconds
     #[arg(long, conflicts_with = "cases")]
     quick: bool,
-    /// List the cases, and run none
+    /// List the cases and run none
     #[arg(long)]
     list: bool,
-    /// Compute the forces on refined meshes, which mesh errors are judged by, and run no case
+    /// Compute the forces on refined meshes, the reference for mesh errors, and run no case
     #[arg(long)]
     refined: bool,
 }
@@ -48,7 +48,7 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// When a case is not there, a body cannot be computed with, or a result cannot be written.
+/// If a case does not exist, a body cannot be computed with, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let chosen = chosen(args)?;
     if args.list {
@@ -97,7 +97,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Forces on refined meshes, as they are recorded in the source.
+/// Computes the forces on refined meshes that the source code records.
 fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Result<Outcome> {
     let mut found = Vec::new();
     for problem in Problem::ALL {
@@ -139,7 +139,7 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static BenchCase>> {
     Ok(cases().iter().filter(|case| is_named(case)).collect())
 }
 
-/// Measures all lines; whether it was not interrupted.
+/// Measures all lines. Returns false if interrupted.
 fn measure(
     chosen: &[&BenchCase],
     context: &Context,
@@ -206,7 +206,8 @@ fn row(
     let levels = model.body().n_levels;
     let refined = case.problem.recorded();
     let is_full = run.mode == Mode::Full;
-    // A tissue that relaxes is at once as stiff as the elastic one: what the mesh does shows there.
+    // Under a sudden press, relaxing tissue is as stiff as the elastic one, so its mesh error is
+    // measured there.
     let sudden = match case.tissue {
         Tissue::Relaxing if !refined.is_empty() => Some(truth(case, model, f64::INFINITY)?),
         _ => None,
@@ -259,7 +260,8 @@ fn row(
     })
 }
 
-/// Compares a case's zone and whole steps with a full factor, and the smallest body with the dense inverse.
+/// Compares a case's zone and whole steps with a full factorization, and the smallest body with the
+/// dense inverse.
 fn ratios(case: &BenchCase, model: &Arc<Model>, report: &mut BenchReport) -> anyhow::Result<()> {
     const DENSE: [(&str, usize); 1] = [("324", 9)];
     const BUDGET: Duration = Duration::from_millis(500);

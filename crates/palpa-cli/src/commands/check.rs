@@ -19,23 +19,24 @@ use palpa::one_paragraph;
 
 /// Check surfaces and scenes: what is wrong, where, and what to do
 ///
-/// Reads OBJ, STL, PLY, OFF, GLB and glTF, and scenes with the surfaces that they name and the body that grows from them. Exit code 0: usable as it is; 1:
-/// has defects, and the report says whether repair removes them; 2: cannot be read.
+/// Reads surfaces (OBJ, STL, PLY, OFF, GLB, glTF) and scenes. Of a scene, it checks the surfaces
+/// that the scene names and the body that grows from them. Exit code 0: usable as it is. 1: has
+/// defects; the report says whether a repair removes them. 2: cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Surfaces, or scenes (.toml)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Unit of the coordinates of surfaces: m, cm, mm or in. A scene says its own
+    /// Unit of the coordinates of surfaces: m, cm, mm or in. Scenes state their own unit
     #[arg(long, default_value = "m", value_parser = unit)]
     unit: LengthUnit,
-    /// Write the repaired copy of a single surface here (.obj, .ply, .off, .stl), in metres
+    /// Write a repaired copy of a single surface to this file (.obj, .ply, .off, .stl), in metres
     #[arg(long, value_name = "FILE")]
     repaired: Option<PathBuf>,
     /// Move the middle of the repaired copy to the origin
     #[arg(long)]
     recentre: bool,
-    /// Weld vertices nearer than this share of the size of the surface, in the repaired copy
+    /// In the repaired copy, weld vertices closer than this share of the size of the surface
     #[arg(long, value_name = "SHARE", default_value_t = RepairOptions::default().weld_tolerance, value_parser = share)]
     weld: f64,
 }
@@ -57,26 +58,26 @@ fn share(word: &str) -> Result<f64, String> {
     }
 }
 
-/// What is known about one file of the command line.
+/// The result for one file of the command line.
 #[derive(Debug, Serialize)]
 struct FileResult {
     file: PathBuf,
-    /// None where it could not be read.
+    /// `None` if the file could not be read.
     verdict: Option<Verdict>,
-    /// Why it could not be read.
+    /// The reason if the file could not be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
-    /// The surface itself, or those that a scene names.
+    /// The surface of the file, or the surfaces that a scene names.
     surfaces: Vec<SurfaceResult>,
-    /// The body that a scene grows, if it does.
+    /// The body that grows from a scene; `None` if none grows.
     #[serde(skip_serializing_if = "Option::is_none")]
     body: Option<GrowthReport>,
-    /// Why a scene's surfaces, sound each, make no body.
+    /// Why no body grows, although each surface of the scene is sound.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
 }
 
-/// What is known about one surface.
+/// The result for one surface.
 #[derive(Debug, Serialize)]
 struct SurfaceResult {
     file: PathBuf,
@@ -85,7 +86,7 @@ struct SurfaceResult {
     notes: Vec<NoteResult>,
     #[serde(flatten)]
     examination: Examination,
-    /// Where the repaired copy is.
+    /// Path of the repaired copy.
     #[serde(skip_serializing_if = "Option::is_none")]
     written: Option<PathBuf>,
 }
@@ -96,10 +97,11 @@ struct NoteResult {
     message: String,
 }
 
-/// Checks all files, and tells about each.
+/// Checks all files and reports on each.
 ///
 /// # Errors
-/// When a file cannot be read, or a repaired copy cannot be written. The other files are reported before.
+/// If a file cannot be read, or a repaired copy cannot be written. The reports on the other files
+/// are printed first.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     ensure!(
         args.repaired.is_none() || args.files.len() == 1,
@@ -135,7 +137,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Checks one file. That it cannot be read is a result; that a copy of it cannot be written is an error.
+/// Checks one file. An unreadable file is a result; a copy that cannot be written is an error.
 fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<FileResult> {
     let mut result = FileResult {
         file: file.into(),
@@ -197,14 +199,14 @@ fn is_scene(file: &Path) -> bool {
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
-/// A surface that was read, with what is needed to understand its coordinates.
+/// A surface that was read, with the data needed to interpret its coordinates.
 struct Named {
     path: PathBuf,
     surface: SurfaceFile,
     unit: LengthUnit,
 }
 
-/// The surface of a file, or those that a scene names.
+/// The surface of a file, or the surfaces that a scene names.
 fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
     let read = |path: &Path, unit: LengthUnit| -> anyhow::Result<Named> {
         Ok(Named {
@@ -229,7 +231,7 @@ fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
         .collect()
 }
 
-/// Writes the repaired copy, if one was asked for and there is something in it; returns where.
+/// Writes the repaired copy, if one was requested and it is not empty. Returns its path.
 fn write_repaired(
     path: &Path,
     examination: &Examination,
@@ -251,7 +253,7 @@ fn write_repaired(
     Ok(Some(target))
 }
 
-/// `skin.obj` → `skin_repaired.obj`; what cannot be written in its own format becomes PLY.
+/// `skin.obj` → `skin_repaired.obj`. If the format cannot be written, the copy becomes PLY.
 fn name_of_copy(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path

@@ -16,24 +16,25 @@ use palpa_lab::export::{self, Deck, Export, Section};
 
 /// Write a scene as an input deck for CalculiX, to check its forces with another solver
 ///
-/// Without a SCENE, a forearm made by formula is exported. Writes body.inp, in millimetres, newtons and megapascals; run
-/// it with `ccx body` in its folder. Mesh, patch and way are those of `palpa press`. The forces on the way down are then in body.dat, the deformed body in body.frd.
+/// Without a SCENE, exports the built-in forearm. Mesh, patch and steps are those of `palpa press`.
+/// Writes body.inp, in millimetres, newtons and megapascals. Run it with `ccx body` in its folder:
+/// CalculiX then writes the forces of the loading to body.dat and the deformed body to body.frd.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML); the embedded forearm if none is given
+    /// Scene file (TOML); the built-in forearm if none is given
     scene: Option<PathBuf>,
-    /// The element that each prism becomes
+    /// Element type for the prisms
     #[arg(long, value_enum, default_value_t)]
     element: Element,
-    /// How deep, with its unit: "8 mm"
+    /// Depth of the press, with a unit: "8 mm"
     #[arg(long)]
     depth: Option<Length>,
-    /// Write the nearest that CalculiX knows where it does not know what the scene says
+    /// Where CalculiX lacks a feature of the scene, write the nearest one that it has
     #[arg(long)]
     approximate: bool,
 }
 
-/// What was written.
+/// Report on the written deck.
 #[derive(Debug, Serialize)]
 struct Report<'a> {
     scene: &'a str,
@@ -44,10 +45,10 @@ struct Report<'a> {
     n_elements: usize,
     /// Nodes that move with the tool.
     n_patch_nodes: usize,
-    /// Radius of the circle that has the area of the skin between these nodes. mm
+    /// Radius of the circle with the area of the skin between these nodes, mm.
     patch_radius_mm: f64,
     depth_mm: f64,
-    /// Where the tool goes.
+    /// Direction of the travel of the tool.
     direction: [f64; 3],
     materials: Vec<Section>,
     notes: &'a [String],
@@ -56,10 +57,10 @@ struct Report<'a> {
 /// The elements of CalculiX that a prism can become.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 enum Element {
-    /// Quadratic, 15 nodes: CalculiX's own answer at its best
+    /// Quadratic, 15 nodes: the most accurate
     #[default]
     C3d15,
-    /// Linear, 6 nodes: small, but much too stiff where tissue keeps its volume
+    /// Linear, 6 nodes: a small file, but much too stiff for nearly incompressible tissue
     C3d6,
 }
 
@@ -75,7 +76,8 @@ impl From<Element> for export::Element {
 /// Runs the command.
 ///
 /// # Errors
-/// On a bad scene or body, on what CalculiX cannot say, and when the deck cannot be written.
+/// If the scene or body is bad, if CalculiX lacks a feature of the scene, or if the deck cannot be
+/// written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let mut scene = match &args.scene {
         Some(path) => Scene::load(path)?,
@@ -196,7 +198,7 @@ fn patch(pressed: &PressedBody) -> Vec<usize> {
     }
 }
 
-/// Without what would end a comment.
+/// The text without line breaks, which would end a comment.
 fn one_line(text: &str) -> String {
     text.replace(['\n', '\r'], " ")
 }

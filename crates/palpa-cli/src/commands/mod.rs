@@ -1,8 +1,9 @@
 //! The commands, one module each.
 //!
-//! A command module has `pub struct Args` (derives [`clap::Args`]; its doc comments are the help text) and
-//! `pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome>`. To add one: write the module, and name it
-//! below once in [`Command`], once in [`Command::name`] and once in [`Command::run`].
+//! A command module has `pub struct Args` (derives [`clap::Args`]; its doc comments are the help
+//! text) and `pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome>`. To add one:
+//! write the module, and name it below once in [`Command`], once in [`Command::name`] and once in
+//! [`Command::run`].
 
 use clap::Subcommand;
 
@@ -20,14 +21,14 @@ pub mod z_width;
 
 use crate::cli::Context;
 
-/// How a command ended, other than by an error.
+/// How a command ended without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// It did what was asked. Exit code 0
+    /// The command did its work, and the result is good. Exit code 0
     Done,
-    /// It did what was asked, and what it found is not good. Exit code 1
+    /// The command did its work, but the result is not good. Exit code 1
     NotGood,
-    /// It was asked to stop, and has left complete files of what was done until then. Exit code 130
+    /// The command was interrupted and left complete files of the results until then. Exit code 130
     Interrupted,
 }
 
@@ -69,7 +70,7 @@ impl Command {
     /// Runs the command.
     ///
     /// # Errors
-    /// On bad input, and when a result cannot be written.
+    /// If the input is bad, or a result cannot be written.
     pub fn run(&self, context: &Context) -> anyhow::Result<Outcome> {
         match self {
             Self::Bench(args) => bench::run(args, context),

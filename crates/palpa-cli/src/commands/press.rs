@@ -1,4 +1,5 @@
-//! `palpa press`: a scripted indentation, as table, plots, pictures and a series for ParaView.
+//! `palpa press`: a scripted indentation; writes a table, plots, pictures and a series for
+//! ParaView.
 
 mod cut;
 mod files;
@@ -16,42 +17,43 @@ use super::Outcome;
 use crate::cli::Context;
 use palpa_plot::output::OutDir;
 
-/// Distance of skin vertices at which the embedded forearm is grown for the continuum. m
+/// Vertex spacing of the skin from which the embedded forearm grows for the continuum, m.
 const COARSE_SPACING: f64 = 10e-3;
 
 /// Press a body along a script and record the force
 ///
-/// Without a SCENE, a forearm made by formula is pressed. Writes the table (press.csv, press.json), force against depth
-/// and time (SVG and PNG), a cross-section, and the deformed body as a VTU/PVD series for ParaView.
+/// Without a SCENE, presses the built-in forearm. Writes the table (press.csv, press.json), force
+/// against depth and time (SVG and PNG), a cross-section, and the deformed body as a VTU/PVD series
+/// for ParaView.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML); the embedded forearm if none is given
+    /// Scene file (TOML); the built-in forearm if none is given
     scene: Option<PathBuf>,
-    /// How the body answers [default: as the scene says, or tissue]
+    /// Model of the body [default: the scene's, or tissue]
     #[arg(long, value_enum)]
     model: Option<Model>,
-    /// Press at the skin point nearest to this one, "X,Y,Z" with units: "120 mm,0 mm,40 mm"
+    /// Press at the skin point nearest to X,Y,Z, with units: "120 mm,0 mm,40 mm"
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     at: Option<String>,
     /// Press at this vertex of the skin surface
     #[arg(long, value_name = "N", conflicts_with = "at")]
     vertex: Option<u32>,
-    /// How deep, with its unit: "8 mm"; the steps grow or shrink with it unless --step is given
+    /// Depth of the press, with a unit: "8 mm". Steps scale with it unless --step is given
     #[arg(long)]
     depth: Option<Length>,
-    /// How fast, with its unit: "10 mm/s"
+    /// Speed of the press, with a unit: "10 mm/s"
     #[arg(long)]
     speed: Option<Velocity>,
-    /// How long to rest at the depth: "0.5 s"
+    /// Time to hold at the full depth, with a unit: "0.5 s"
     #[arg(long)]
     hold: Option<Time>,
-    /// Depth between two results: "0.5 mm"
+    /// Depth from one result to the next, with a unit: "0.5 mm"
     #[arg(long)]
     step: Option<Length>,
-    /// Stop at the depth instead of coming back
+    /// Stop at the full depth; do not retract
     #[arg(long)]
     no_retract: bool,
-    /// Deformed bodies in the series for ParaView, rest and deepest among them; 0 for none
+    /// Number of deformed bodies in the ParaView series, including rest and the deepest; 0 for none
     #[arg(long, default_value_t = 9, value_name = "N")]
     frames: usize,
 }
@@ -59,16 +61,16 @@ pub struct Args {
 /// The models of response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Model {
-    /// A continuum: nonlinear, nearly incompressible, viscoelastic
+    /// Continuum: nonlinear, nearly incompressible, viscoelastic
     Tissue,
-    /// The network of bars of 2009
+    /// Network of bars, the method of 2009
     Reference,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// On a bad scene or body, and when a result cannot be written.
+/// If the scene or body is bad, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let scene = adjusted_scene(args)?;
     let out = context.out_dir()?;
@@ -89,7 +91,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     }
 }
 
-/// What is to be done, and where its results go.
+/// A press to run, and the destination of its results.
 #[derive(Clone, Copy)]
 struct Job<'a> {
     args: &'a Args,
@@ -99,7 +101,7 @@ struct Job<'a> {
     scene_name: &'a str,
 }
 
-/// The scene with what the command line changes in it.
+/// The scene with the changes of the command line.
 fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
     let mut scene = match &args.scene {
         Some(path) if is_surface(path) => bail!(
@@ -127,7 +129,7 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         press.target = Target::Vertex(vertex);
     }
     if let Some(depth) = args.depth {
-        // The step keeps its share of the depth unless it is given, too.
+        // The step keeps its share of the depth unless the step is given too.
         press.step *= depth.si() / press.depth;
         press.depth = depth.si();
     }
@@ -148,8 +150,9 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Grows the embedded forearm from a coarser skin than its scene says: bars need fine triangles everywhere, but the continuum
-/// is refined where it is pressed. Its force changes by less than a hundredth, and takes a third of the time.
+/// Lets the embedded forearm grow from a coarser skin than in its scene. Bars need fine triangles
+/// everywhere, but the continuum is refined where it is pressed. Its force changes by less than one
+/// per cent, and the press takes a third of the time.
 fn coarsen(scene: &mut Scene) {
     if let Skin::Generated(Generator::Forearm { spacing, .. }) = &mut scene.body.skin {
         *spacing = COARSE_SPACING;

@@ -1,4 +1,4 @@
-//! `palpa replay`: a log run again.
+//! `palpa replay`: runs a log again.
 
 use std::path::PathBuf;
 
@@ -11,19 +11,20 @@ use super::Outcome;
 use crate::cli::Context;
 use palpa::live::{LiveScene, SpringScene, changed_files, scene_of};
 
-/// Run a log again and compare, or export it as tables
+/// Run a log again and compare the forces, or export it as tables
 ///
-/// Makes the body anew from the scene in the log, runs the tissue's steps and the 1 kHz law from what was logged, in one
-/// thread, and compares all forces and patches: to the bit on the same kind of processor, within a tolerance on another.
-/// Exits with 1 when they differ.
+/// Builds the body from the scene in the log. Then runs the steps of the tissue and the 1 kHz law
+/// again in one thread, from the logged inputs, and compares all forces and patches. They must be
+/// equal bit for bit on the same kind of processor, and within a tolerance on another. Exit code 1
+/// if they differ.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log (MCAP), as `palpa loop-report` writes it
     log: PathBuf,
-    /// Make the body from this scene instead of the one in the log
+    /// Build the body from this scene instead of the one in the log
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Write the log as tables into the output folder, and do not run it again
+    /// Write the log as tables to the output folder; do not run it again
     #[arg(long, value_enum)]
     export: Option<Format>,
 }
@@ -37,7 +38,7 @@ enum Format {
     Parquet,
 }
 
-/// What is printed with `--json`.
+/// Content of the `--json` output.
 #[derive(Debug, Serialize)]
 struct Found {
     verdict: &'static str,
@@ -50,13 +51,14 @@ struct Found {
     first_tick_differing: Option<u64>,
     max_force_difference_n: f64,
     stopped: Option<String>,
-    /// Whether the log was closed properly, and what is damaged in it.
+    /// Whether the log was closed properly.
     is_whole: bool,
+    /// The damage, if the log is damaged.
     damage: Option<String>,
     changed_files: Vec<String>,
 }
 
-/// What is printed with `--export` and `--json`.
+/// Content of the `--json` output with `--export`.
 #[derive(Debug, Serialize)]
 struct Tables {
     files: Vec<PathBuf>,
@@ -81,7 +83,7 @@ fn again(log: &Log, tissue: impl Tissue, context: &Context) -> ReplayReport {
 /// Runs the command.
 ///
 /// # Errors
-/// When the log cannot be read, its scene not be built, or a table not be written.
+/// If the log cannot be read, its scene cannot be built, or a table cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     if let Some(format) = args.export {
         return export(args, format, context);
@@ -174,7 +176,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Says that a log is not whole.
+/// Prints a note if a log is not complete.
 fn note_ending(ending: &Ending, context: &Context) {
     match ending {
         Ending::Whole => {}

@@ -1,4 +1,4 @@
-//! `palpa reproduce`: the thesis's evaluation side by side with ours.
+//! `palpa reproduce`: the evaluation of the thesis side by side with Palpa's results.
 
 use std::time::Duration;
 
@@ -19,20 +19,23 @@ use palpa_plot::output::OutDir;
 /// Depth ranges of the fits, in mm: the thesis does not say how deep its figures go.
 const RANGES_MM: [usize; 3] = [60, 90, 120];
 
-/// The uniform body's force must be this nearly proportional down to 60 mm (figure 4.2), or the result is not good.
+/// Smallest R² of a line through the uniform body's force down to 60 mm (figure 4.2); below it the
+/// result is not good.
 const LEAST_R2: f64 = 0.99;
 
-/// Reproduce the evaluation of the reference method: table 4.2 and figures 4.2 to 4.4
+/// Reproduce the evaluation of the reference method of 2009: table 4.2, figures 4.2 to 4.4
 ///
-/// Steps per second against the dense inverse of 2009, and force against depth for a uniform body and two layered ones, over
-/// all readings of what the text leaves open; and the same bodies as a continuum, to show from which push on a hard layer is
-/// felt. Writes reproduce.json, table.csv, sweep.csv, curves.csv, continuum.csv, and reproduce.svg and .png.
+/// Measures steps per second against the dense inverse of 2009. Computes force against depth for a
+/// uniform body and two layered ones, for every reading of what the text leaves open. Computes the
+/// same bodies as a continuum, to show at which depth of press a hard layer is felt. Writes
+/// reproduce.json, table.csv, sweep.csv, curves.csv, continuum.csv, reproduce.svg and
+/// reproduce.png.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Leave out of the speed table what has more nodes than this
+    /// Largest number of nodes in the speed table
     #[arg(long, value_name = "N", default_value_t = 16_384)]
     max_nodes: usize,
-    /// How long each rate of the speed table is measured, in seconds
+    /// Time to measure each rate of the speed table, in seconds
     #[arg(long, value_name = "S", default_value_t = 0.5, value_parser = seconds)]
     seconds: f64,
 }
@@ -46,7 +49,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Everything that was done until an interruption.
+/// The results; after an interruption, those completed until then.
 #[derive(Debug, Default)]
 struct Done {
     report: Report,
@@ -57,7 +60,7 @@ struct Done {
 /// Runs the evaluation.
 ///
 /// # Errors
-/// When a result cannot be written.
+/// If a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     context.out_dir()?;
     context.begin_recording();
@@ -83,7 +86,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Figures and sweep; whether they were finished.
+/// Computes figures and sweep. Returns whether they were finished.
 fn figures(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     let main = Curves::compute(MAIN)?;
     let small = Curves::compute(Reading { n: 3, ..MAIN })?;
@@ -182,7 +185,7 @@ fn say_figures(context: &Context, figures: &Figures) -> anyhow::Result<()> {
     context.say(&table)
 }
 
-/// Convergence and explicit Euler; whether they were finished.
+/// Computes convergence and explicit Euler. Returns whether they were finished.
 fn claims(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     done.report.convergence = convergence()?;
     context.say("\nForce at 40 mm in 4 steps, each in n parts (uniform body)")?;
@@ -234,7 +237,7 @@ fn claims(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     Ok(!context.is_interrupted())
 }
 
-/// The bodies as a continuum; whether they were finished.
+/// Computes the bodies as a continuum. Returns whether they were finished.
 fn continuum(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     let discs = discs();
     let progress = context.progress(n_steps(&discs), "continuum");
@@ -290,7 +293,7 @@ fn continuum(context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     Ok(!context.is_interrupted())
 }
 
-/// The speed table; whether it was finished.
+/// Measures the speed table. Returns whether it was finished.
 fn table(args: &Args, context: &Context, done: &mut Done) -> anyhow::Result<bool> {
     let budget = Duration::from_secs_f64(args.seconds);
     let shapes = shapes(args.max_nodes);

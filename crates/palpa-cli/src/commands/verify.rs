@@ -1,4 +1,4 @@
-//! `palpa verify`: problems with known answers, and how near the continuum model comes.
+//! `palpa verify`: compares the continuum model with known answers.
 
 mod report;
 
@@ -19,19 +19,20 @@ use palpa_plot::output::OutDir;
 
 /// Compare the continuum model with known answers
 ///
-/// Cases by formula need nothing else; with --reference, also those that compare with tables of other programs. Prints for each
-/// figure the known answer, ours, the error, how large it may be, and the nodes that can move; writes verify.csv, verify.json
-/// and the errors against the size of the mesh (convergence.csv, .svg and .png). Exit code 1 if any figure is out of
-/// tolerance.
+/// Cases by formula need nothing else. With --reference, Palpa also runs the cases that compare
+/// with tables of other programs. Prints each figure with the known answer, the computed one, the
+/// error, its tolerance, and the number of nodes that can move. Writes verify.csv, verify.json, and
+/// the errors against mesh size (convergence.csv, .svg and .png). Exit code 1 if any figure is out
+/// of tolerance.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only these cases, by name [default: all]
+    /// Cases to run, by name [default: all]
     #[arg(value_name = "CASE")]
     cases: Vec<String>,
-    /// Folder with the reference tables, for the cases that compare with them
+    /// Folder with the reference tables
     #[arg(long, value_name = "DIR")]
     reference: Option<PathBuf>,
-    /// List the cases, and run none
+    /// List the cases and run none
     #[arg(long)]
     list: bool,
 }
@@ -39,7 +40,7 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// When a case or a reference table is not there, and when a result cannot be written.
+/// If a case or a reference table does not exist, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let chosen = chosen(args)?;
     if args.list {
@@ -54,7 +55,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     context.begin_recording();
     let mut found = Findings::default();
     let ran = run_cases(&chosen, &options, context, &mut found);
-    // What was done is kept, whatever ended it.
+    // The completed figures are kept, whatever ended the run.
     if ran.is_ok() || !found.rows.is_empty() {
         write(out, &found)?;
     }
@@ -108,7 +109,7 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
             && let Some(case) = named.iter().find(|case| case.needs_reference)
         {
             bail!(
-                "case \"{}\" compares with reference tables; say where they are: --reference DIR",
+                "case \"{}\" needs the reference tables; name their folder with --reference DIR",
                 case.name
             );
         }
@@ -120,7 +121,7 @@ fn chosen(args: &Args) -> anyhow::Result<Vec<&'static Case>> {
         .collect())
 }
 
-/// A name as one word of the command line.
+/// The name as one word for the command line, with hyphens for spaces.
 fn written(name: &str) -> String {
     name.replace(' ', "-")
 }
@@ -129,7 +130,7 @@ fn is_name_of(name: &str, case: &Case) -> bool {
     written(name).eq_ignore_ascii_case(&written(case.name))
 }
 
-/// What a machine is told about a case.
+/// A case in the `--json` list.
 #[derive(Debug, Serialize)]
 struct Listed {
     name: &'static str,
@@ -186,7 +187,7 @@ fn run_cases(
             Err(error @ (VerifyError::NoReference | VerifyError::Table { .. })) => {
                 return Err(error).with_context(|| format!("case \"{}\"", case.name));
             }
-            // A problem that cannot be solved is a figure that is not good, among the others.
+            // A problem that cannot be solved counts as a failed figure among the others.
             Err(error) => unsolved(case, &error),
         };
         progress.suspend(|| say_case(context, case, &findings))?;
@@ -212,7 +213,7 @@ fn unsolved(case: &Case, error: &VerifyError) -> Findings {
     }
 }
 
-/// An older study must not stand beside figures that it does not belong to.
+/// Removes the study of an older run, so that it does not lie beside figures of this run.
 fn remove_older(out: &OutDir) -> anyhow::Result<()> {
     for name in ["convergence.csv", "convergence.svg", "convergence.png"] {
         let path = out.path().join(name);

@@ -1,4 +1,4 @@
-//! `palpa view`: the body under one's own hand, in a browser.
+//! `palpa view`: touch the body in a browser.
 
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
@@ -12,35 +12,38 @@ use super::Outcome;
 use crate::cli::Context;
 use palpa_session::{Session, SessionParams, gallery};
 
-/// Touch a body in a browser: see it deform, read and feel the force
+/// Touch a body in a browser: see it deform and read the force
 ///
-/// Starts the engine (tissue, 1 kHz loop, a simulated haptic device) and a web server on this machine, opens the page, and runs
-/// until Ctrl-C. Without a SCENE, a forearm is shown; the page has more. Recordings go to the output folder.
+/// Starts the engine (tissue, 1 kHz loop, a simulated haptic device) and a web server on this
+/// computer, opens the page, and runs until Ctrl-C. Without a SCENE, shows a forearm; the page
+/// offers more scenes. Recordings go to the output folder.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML), or the key of a scene of the gallery: forearm, `forearm_lump`, limb, block, `patch_bars`, `patch_tissue`
+    /// Scene file (TOML), or the name of a scene of the gallery: forearm, `forearm_lump`, limb,
+    /// block, `patch_bars`, `patch_tissue`
     scene: Option<PathBuf>,
     /// Do not open a browser
     #[arg(long)]
     no_open: bool,
-    /// Port to listen at; 0 takes any that is free [default: 7750, or any if that is in use]
+    /// Port to listen on; 0 for any free one [default: 7750, or any free one if that is in use]
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
-    /// Address to listen at; any but this machine's own (127.0.0.1) needs --token
+    /// Address to listen on; any address other than 127.0.0.1 needs --token
     #[arg(long, default_value = "127.0.0.1", value_name = "IP", value_parser = address)]
     bind: IpAddr,
-    /// What a page must know to come in: 8 characters or more
+    /// Token that a page needs to connect: 8 characters or more
     #[arg(long, value_name = "TEXT", env = "PALPA_TOKEN", hide_env_values = true)]
     token: Option<String>,
-    /// Seed of the lumps that "find the lump" hides, for the same places again; the rounds after the first count on
+    /// Seed for the places of the hidden lumps in "find the lump". The same seed gives the same
+    /// places, round by round
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Let the page ask for faults of the engine, for drills and tests
+    /// Let the page trigger faults of the engine, for drills and tests
     #[arg(long)]
     allow_faults: bool,
 }
 
-/// An address as a person writes it.
+/// Parses an address as a person writes it.
 fn address(text: &str) -> Result<IpAddr, String> {
     if text == "localhost" {
         return Ok(Ipv4Addr::LOCALHOST.into());
@@ -50,22 +53,22 @@ fn address(text: &str) -> Result<IpAddr, String> {
     })
 }
 
-/// Where the page is, for machines.
+/// The address of the page, for machines.
 #[derive(Debug, Serialize)]
 struct Started {
     url: String,
-    /// The same for other machines, if the server listens at all of this one's addresses.
+    /// Address for other machines, if the server listens on all addresses of this machine.
     url_elsewhere: Option<String>,
     port: u16,
 }
 
-/// Where the page is when nothing else is said.
+/// Default port of the page.
 const PORT: u16 = 7750;
 
 /// Runs the command.
 ///
 /// # Errors
-/// On a scene that cannot be read, and when the server cannot listen where it should.
+/// If the scene cannot be read, or the server cannot listen at the requested address.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let (scene, gallery_key) = scene_of(args)?;
     let out = context.out_dir()?;
@@ -83,7 +86,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     };
     let server = match args.port {
         Some(port) => Server::start(&params(port), remote.clone())?,
-        // Who did not ask for a port is not to be held up by another viewer.
+        // Without --port, another viewer on the default port must not prevent the start.
         None => match Server::start(&params(PORT), remote.clone()) {
             Err(palpa_viewer::ServerError::PortInUse { .. }) => {
                 Server::start(&params(0), remote.clone())?
@@ -128,9 +131,10 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The address by which this machine goes out, and others reach it.
+/// The address at which other machines can reach this one.
 fn outward(bind: IpAddr) -> Option<IpAddr> {
-    // Nothing is sent: a socket is asked which address it would send from. These are addresses for examples.
+    // Nothing is sent; the socket only reports the address from which it would send. The targets
+    // are addresses reserved for examples.
     let example = match bind {
         IpAddr::V4(_) => "192.0.2.1:9",
         IpAddr::V6(_) => "[2001:db8::1]:9",

@@ -1,4 +1,5 @@
-//! `palpa z-width`: how stiff and how damped a wall each simulated device can render without rattling.
+//! `palpa z-width`: largest stiffness and damping of a wall that each simulated device can render
+//! without rattling.
 
 use palpa_device::DeviceModel;
 use palpa_lab::z_width::{GRIPS, Study, WallRow, picture};
@@ -11,16 +12,17 @@ use crate::table::Table;
 const DEVICES: [&str; 4] = ["falcon", "touch", "inverse3", "ideal"];
 /// Find the stable range of stiffness and damping of each simulated device
 ///
-/// A wall of one spring and a damper is pressed by 3 mm with the coupling off, in simulated time, for each device in each
-/// hand; stable is where the force between 20 and 400 Hz stays below 0.02 N over two seconds with the hand's target still.
-/// For each damping the largest stiffness is given up to which all that were tried are stable, without and with the energy
-/// observer. Writes a table, the figures and the picture (CSV, JSON, SVG and PNG).
+/// In simulated time, each device in each grip presses 3 mm into a wall, a spring with a damper,
+/// with the coupling off. A wall is stable if the force between 20 and 400 Hz stays below 0.02 N
+/// over two seconds while the hand's target is still. For each damping, reports the largest
+/// stiffness up to which every tested wall is stable, without and with the energy observer. Writes
+/// a table, the figures and a picture (CSV, JSON, SVG and PNG).
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only this device; may be repeated [default: all]
+    /// Test only this device; may be repeated [default: all]
     #[arg(long = "device", value_name = "NAME", value_parser = DEVICES)]
     devices: Vec<String>,
-    /// Only in this hand; may be repeated [default: all]
+    /// Test only this grip; may be repeated [default: all]
     #[arg(long = "grip", value_name = "NAME", value_parser = ["soft", "medium", "stiff"])]
     grips: Vec<String>,
 }
@@ -28,7 +30,7 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// When a result cannot be written.
+/// If a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let out = context.out_dir()?;
     context.begin_recording();
@@ -61,7 +63,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// The limits without damping, which is what the law relies on.
+/// Prints the limits without damping, on which the law relies.
 fn say(rows: &[WallRow], context: &Context) -> anyhow::Result<()> {
     let mut table = Table::new([
         "stable to, N/m",

@@ -1,5 +1,5 @@
-//! `palpa check` on files that are awkward on purpose: the verdict that each must get, with bounded work
-//! and memory.
+//! `palpa check` on files that are awkward on purpose: the verdict that each must get, with bounded
+//! work and memory.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -7,19 +7,20 @@ use std::process::{Command, Stdio};
 /// Most processor time for one file, s: work, whatever else the machine does. The slowest takes a
 /// tenth of it. A file that needs more ends by a signal instead of an exit code.
 const CPU_SECONDS: u32 = 5;
-/// Most address space for one file, KiB. It is larger than the resident memory, so it bounds the peak
-/// from above.
+/// Most address space for one file, KiB. It is larger than the resident memory, so it bounds the
+/// peak from above.
 const MEMORY_KIB: u32 = 500_000;
 
 /// File, exit code, and words of the JSON report or, with code 2, of the error.
 ///
 /// The exit codes were decided from the README beside the data before the first run; the words were
-/// taken from the first output. Rows that came out otherwise, because the file turned out to be sounder
-/// or worse when read properly, say so.
+/// taken from the first output. Rows that came out otherwise, because the file turned out to be
+/// sounder or worse when read properly, say so.
 const EXPECTED: [(&str, i32, &[&str]); 31] = [
     // Positions are ±inf: nothing can be known about the shape.
     ("assimp_BoxWithInfinites.glb", 1, &["not-finite"]),
-    // 18 shells that stick in each other; 56 triangles without area, after which no crowded edges are left.
+    // 18 shells that stick in each other; 56 triangles without area, after which no crowded edges
+    // are left.
     (
         "assimp_Spider_ascii.stl",
         1,
@@ -32,7 +33,8 @@ const EXPECTED: [(&str, i32, &[&str]); 31] = [
     ),
     // UTF-16 text: decoded.
     ("assimp_box_UTF16BE.obj", 0, &["UTF-16"]),
-    // One concave polygon round a hole, joined by a seam: cut by ears it is a flat ring, open on both rims.
+    // One concave polygon round a hole, joined by a seam: cut by ears it is a flat ring, open on
+    // both rims.
     ("assimp_concave_polygon.obj", 0, &["open-boundary"]),
     ("assimp_cube_binary.ply", 0, &[]),
     // A face names vertex 12 of 8.
@@ -129,13 +131,14 @@ const EXPECTED: [(&str, i32, &[&str]); 31] = [
         2,
         &["1024 vertices but no faces"],
     ),
-    // A bent pentagon that doubles back on itself: no clean cut, which is noted; its triangles are an open sheet.
+    // A bent pentagon that doubles back on itself: no clean cut, which is noted; its triangles are
+    // an open sheet.
     ("trimesh_polygonfaces.obj", 0, &["fold over themselves"]),
     ("trimesh_soup.stl", 1, &["unjoined", "self-intersection"]),
     // Guessed to be open only; its eyes also stick through the head.
     ("trimesh_suzanne.ply", 1, &["hole", "self-intersection"]),
-    // Guessed to be bad: its 11 triangles without area are those of cutting polygons with collinear corners into a fan.
-    // Cut by ears, with every corner kept, it is closed and sound.
+    // Guessed to be bad: its 11 triangles without area are those of cutting polygons with collinear
+    // corners into a fan. Cut by ears, with every corner kept, it is closed and sound.
     ("trimesh_wallhole.obj", 0, &["\"n_boundary_edges\": 0"]),
 ];
 

@@ -2,8 +2,8 @@
 
 use palpa_lab::bench::refined::Problem;
 
-/// Largest relative difference of the recorded forces from tables made on a block or on a cylinder of
-/// its width.
+/// Largest relative difference of the recorded forces from tables made on a block or on a cylinder
+/// of its width.
 const TOLERANCE: f64 = 0.012;
 
 #[test]

@@ -1,5 +1,5 @@
-//! Exported decks, run by the real CalculiX (Debian: `calculix-ccx`). `make test-data` leaves these tests
-//! out where it is not installed.
+//! Exported decks, run by the real CalculiX (Debian: `calculix-ccx`). `make test-data` leaves these
+//! tests out where it is not installed.
 
 use std::fs;
 use std::path::Path;
@@ -77,7 +77,8 @@ fn confined_columns_have_the_exact_force_of_every_law() {
     }
 }
 
-/// Force on a confined column of layers in series: the stress is the same in all, the shortenings add up.
+/// Force on a confined column of layers in series: the stress is the same in all, the shortenings
+/// add up.
 fn column_force(laws: &[Law; 2], heights: [f64; 2], depth: f64, area: f64) -> f64 {
     let pressure = |law: &Law, stretch: f64| {
         -law.stress(&Mat3::from_diagonal(&Vector3::new(1.0, 1.0, stretch)))[(2, 2)]
@@ -153,7 +154,8 @@ impl Turned {
     }
 }
 
-/// Planes of symmetry across the axes are held in frames of their own, corners in two planes at once.
+/// Planes of symmetry across the axes are held in frames of their own, corners in two planes at
+/// once.
 #[test]
 fn a_turned_body_has_the_turned_force() {
     let [straight, turned] = [Vec3::zeros(), Vec3::new(0.5, -0.8, 0.3)].map(Turned::new);
@@ -188,7 +190,8 @@ fn a_hard_lump_is_felt_in_the_deck() {
     assert!(with > 1.1 * without, "{with} N against {without} N");
 }
 
-/// Skin over fat over muscle under a bonded disc of 10 mm, computed by others with other elements of CalculiX.
+/// Skin over fat over muscle under a bonded disc of 10 mm, computed by others with other elements
+/// of CalculiX.
 #[test]
 fn the_layered_block_of_the_reference_has_its_force() {
     let table = crate::reference().join("B2_layered_block_nu045.csv");

@@ -1,8 +1,8 @@
 //! Tests on measured and awkward data, which are not part of this repository, and with CalculiX:
 //! `make test-data`.
 //!
-//! `PALPA_SHARED` names the folder that holds them as `data/…` and `reference/…`. A test whose data or
-//! program is not there fails.
+//! `PALPA_SHARED` names the folder that holds them as `data/…` and `reference/…`. A test whose data
+//! or program is not there fails.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -41,7 +41,8 @@ fn counts_and_sizes_agree_with_trimesh() {
         );
         assert_eq!(report.n_parts.to_string(), row[9], "{path}: parts");
 
-        // Where the surface is open, trimesh's volume depends on the origin; ours caps the openings.
+        // Where the surface is open, trimesh's volume depends on the origin; ours caps the
+        // openings.
         let part = &report.parts[0];
         let expected: f64 = row[12].parse().unwrap();
         // A quadrilateral that is not flat has another volume with the other diagonal.

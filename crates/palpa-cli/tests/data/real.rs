@@ -17,7 +17,8 @@ struct Case {
     at: Option<&'static str>,
     /// At least this many prisms, so that a part is not taken for the whole.
     n_prisms: u64,
-    /// Largest share of the skin with thinned layers, as seen when the growth was looked at, and some.
+    /// Largest share of the skin with thinned layers, as seen when the growth was looked at, and
+    /// some.
     thinned_share: f64,
 }
 
@@ -185,7 +186,8 @@ fn a_forearm_with_its_bones_is_pressed_at_both_resolutions() {
         assert!(stand_off["max"].as_f64().unwrap() < 16e-3, "{stand_off}");
         assert!(stand_off["min"].as_f64().unwrap() > -1e-3, "{stand_off}");
     }
-    // The same body and tool; bars and a disc of few nodes leave the force to the mesh within this factor.
+    // The same body and tool; bars and a disc of few nodes leave the force to the mesh within this
+    // factor.
     let ratio = last_force(&coarse) / last_force(&fine);
     println!("force on the coarse over the fine forearm: {ratio:.3}");
     assert!((0.5..2.0).contains(&ratio), "{ratio}");

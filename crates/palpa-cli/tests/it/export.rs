@@ -224,7 +224,8 @@ fn the_patch_moves_the_base_stays_and_the_sides_slide() {
     for side in [-20.0, 20.0] {
         assert!(cut.contains(&all(&|p| p.x == side)) && cut.contains(&all(&|p| p.y == side)));
     }
-    // Each node of the sides keeps its normal directions, the corners two of them, unless it is fixed.
+    // Each node of the sides keeps its normal directions, the corners two of them, unless it is
+    // fixed.
     let fixed = inp.set("FIXED");
     let mut kept: BTreeMap<usize, BTreeSet<String>> = BTreeMap::new();
     for (_, lines) in inp.blocks("*BOUNDARY") {

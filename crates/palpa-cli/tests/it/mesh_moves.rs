@@ -1,5 +1,5 @@
-//! A fine mesh that moves with the tool over a forearm with a lump, against a mesh that is fine along
-//! the whole way, in simulated time.
+//! A fine mesh that moves with the tool over a forearm with a lump, against a mesh that is fine
+//! along the whole way, in simulated time.
 
 use std::path::Path;
 

@@ -84,7 +84,8 @@ fn a_block_is_pressed_and_every_file_is_there() {
     let loading = forces(&report, "load");
     assert_eq!(loading.len(), 7);
     assert!(loading.windows(2).all(|f| f[1] > f[0]), "{loading:?}");
-    // A soft layer over a stiffer one: between the two as uniform columns of the disc's area, up to the field around.
+    // A soft layer over a stiffer one: between the two as uniform columns of the disc's area, up to
+    // the field around.
     let area = std::f64::consts::PI * 0.015_f64.powi(2);
     let softest = 10e3 * area * 3e-3 / 30e-3;
     assert!(

@@ -71,7 +71,8 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
     let run = &report["result"]["runs"][0];
     assert!(number(&run["hysteresis"][0]).abs() < 1e-6, "{run}");
     assert_eq!(run["relaxation"], Value::Null);
-    // The work of the tool is in the tissue; the trapezoidal rule takes a little more of a stiffening curve.
+    // The work of the tool is in the tissue; the trapezoidal rule takes a little more of a
+    // stiffening curve.
     let (energy, work) = (
         column(&report, "energy_mj")[4],
         column(&report, "work_mj")[4],
@@ -266,7 +267,8 @@ fn a_viscous_block_loses_work_relaxes_and_is_stiffer_when_it_is_pressed_fast() {
         1.0 < slow && slow < fast && fast < 1.0 / 0.6,
         "{slow} {fast}"
     );
-    // After 1 s, five time constants, the fast one has lost nearly all that it can: 0.4, less what went on the way down.
+    // After 1 s, five time constants, the fast one has lost nearly all that it can: 0.4, less what
+    // went on the way down.
     assert!(
         (of(1, "relaxation") - (1.0 - 1.0 / fast)).abs() < 0.01,
         "{runs:?}"

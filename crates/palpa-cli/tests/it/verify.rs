@@ -126,7 +126,7 @@ fn bad_input_is_refused_in_one_line() {
             &["patch", "--reference", "nowhere"],
             "there is no folder \"nowhere\"",
         ),
-        (&["B1"], "say where they are: --reference DIR"),
+        (&["B1"], "name their folder with --reference DIR"),
         (
             &["B1", "--reference", "empty"],
             "empty/B1_homogeneous_block.csv",

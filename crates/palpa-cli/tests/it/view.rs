@@ -1,5 +1,5 @@
-//! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested in
-//! `web/e2e`.
+//! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested
+//! in `web/e2e`.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -120,8 +120,8 @@ impl Viewer {
         })
     }
 
-    /// Asks for the hand at the home of the scene. It is to be repeated: a hand that hears nothing for a
-    /// second lifts.
+    /// Asks for the hand at the home of the scene. It is to be repeated: a hand that hears nothing
+    /// for a second lifts.
     fn hold(&self, home: &Value, depth: f64) {
         let hand = json!({ "type": "hand", "point": home["point"], "normal": home["normal"], "depth": depth });
         self.ask(&hand);
@@ -147,8 +147,8 @@ impl Viewer {
         displacements.chunks(3).map(size).fold(0.0, f64::max)
     }
 
-    /// Presses until the body has come to rest, pressed in by most of a depth that a hand on a spring
-    /// reaches. Returns the largest displacement, m.
+    /// Presses until the body has come to rest, pressed in by most of a depth that a hand on a
+    /// spring reaches. Returns the largest displacement, m.
     fn press(&self, depth: f64) -> f64 {
         let home = self.json("api/state")["home"].clone();
         let mut before = [0.0; 3];
@@ -161,8 +161,8 @@ impl Viewer {
         })
     }
 
-    /// Lifts the hand, until the body is back at rest but for a hundredth of its displacement before, and the tool has left
-    /// it for some time.
+    /// Lifts the hand, until the body is back at rest but for a hundredth of its displacement
+    /// before, and the tool has left it for some time.
     fn lift(&self, pressed: f64) {
         self.ask(&json!({ "type": "lift" }));
         wait_for("the body is let go", || {
@@ -322,7 +322,8 @@ fn hidden_lumps_stay_hidden_until_the_truth_is_asked_for() {
     );
     let (code, words) = viewer.post(r#"{"type":"start_recording"}"#);
     assert!(code == 409 && words.contains("hidden lumps"), "{words}");
-    // The body is not shown while lumps are hidden: the hand presses for some time of the engine's clock.
+    // The body is not shown while lumps are hidden: the hand presses for some time of the engine's
+    // clock.
     viewer.pass(3.0, || viewer.hold(&state["home"], 4e-3));
     viewer.ask(&json!({ "type": "mark", "point": [0.01, 0.0, 0.0] }));
     viewer.ask(&json!({ "type": "reveal" }));

@@ -1,6 +1,6 @@
-//! Faults of device, tissue and clock while the finite elements are pressed, through the real threads,
-//! mailboxes and device. The force stays finite, limited in size and slew, and comes back. The log is
-//! whole, says what happened, and replays bit for bit.
+//! Faults of device, tissue and clock while the finite elements are pressed, through the real
+//! threads, mailboxes and device. The force stays finite, limited in size and slew, and comes back.
+//! The log is whole, says what happened, and replays bit for bit.
 
 use palpa::live::{LiveScene, device_model, grip};
 use palpa_device::{Fault, FaultSwitch, Faulty, HapticDevice, LiveTarget, SimulatedDevice, Vec3};
@@ -24,14 +24,15 @@ fn gel() -> SceneText {
         .set("motion", "above", "3 mm")
 }
 
-/// Time without a fault after which the whole force is back, s: it is let in slowly, in half a second.
+/// Time without a fault after which the whole force is back, s: it is let in slowly, in half a
+/// second.
 const BACK: f64 = 1.0;
 /// Relative difference within which the force is the same again.
 const SAME: f64 = 0.01;
 
 /// A run that is disturbed step by step: each fault comes when the force has settled after the one
-/// before. A machine that stands still for some milliseconds (a virtual one does) is one more fault,
-/// which the law answers as the others.
+/// before. A machine that stands still for some milliseconds (a virtual one does) is one more
+/// fault, which the law answers as the others.
 struct Run {
     engine: Engine,
 }
@@ -62,8 +63,8 @@ impl Run {
         wait_for(text, || (count(&self.engine) >= before + n).then_some(()));
     }
 
-    /// Waits until the force was there, whole, steady and without a fault for a while, and returns that
-    /// moment, s. How large it must be, the log is asked afterwards.
+    /// Waits until the force was there, whole, steady and without a fault for a while, and returns
+    /// that moment, s. How large it must be, the log is asked afterwards.
     fn settle(&mut self) -> f64 {
         let (mut since, mut last) = (self.engine.now(), f64::NAN);
         self.until("the force is steady", |tick| {
@@ -198,7 +199,8 @@ fn faults_while_real_tissue_is_pressed() {
     hand.set(deep);
     run.until("the gel is felt", |tick| tick.devices[0].force[2] > 0.1);
     let mut settled = vec![("the first press", run.settle())];
-    // 20 mm deeper for a hundred ticks, as it seems: the tissue is pressed there, and must find back.
+    // 20 mm deeper for a hundred ticks, as it seems: the tissue is pressed there, and must find
+    // back.
     jumped.set(true);
     run.ticks(100);
     jumped.set(false);

@@ -29,8 +29,8 @@ struct Stroke {
     n_nodes: usize,
 }
 
-/// The layers of benchmark B2. The mesh near lumps is as coarse as may be, so that it is the same with
-/// and without one.
+/// The layers of benchmark B2. The mesh near lumps is as coarse as may be, so that it is the same
+/// with and without one.
 fn layers() -> Scene {
     Scene::skin_fat_muscle(3, 4)
         .press(6.0)
@@ -65,7 +65,8 @@ fn stroke(scene: &Scene) -> Stroke {
     }
 }
 
-/// One place of the stroke. Changes are against the stroke without the lump; x along it, z out of the tissue.
+/// One place of the stroke. Changes are against the stroke without the lump; x along it, z out of
+/// the tissue.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Row {
     at_mm: f64,
@@ -89,8 +90,8 @@ fn peak(points: &[[f64; 2]]) -> [f64; 2] {
     [x1 + by, y1 + by * (slope + curve * by)]
 }
 
-/// The promise: the peak within 15 % and 1 mm of the converged one, and nothing in it that hands feel as a vibration or a
-/// knock, 0.02 N.
+/// The promise: the peak within 15 % and 1 mm of the converged one, and nothing in it that hands
+/// feel as a vibration or a knock, 0.02 N.
 #[test]
 fn a_lump_is_felt_where_it_lies_and_as_hard_as_it_is() {
     let lump = Lump::sphere(6.0, "lump", "100 kPa").at([0.0, 0.0, -14.0]);

@@ -1,5 +1,5 @@
-//! Force while moving: the shipped moving step and law against converged equilibria on the same mesh,
-//! in simulated time.
+//! Force while moving: the shipped moving step and law against converged equilibria on the same
+//! mesh, in simulated time.
 
 use palpa::live::{LiveScene, RehearsalParams};
 use palpa_device::Path as Way;
@@ -58,8 +58,8 @@ fn trace(live: &LiveScene, way: &Way) -> Vec<TraceRow> {
     force_while_moving(live, ABOVE, way, &params, 8).unwrap()
 }
 
-/// The worst row past a depth (mm) while moving, and the worst relative error in the last 0.1 s, when
-/// the tool is held still.
+/// The worst row past a depth (mm) while moving, and the worst relative error in the last 0.1 s,
+/// when the tool is held still.
 fn worst(rows: &[TraceRow], past_mm: f64) -> (TraceRow, f64) {
     let excess = |r: &&TraceRow| r.error_n / (0.05 * r.static_force_n.abs()).max(0.03);
     let moving = rows.iter().filter(|r| r.depth_mm > past_mm);

@@ -1,5 +1,5 @@
-//! The closed loop on the finite elements: nothing rattles, and no energy is made, in any hand, on any
-//! tissue.
+//! The closed loop on the finite elements: nothing rattles, and no energy is made, in any hand, on
+//! any tissue.
 
 use palpa::live::{LiveScene, RehearsalParams, RehearsalTick, rehearse};
 use palpa_device::{
@@ -182,7 +182,8 @@ fn deficit(forces: &[Vec3], places: &[Vec3]) -> f64 {
     deficit
 }
 
-/// Largest change of force where a patch arrives, and the 99.9th percentile elsewhere, while all of it is let through. N
+/// Largest change of force where a patch arrives, and the 99.9th percentile elsewhere, while all of
+/// it is let through. N
 fn steps(ticks: &[RehearsalTick]) -> (f64, f64) {
     let (arrivals, others): (Vec<_>, Vec<_>) = (ticks.windows(2))
         .filter(|pair| pair[0].report.gain >= 1.0)
@@ -201,8 +202,8 @@ fn steps(ticks: &[RehearsalTick]) -> (f64, f64) {
     )
 }
 
-/// The promise: below 0.02 N between 20 and 400 Hz with the hand's target still, no more energy given
-/// out than taken in but for the budget, and no knock where a patch arrives.
+/// The promise: below 0.02 N between 20 and 400 Hz with the hand's target still, no more energy
+/// given out than taken in but for the budget, and no knock where a patch arrives.
 fn every_hand_on(case: &Case) {
     let mut failures = Vec::new();
     for friction in [0.0, 0.3] {

@@ -4,12 +4,12 @@ use super::Path;
 use palpa_servo::Vec3;
 
 impl Path {
-    /// Down by a depth, and held: from `above` along `into`, a unit vector.
+    /// Presses down by a depth and holds: from `above` along `into`, a unit vector.
     pub fn press(above: Vec3, into: Vec3, depth: f64, speed: f64, hold: f64) -> Self {
         Self::from(above).to(above + into * depth, speed).hold(hold)
     }
 
-    /// Down, across by a vector, and up.
+    /// Presses down, moves across by a vector, and goes up.
     pub fn stroke(above: Vec3, into: Vec3, depth: f64, across: Vec3, speed: f64) -> Self {
         let down = above + into * depth;
         Self::press(above, into, depth, speed, 0.1)
@@ -17,7 +17,7 @@ impl Path {
             .to(above + across, speed)
     }
 
-    /// Down, then across and back while pressed, a number of times.
+    /// Presses down, then moves across and back while pressed, `times` times.
     pub fn drag(
         above: Vec3,
         into: Vec3,
@@ -34,7 +34,7 @@ impl Path {
         path
     }
 
-    /// Quick short presses, a number of times.
+    /// Makes quick short presses, `times` times.
     pub fn tap(above: Vec3, into: Vec3, depth: f64, speed: f64, times: usize) -> Self {
         let mut path = Self::from(above);
         for _ in 0..times {
@@ -46,7 +46,8 @@ impl Path {
         path
     }
 
-    /// Presses at points along a line, with small circles at each, as a physician feels for a lump.
+    /// Presses at points along a line, with small circles at each point, like a physician who feels
+    /// for a lump.
     pub fn palpate(
         above: Vec3,
         into: Vec3,

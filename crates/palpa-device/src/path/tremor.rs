@@ -5,8 +5,8 @@ use palpa_servo::Vec3;
 
 impl Path {
     /// Adds physiological tremor from one moment to another, s: three sines of 8 to 12 Hz in
-    /// directions drawn by the seed. `amplitude` is the root of their mean square, m; a healthy
-    /// hand has 0.05 to 0.2 mm.
+    /// directions drawn by the seed. `amplitude` is their root mean square, m; a healthy hand has
+    /// 0.05 to 0.2 mm.
     #[must_use]
     pub fn trembling(mut self, amplitude: f64, seed: u64, from: f64, to: f64) -> Self {
         let mut state = seed;
@@ -22,7 +22,7 @@ impl Path {
     }
 }
 
-/// A number from 0 to 1 by splitmix64 (Steele, Lea & Flood 2014).
+/// A random number from 0 to 1 by splitmix64 (Steele, Lea & Flood 2014).
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;

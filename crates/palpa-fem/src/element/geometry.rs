@@ -1,13 +1,15 @@
 //! What the rest shape decides about an element: gradients and volumes at its points.
 //!
-//! All integrals of the element are exact with one point in the plane of a wedge and two over its thickness: volumes and
-//! gradient integrals of a six-node prism are linear in the plane and of second order over the thickness.
+//! All integrals of the element are exact with one point in the plane of a wedge and two over its
+//! thickness: volumes and gradient integrals of a six-node prism are linear in the plane and of
+//! second order over the thickness.
 
 use palpa_mesh::Vec3;
 
 use crate::Mat3;
 
-/// Place of the two Gauss points over the thickness, in the natural coordinate −1 (lower) to 1 (upper).
+/// Place of the two Gauss points over the thickness, in the natural coordinate −1 (lower) to 1
+/// (upper).
 pub(crate) const GAUSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
 /// A wedge at its two points.

@@ -1,12 +1,14 @@
-//! The element: a pair of wedges under a quadrilateral of two skin triangles, in one interval between levels.
+//! The element: a pair of wedges under a quadrilateral of two skin triangles, in one interval
+//! between levels.
 //!
 //! ```text
 //! W = α Σ_q V_q W_d(F^_q)  +  (1 − α) Σ_wedges Σ_q V_wq W_d(F^_wq)  +  V U(v̄),   v̄ = Σ V_wq v(F_wq) / V
 //! ```
-//! `F_wq` is the deformation gradient of wedge w over its centroid at depth point q, `F_q` the mean of both wedges' by
-//! volume. The volume change is one number per pair, which is what removes locking; the deviator of the pair's mean alone
-//! would leave hourglass modes, which the wedges' own deviators, weighted by 1 − α, hold. `F^` is corrected for thickness,
-//! see [`unit`]. A triangle without a partner is a group of one.
+//! `F_wq` is the deformation gradient of wedge w over its centroid at depth point q, `F_q` the mean
+//! of both wedges' by volume. The volume change is one number per pair, which is what removes
+//! locking; the deviator of the pair's mean alone would leave hourglass modes, which the wedges'
+//! own deviators, weighted by 1 − α, hold. `F^` is corrected for thickness, see [`unit`]. A
+//! triangle without a partner is a group of one.
 //!
 //! Derivation: `docs/theory/paired_prism.md`.
 
@@ -44,7 +46,8 @@ pub(crate) struct Phase {
     pub(crate) volume: f64,
 }
 
-/// What stays constant during a step of a viscous or pre-stressed material, at every place of a group.
+/// What stays constant during a step of a viscous or pre-stressed material, at every place of a
+/// group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Overstress {
     /// Second Piola–Kirchhoff stress that does not depend on the step's deformation, in Pa.
@@ -65,7 +68,7 @@ pub(crate) struct PhaseAt<'a> {
 
 /// How a group stands in the mesh: which columns its wedges have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub(crate) struct GroupLayout {
     /// For each wedge the local columns of its corners, as the triangle has them.
     pub(crate) wedges: [[u8; 3]; 2],
     /// 1 or 2.
@@ -105,7 +108,7 @@ fn node(columns: [u8; 3], corner: usize) -> usize {
 
 /// Deformation gradients of the wedges at their points.
 pub(crate) fn deformation(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
 ) -> [[Mat3; 2]; 2] {
@@ -123,7 +126,7 @@ pub(crate) fn deformation(
 
 /// Evaluates a group. `alpha` is the share of the pair's mean deviator.
 pub(crate) fn evaluate(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],
@@ -209,7 +212,7 @@ pub(crate) fn evaluate(
 }
 
 /// The volumetric part of a group.
-struct Volumetric {
+struct VolumePart {
     /// Mean of `v` over the group, less 1.
     change: f64,
     energy: f64,
@@ -237,12 +240,12 @@ pub(crate) fn volume_change(measure: VolumeMeasure, f: &Mat3) -> (f64, Mat3) {
 }
 
 fn volumetric(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
     f: &[[Mat3; 2]; 2],
     phases: &[PhaseAt<'_>],
     kinematics: Kinematics,
-) -> Option<Volumetric> {
+) -> Option<VolumePart> {
     let measure = phases[0].law.volume_measure();
     let total = geometry.volume();
     let mut derivative = [[Mat3::zeros(); 2]; 2];
@@ -274,7 +277,7 @@ fn volumetric(
     }
     let stress = [0, 1]
         .map(|w| [0, 1].map(|q| derivative[w][q] * (pressure * geometry.wedges[w].volumes[q])));
-    Some(Volumetric {
+    Some(VolumePart {
         change,
         energy,
         pressure,
@@ -286,9 +289,9 @@ fn volumetric(
 }
 
 fn add_bulk_stiffness(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
-    volume: &Volumetric,
+    volume: &VolumePart,
     out: &mut GroupResponse,
 ) {
     let mut gradient = [Vec3::zeros(); N_NODES];
@@ -328,7 +331,7 @@ impl PairMean {
         }
     }
 
-    fn node_gradients(&self, shape: Shape, geometry: &GroupGeometry) -> [[Vec3; N_NODES]; 2] {
+    fn node_gradients(&self, shape: GroupLayout, geometry: &GroupGeometry) -> [[Vec3; N_NODES]; 2] {
         let mut gradients = [[Vec3::zeros(); N_NODES]; 2];
         for w in 0..2 {
             for q in 0..2 {
@@ -464,9 +467,10 @@ fn add<const N: usize>(
     }
 }
 
-/// The deviatoric stress of a law at every point of a group, as second Piola–Kirchhoff stress, and its `U'`.
+/// The deviatoric stress of a law at every point of a group, as second Piola–Kirchhoff stress, and
+/// its `U'`.
 pub(crate) fn elastic_stresses(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     law: &Law,
@@ -513,9 +517,10 @@ pub(crate) fn elastic_stresses(
     Some(stresses)
 }
 
-/// For each wedge of a group: Cauchy stress, mean deformation gradient, volume ratio and energy density.
+/// For each wedge of a group: Cauchy stress, mean deformation gradient, volume ratio and energy
+/// density.
 pub(crate) fn element_fields(
-    shape: Shape,
+    shape: GroupLayout,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],

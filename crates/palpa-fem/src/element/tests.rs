@@ -52,11 +52,11 @@ fn laws() -> Vec<Law> {
     ]
 }
 
-const PAIR_SHAPE: Shape = Shape {
+const PAIR_SHAPE: GroupLayout = GroupLayout {
     wedges: [[0, 1, 2], [3, 2, 1]],
     n_wedges: 2,
 };
-const SINGLE_SHAPE: Shape = Shape {
+const SINGLE_SHAPE: GroupLayout = GroupLayout {
     wedges: [[0, 1, 2], [0, 1, 2]],
     n_wedges: 1,
 };
@@ -71,7 +71,7 @@ fn nodes(noise: &mut Noise) -> [Vec3; N_NODES] {
     })
 }
 
-fn geometry(shape: Shape, nodes: &[Vec3; N_NODES]) -> GroupGeometry {
+fn geometry(shape: GroupLayout, nodes: &[Vec3; N_NODES]) -> GroupGeometry {
     let corners: Vec<[Vec3; 6]> = shape.wedges[..usize::from(shape.n_wedges)]
         .iter()
         .map(|columns| std::array::from_fn(|corner| nodes[node(*columns, corner)]))
@@ -101,7 +101,7 @@ fn overstress(noise: &mut Noise) -> Overstress {
 
 struct Case {
     name: String,
-    shape: Shape,
+    shape: GroupLayout,
     geometry: GroupGeometry,
     law: Law,
     second: Option<Law>,
@@ -279,7 +279,8 @@ fn at_rest_only_rigid_motions_cost_nothing() {
             case.name,
             &modes[..8]
         );
-        // A lone wedge has one more (its volume change may be linear over the thickness); its neighbours hold that.
+        // A lone wedge has one more (its volume change may be linear over the thickness); its
+        // neighbours hold that.
         let first = if case.shape.n_wedges == 2 { 6 } else { 7 };
         assert!(
             modes[first] > 1e-4 * largest,

@@ -1,15 +1,18 @@
 //! Two points over the thickness of a layer, with the thickness correction.
 //!
-//! With one volume change for the whole thickness a layer would bend with a third of its stiffness. So the part of the
-//! volume change that is linear over the depth is taken out along the thickness alone:
+//! With one volume change for the whole thickness a layer would bend with a third of its stiffness.
+//! So the part of the volume change that is linear over the depth is taken out along the thickness
+//! alone:
 //!
 //! ```text
 //! F^_q = F_q + (s_q − 1) (F_q M) ⊗ m,   s_q = Jb / J_q,   Jb = Σ v_q J_q,   J_q = det F_q,   v_q = V_q / Σ V
 //! ```
-//! `M = ∂X/∂ζ` and `m = grad ζ` are constant over the group, so that a uniform deformation stays uniform (patch test),
-//! and `det F^_q = Jb`. The small-strain likeness has `J_q = 1 + tr(F_q − I)`, `s_q = 1 + Jb − J_q` and `F_q M → M`.
+//! `M = ∂X/∂ζ` and `m = grad ζ` are constant over the group, so that a uniform deformation stays
+//! uniform (patch test), and `det F^_q = Jb`. The small-strain likeness has
+//! `J_q = 1 + tr(F_q − I)`, `s_q = 1 + Jb − J_q` and `F_q M → M`.
 //!
-//! Derivatives, with `C_q = ∂J_q/∂F_q`, `P^_q` and `H^_q` the weighted stress and tangent at `F^_q`:
+//! Derivatives, with `C_q = ∂J_q/∂F_q`, `P^_q` and `H^_q` the weighted stress and tangent at
+//! `F^_q`:
 //!
 //! ```text
 //! A_q = I + (s_q − 1) M ⊗ m,  a_q = (F_q M) ⊗ m,  k_q = P^_q : a_q,  δF^_q = δF_q A_q + a_q δs_q
@@ -178,7 +181,8 @@ pub(crate) fn cofactor(f: &Mat3) -> Mat3 {
 
 /// Adds `scale · ∂²det F/∂F∂F`.
 pub(crate) fn add_second_derivative_of_det(tangent: &mut Mat9, f: &Mat3, scale: f64) {
-    // Columns j ≠ l of F: the derivative of a cross product of two columns is a skew matrix of the third.
+    // Columns j ≠ l of F: the derivative of a cross product of two columns is a skew matrix of the
+    // third.
     for (j, l, n, sign) in [(0, 1, 2, 1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0)] {
         let x = f.column(n) * (scale * sign);
         // δ(F_l × F_n) by F_l is −[F_n]× ; det = F_j · (F_l × F_n).
@@ -204,7 +208,8 @@ fn mat3(v: &Vec9) -> Mat3 {
     Mat3::from_column_slice(v.as_slice())
 }
 
-/// `H` seen from `δF` where it acts on `δF A`: both of its index pairs are multiplied by `Aᵀ` from the right.
+/// `H` seen from `δF` where it acts on `δF A`: both of its index pairs are multiplied by `Aᵀ` from
+/// the right.
 fn transformed(tangent: &Mat9, a_transposed: &Mat3) -> Mat9 {
     let mut rows = Mat9::zeros();
     // Blocks of three rows or columns belong to one column of δF.

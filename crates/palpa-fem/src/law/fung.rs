@@ -4,7 +4,8 @@
 //! W_d(F) = μ/(2b) (exp(b x) − 1),   x = Ī1 − 3                [J/m³]
 //! P(F)   = μ/2 exp(b x) ∂Ī1/∂F                                [Pa]
 //! ```
-//! Soft at first, then stiffening without bound, as skin does; `b → 0` is neo-Hookean. Demiray, J. Biomech. 5 (1972).
+//! Soft at first, then stiffening without bound, as skin does; `b → 0` is neo-Hookean. Demiray, J.
+//! Biomech. 5 (1972).
 
 use super::error::{check_positive, moduli};
 use super::invariants::FirstInvariant;
@@ -35,8 +36,8 @@ impl Fung {
         })
     }
 
-    /// From Young's modulus (Pa) and Poisson's ratio at rest and the exponent `b > 0`, with the quadratic volumetric
-    /// energy.
+    /// From Young's modulus (Pa) and Poisson's ratio at rest and the exponent `b > 0`, with the
+    /// quadratic volumetric energy.
     ///
     /// # Errors
     /// A modulus or exponent that is not positive, or a ratio outside (−1, ½).

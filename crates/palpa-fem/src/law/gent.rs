@@ -4,8 +4,8 @@
 //! W_d(F) = −μ J_m/2 ln(1 − x/J_m),   x = Ī1 − 3 < J_m            [J/m³]
 //! P(F)   = μ/2 J_m/(J_m − x) ∂Ī1/∂F                              [Pa]
 //! ```
-//! For `x ≥ J_m` the energy is `+∞`, so that a line search backs off. `J_m → ∞` is neo-Hookean. `ln_1p` keeps
-//! the digits at small strain. Gent, Rubber Chem. Technol. 69 (1996), 59–61.
+//! For `x ≥ J_m` the energy is `+∞`, so that a line search backs off. `J_m → ∞` is neo-Hookean.
+//! `ln_1p` keeps the digits at small strain. Gent, Rubber Chem. Technol. 69 (1996), 59–61.
 
 use super::error::{check_positive, moduli};
 use super::invariants::FirstInvariant;
@@ -36,8 +36,8 @@ impl Gent {
         })
     }
 
-    /// From Young's modulus (Pa) and Poisson's ratio at rest and the limit `J_m > 0`, with the quadratic volumetric
-    /// energy.
+    /// From Young's modulus (Pa) and Poisson's ratio at rest and the limit `J_m > 0`, with the
+    /// quadratic volumetric energy.
     ///
     /// # Errors
     /// A modulus or limit that is not positive, or a ratio outside (−1, ½).

@@ -5,8 +5,9 @@
 //! ∂Ī1/∂F = 2 J^(−2/3) (F − I1/3 T)
 //! ∂Ī2/∂F = J^(−4/3) (M − 4/3 I2 T),   M = ∂I2/∂F = 2 (I1 F − F C)
 //! ```
-//! Both are 3 at rest and never less, and what a law needs is their excess over 3, which is of second order in strain.
-//! Subtracting 3 would lose it at strains below 1e-5. Instead, with `t = I1/3` and `C = t (I + D)`, `tr D = 0`:
+//! Both are 3 at rest and never less, and what a law needs is their excess over 3, which is of
+//! second order in strain. Subtracting 3 would lose it at strains below 1e-5. Instead, with
+//! `t = I1/3` and `C = t (I + D)`, `tr D = 0`:
 //!
 //! ```text
 //! J²/t³ = det(I + D) = 1 − n,   n = ½ D:D − det D ≥ 0,   r = (J²/t³)^(1/3) = J^(2/3)/t ≤ 1
@@ -81,7 +82,8 @@ pub(super) struct Isochoric {
 }
 
 impl Isochoric {
-    /// `None` where there is no such law: `det F ≤ 0`, or so near that, that doubles do not hold it.
+    /// `None` where there is no such law: `det F ≤ 0`, or so near that, that doubles do not hold
+    /// it.
     #[inline]
     pub(super) fn new(f: &Mat3) -> Option<Self> {
         let cof = cofactor(f);

@@ -6,7 +6,8 @@
 //! P(F)   = 2 μ dev ε                 [Pa]
 //! A_ijkl = μ (δ_ik δ_jl + δ_il δ_jk) − 2/3 μ δ_ij δ_kl
 //! ```
-//! With `U(v) = K/2 (tr ε)²` the whole is Hooke's law. It exists for every `F`, and is blind to rotation only to first order.
+//! With `U(v) = K/2 (tr ε)²` the whole is Hooke's law. It exists for every `F`, and is blind to
+//! rotation only to first order.
 
 use super::error::{check_positive, moduli};
 use super::{Described, Kinematics, LawError, Response, VolumeMeasure, Volumetric};

@@ -1,14 +1,15 @@
 //! Material laws.
 //!
-//! To add a law: a file here with its energy (`fung.rs` is a short example); its name in the lists of
-//! this file (`mod`, `pub use`, [`Law`], `of_each!`, `law_from!`) and in `every_law` of
-//! `tests/it/law.rs`, which runs all tests of laws over it. Then it can be used from Rust. For scenes:
-//! its parameters in `palpa-scene/src/law.rs`, an arm in `palpa/src/continuum.rs` and one in
-//! `palpa-lab/src/export/material.rs`, its menu entry in `web/src/ui`, and a row in `docs/theory/laws.md`.
+//! To add a law: a file here with its energy (`fung.rs` is a short example); its name in the lists
+//! of this file (`mod`, `pub use`, [`Law`], `of_each!`, `law_from!`) and in `every_law` of
+//! `tests/it/law.rs`, which runs all tests of laws over it. Then it can be used from Rust. For
+//! scenes: its parameters in `palpa-scene/src/law.rs`, an arm in `palpa/src/continuum.rs` and one
+//! in `palpa-lab/src/export/material.rs`, its menu entry in `web/src/ui`, and a row in
+//! `docs/theory/laws.md`.
 //!
-//! A law is the sum of a *deviatoric* energy density, which the element evaluates at its points, and a *volumetric* one,
-//! which it evaluates once at the mean volume change of a pair of prisms, so that nearly incompressible tissue does not
-//! lock:
+//! A law is the sum of a *deviatoric* energy density, which the element evaluates at its points,
+//! and a *volumetric* one, which it evaluates once at the mean volume change of a pair of prisms,
+//! so that nearly incompressible tissue does not lock:
 //!
 //! ```text
 //! W(F) = W_d(F) + U(v),   v = det F  (or its small-strain or Green-strain likeness, see `VolumeMeasure`)   [J/m³]
@@ -48,7 +49,8 @@ use crate::{Mat3, Mat9};
 pub(crate) use hardening::{Hardening, Powers};
 use invariants::FirstInvariant;
 
-/// An energy density beyond this (J/m³) is that of no tissue, and its derivatives may overflow: it counts as infinite.
+/// An energy density beyond this (J/m³) is that of no tissue, and its derivatives may overflow: it
+/// counts as infinite.
 const HIGHEST_ENERGY: f64 = 1e60;
 
 /// How a law measures the change of volume; 1 at rest.
@@ -71,8 +73,8 @@ pub enum Kinematics {
     Small,
 }
 
-/// What each law says of itself; its energy, stress and tangent it gives by `energy_at`, `stress_at` and `response_at`, of
-/// its own or as a [`FirstInvariant`].
+/// What each law says of itself; its energy, stress and tangent it gives by `energy_at`,
+/// `stress_at` and `response_at`, of its own or as a [`FirstInvariant`].
 trait Described {
     /// Name of the law, as in messages and reports.
     const NAME: &'static str;
@@ -99,7 +101,8 @@ trait Described {
         Kinematics::Finite
     }
 
-    /// How it hardens, if the moving step's kernel knows it; the general element evaluates all others.
+    /// How it hardens, if the moving step's kernel knows it; the general element evaluates all
+    /// others.
     fn hardening(&self) -> Option<Hardening> {
         None
     }
@@ -130,8 +133,8 @@ const ZERO9: nalgebra::ArrayStorage<f64, 9, 9> = nalgebra::ArrayStorage([[0.0; 9
 
 /// An elastic law with its parameters.
 ///
-/// Every method is pure and allocates nothing. No deformation gradient, however bad, gives a NaN: where a law does not
-/// exist the energy is infinite and its derivatives are zero.
+/// Every method is pure and allocates nothing. No deformation gradient, however bad, gives a NaN:
+/// where a law does not exist the energy is infinite and its derivatives are zero.
 ///
 /// ```
 /// use palpa_fem::Mat3;
@@ -180,8 +183,8 @@ macro_rules! of_each {
 }
 
 impl Law {
-    /// Half the shear modulus at rest (Pa), how the law hardens, and the bulk modulus (Pa), of an isotropic law at large
-    /// strain whose volumetric energy is quadratic; none of others.
+    /// Half the shear modulus at rest (Pa), how the law hardens, and the bulk modulus (Pa), of an
+    /// isotropic law at large strain whose volumetric energy is quadratic; none of others.
     pub(crate) fn hardening(&self) -> Option<(f64, Hardening, f64)> {
         let hardening = of_each!(self, law => law.hardening())?;
         match *self.volumetric_energy() {
@@ -204,7 +207,8 @@ macro_rules! law_from {
 law_from!(Linear StVenantKirchhoff NeoHookean MooneyRivlin Yeoh Ogden Fung Gent);
 
 impl Law {
-    /// `W_d(F)`, in J/m³; infinite for `det F ≤ 0` (but not of the linear law, which knows no inversion).
+    /// `W_d(F)`, in J/m³; infinite for `det F ≤ 0` (but not of the linear law, which knows no
+    /// inversion).
     #[inline]
     pub fn deviatoric_energy(&self, f: &Mat3) -> f64 {
         let energy = of_each!(self, law => law.energy_at(f));
@@ -237,8 +241,8 @@ impl Law {
         response
     }
 
-    /// `[U, U', U'']` at the volume ratio `v` (see [`Law::volume_measure`]), in J/m³ = Pa; `[∞, 0, 0]` where the law does
-    /// not exist.
+    /// `[U, U', U'']` at the volume ratio `v` (see [`Law::volume_measure`]), in J/m³ = Pa;
+    /// `[∞, 0, 0]` where the law does not exist.
     #[inline]
     pub fn volumetric(&self, v: f64) -> [f64; 3] {
         let slopes = of_each!(self, law => law.volumetric()).evaluate(v);
@@ -308,7 +312,8 @@ impl Law {
         }
     }
 
-    /// The whole Cauchy stress `P Fᵀ/det F`, in Pa, symmetric; of a small-strain law its one stress.
+    /// The whole Cauchy stress `P Fᵀ/det F`, in Pa, symmetric; of a small-strain law its one
+    /// stress.
     pub fn cauchy_stress(&self, f: &Mat3) -> Mat3 {
         let stress = self.stress(f);
         let jacobian = f.determinant();

@@ -4,8 +4,9 @@
 //! W_d(F) = C10 (Ī1 − 3) + C01 (Ī2 − 3),   μ = 2 (C10 + C01)          [J/m³]
 //! P(F)   = C10 ∂Ī1/∂F + C01 ∂Ī2/∂F                                   [Pa]
 //! ```
-//! Gradients and Hessians of the invariants are in `invariants.rs`. A negative constant, as fits to one test often give,
-//! lets the energy fall without bound in another kind of strain, so it is refused.
+//! Gradients and Hessians of the invariants are in `invariants.rs`. A negative constant, as fits to
+//! one test often give, lets the energy fall without bound in another kind of strain, so it is
+//! refused.
 
 use super::error::{check_not_negative, check_positive, check_share, moduli};
 use super::invariants::Isochoric;
@@ -38,8 +39,8 @@ impl MooneyRivlin {
         })
     }
 
-    /// From Young's modulus (Pa), Poisson's ratio and the share of `C01` in `C10 + C01`, with the quadratic volumetric
-    /// energy.
+    /// From Young's modulus (Pa), Poisson's ratio and the share of `C01` in `C10 + C01`, with the
+    /// quadratic volumetric energy.
     ///
     /// # Errors
     /// A modulus that is not positive, a ratio outside (−1, ½), or a share outside 0 to 1.

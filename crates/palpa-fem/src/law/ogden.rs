@@ -1,15 +1,17 @@
 //! Ogden law.
 //!
-//! With the principal stretches `λ_a`, `λ̄_a = J^(−1/3) λ_a`, and unit vectors `v_a` at rest and `u_a` in space, `F = Σ λ_a u_a⊗v_a`:
+//! With the principal stretches `λ_a`, `λ̄_a = J^(−1/3) λ_a`, and unit vectors `v_a` at rest and
+//! `u_a` in space, `F = Σ λ_a u_a⊗v_a`:
 //!
 //! ```text
 //! W_d(F) = Σ_p 2 μ_p/α_p² (λ̄_1^α_p + λ̄_2^α_p + λ̄_3^α_p − 3),   μ = Σ μ_p        [J/m³]
 //! P(F)   = Σ_a g_a/λ_a u_a⊗v_a                                                   [Pa]
 //! g_a    = ∂W_d/∂ ln λ_a = Σ_p 2 μ_p/α_p (λ̄_a^α_p − m_p),   m_p = ⅓ Σ_b λ̄_b^α_p
 //! ```
-//! In the frame of the `u_a⊗v_b` the tangent has a 3 × 3 block for the stretches and, for each pair `a < b`, one stiffness
-//! against stretching askew and one against spin: `(W_a − W_b)/(λ_a − λ_b)` and `(W_a + W_b)/(λ_a + λ_b)`, `W_a = g_a/λ_a`. The first
-//! is written with `sinh`, so that equal stretches are no special case but for 0/0 itself. Ogden, Proc. R. Soc. A 326 (1972).
+//! In the frame of the `u_a⊗v_b` the tangent has a 3 × 3 block for the stretches and, for each pair
+//! `a < b`, one stiffness against stretching askew and one against spin: `(W_a − W_b)/(λ_a − λ_b)`
+//! and `(W_a + W_b)/(λ_a + λ_b)`, `W_a = g_a/λ_a`. The first is written with `sinh`, so that equal
+//! stretches are no special case but for 0/0 itself. Ogden, Proc. R. Soc. A 326 (1972).
 
 use super::error::{check_positive, moduli};
 use super::invariants::Isochoric;
@@ -43,10 +45,12 @@ impl Ogden {
     /// Exponents outside these sizes overflow or cancel, and fit no tissue.
     const EXPONENTS: [f64; 2] = [1e-3, 100.0];
 
-    /// From 1 to 6 terms. Where a published fit has a negative `mu`, its energy is not convex, and it is refused.
+    /// From 1 to 6 terms. Where a published fit has a negative `mu`, its energy is not convex, and
+    /// it is refused.
     ///
     /// # Errors
-    /// No term or too many; a `mu` that is not positive; an exponent of a size outside 0.001 to 100.
+    /// No term or too many; a `mu` that is not positive; an exponent of a size outside 0.001 to
+    /// 100.
     pub fn new(terms: &[OgdenTerm], volumetric: Volumetric) -> Result<Self, LawError> {
         if terms.is_empty() || terms.len() > Self::MOST_TERMS {
             return Err(LawError::Terms {
@@ -81,11 +85,12 @@ impl Ogden {
         Ok(law)
     }
 
-    /// One term of the exponent `alpha`, from Young's modulus (Pa) and Poisson's ratio, with the quadratic volumetric
-    /// energy.
+    /// One term of the exponent `alpha`, from Young's modulus (Pa) and Poisson's ratio, with the
+    /// quadratic volumetric energy.
     ///
     /// # Errors
-    /// A modulus that is not positive, a ratio outside (−1, ½), or an exponent of a size outside 0.001 to 100.
+    /// A modulus that is not positive, a ratio outside (−1, ½), or an exponent of a size outside
+    /// 0.001 to 100.
     pub fn from_young(young: f64, poisson: f64, alpha: f64) -> Result<Self, LawError> {
         let (shear, bulk) = moduli(NAME, young, poisson)?;
         Self::new(

@@ -12,12 +12,14 @@
 //! S_visco = m (1 − Σ g_i) S_new + Σ h_i = c S_new + H
 //! c = m (1 − Σ g_i (1 − φ_i)),   H = Σ (e^(−x) h_i − m g_i φ_i S_old)
 //! ```
-//! where `S` is what the *law* says and `m` takes it to the instantaneous scale: 1, or `1/(1 − Σ g_i)` where the law's
-//! moduli are those of the long term. `c` and `H` do not depend on what is being solved for, so a step has the energy
-//! `c W_d(F) + H : E`, `E = (FᵀF − I)/2`, the stress `c P(F) + F H`, and Newton's method sees an elastic body.
+//! where `S` is what the *law* says and `m` takes it to the instantaneous scale: 1, or
+//! `1/(1 − Σ g_i)` where the law's moduli are those of the long term. `c` and `H` do not depend on
+//! what is being solved for, so a step has the energy `c W_d(F) + H : E`, `E = (FᵀF − I)/2`, the
+//! stress `c P(F) + F H`, and Newton's method sees an elastic body.
 //!
-//! A point keeps its history as `[[f64; N]; n_terms + 1]`: the last `S`, then each `h_i`; all zero at rest. `N` is 6 for a
-//! symmetric second Piola–Kirchhoff stress ([`six_of`]) and 1 for the volumetric stress `U'`.
+//! A point keeps its history as `[[f64; N]; n_terms + 1]`: the last `S`, then each `h_i`; all zero
+//! at rest. `N` is 6 for a symmetric second Piola–Kirchhoff stress ([`six_of`]) and 1 for the
+//! volumetric stress `U'`.
 
 use super::LawError;
 use super::error::check_positive;
@@ -55,11 +57,12 @@ impl Prony {
     /// How many terms there may be.
     pub const MOST_TERMS: usize = 16;
 
-    /// From 1 to 16 terms. With `relaxes_volume` the volumetric stress relaxes alike, so that Poisson's ratio stays;
-    /// without, it stays elastic at what the law says.
+    /// From 1 to 16 terms. With `relaxes_volume` the volumetric stress relaxes alike, so that
+    /// Poisson's ratio stays; without, it stays elastic at what the law says.
     ///
     /// # Errors
-    /// No term or too many; a `g` or `tau` that is not positive and finite; a sum of `g` of 1 or more.
+    /// No term or too many; a `g` or `tau` that is not positive and finite; a sum of `g` of 1 or
+    /// more.
     pub fn new(
         terms: Vec<PronyTerm>,
         moduli: Moduli,
@@ -135,8 +138,8 @@ impl Prony {
         self.instantaneous() * (1.0 - gone)
     }
 
-    /// Storage and loss modulus at the angular frequency `omega` (rad/s), as multiples of the law's modulus:
-    /// `m (1 − Σ g + Σ g (ωτ)²/(1 + (ωτ)²))` and `m Σ g ωτ/(1 + (ωτ)²)`.
+    /// Storage and loss modulus at the angular frequency `omega` (rad/s), as multiples of the law's
+    /// modulus: `m (1 − Σ g + Σ g (ωτ)²/(1 + (ωτ)²))` and `m Σ g ωτ/(1 + (ωτ)²)`.
     pub fn dynamic(&self, omega: f64) -> [f64; 2] {
         let mut sum = [1.0 - self.relaxing(), 0.0];
         for term in &self.terms {
@@ -147,7 +150,8 @@ impl Prony {
         sum.map(|part| part * self.instantaneous())
     }
 
-    /// What a step of the duration `dt` needs at every point. `dt = 0` is a sudden step, `dt = ∞` relaxes fully.
+    /// What a step of the duration `dt` needs at every point. `dt = 0` is a sudden step, `dt = ∞`
+    /// relaxes fully.
     ///
     /// # Panics
     /// On a negative `dt` or a NaN.
@@ -187,13 +191,14 @@ impl PronyStep {
         self.scale
     }
 
-    /// For each term what is left of its memory, and what a change of the elastic stress adds to it.
+    /// For each term what is left of its memory, and what a change of the elastic stress adds to
+    /// it.
     pub(crate) fn factors(&self) -> ([f64; Prony::MOST_TERMS], [f64; Prony::MOST_TERMS]) {
         (self.decay, self.gain)
     }
 
-    /// `H`, in Pa: the part of the new stress that the past has fixed. `history` is `[n_terms + 1]` rows, as the last step
-    /// left them.
+    /// `H`, in Pa: the part of the new stress that the past has fixed. `history` is `[n_terms + 1]`
+    /// rows, as the last step left them.
     #[inline]
     pub fn memory<const N: usize>(&self, history: &[[f64; N]]) -> [f64; N] {
         let mut memory = [0.0; N];
@@ -223,7 +228,8 @@ impl PronyStep {
     }
 }
 
-/// The six numbers `xx, yy, zz, xy, yz, zx` of a symmetric matrix (not doubled), as histories keep them.
+/// The six numbers `xx, yy, zz, xy, yz, zx` of a symmetric matrix (not doubled), as histories keep
+/// them.
 #[inline]
 pub fn six_of(symmetric: &Mat3) -> [f64; 6] {
     let s = symmetric;

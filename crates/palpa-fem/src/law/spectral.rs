@@ -2,11 +2,12 @@
 
 use crate::Mat3;
 
-/// Each sweep squares what is off the diagonal, so that 5 do for any matrix of doubles; more never hurt.
+/// Each sweep squares what is off the diagonal, so that 5 do for any matrix of doubles; more never
+/// hurt.
 const SWEEPS: usize = 8;
 
-/// Eigenvalues, and eigenvectors as columns, of a symmetric matrix, by Jacobi's rotations: always ends, is exact for a
-/// diagonal matrix, and gives orthonormal vectors for equal eigenvalues too.
+/// Eigenvalues, and eigenvectors as columns, of a symmetric matrix, by Jacobi's rotations: always
+/// ends, is exact for a diagonal matrix, and gives orthonormal vectors for equal eigenvalues too.
 pub(super) fn eigen(symmetric: &Mat3) -> ([f64; 3], Mat3) {
     let mut a = *symmetric;
     let mut vectors = Mat3::identity();

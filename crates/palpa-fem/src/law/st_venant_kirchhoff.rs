@@ -6,8 +6,9 @@
 //! P(F)   = F S                                                                            [Pa]
 //! A_ijkl = δ_ik S_lj + μ ((F Fᵀ)_ik δ_jl + F_il F_kj) − 2/3 μ F_ij F_kl
 //! ```
-//! With `U(v) = K/2 (tr E)²` the whole is the textbook law. Right at large rotation and small strain; under compression
-//! beyond about a third it softens and gives way, so it is for comparison, not for pressed tissue.
+//! With `U(v) = K/2 (tr E)²` the whole is the textbook law. Right at large rotation and small
+//! strain; under compression beyond about a third it softens and gives way, so it is for
+//! comparison, not for pressed tissue.
 
 use super::error::{check_positive, moduli};
 use super::tangent::{add_exchange, add_left, add_outer, add_right};

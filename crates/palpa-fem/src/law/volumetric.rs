@@ -4,9 +4,9 @@
 //! quadratic     U(v) = K/2 (v − 1)²      U' = K (v − 1)     U'' = K                    [J/m³]
 //! logarithmic   U(v) = K/2 (ln v)²       U' = K ln v / v    U'' = K (1 − ln v) / v²
 //! ```
-//! `v` is 1 at rest and `U'` the mean stress (for `v = det F`; tension is positive). The quadratic form is the
-//! one usually written with `D1 = 2/K`; it does not resist collapse (`U` stays finite at `v = 0`). The logarithmic form does, but
-//! is not convex beyond `v = e`.
+//! `v` is 1 at rest and `U'` the mean stress (for `v = det F`; tension is positive). The quadratic
+//! form is the one usually written with `D1 = 2/K`; it does not resist collapse (`U` stays finite
+//! at `v = 0`). The logarithmic form does, but is not convex beyond `v = e`.
 
 use super::error::check_positive;
 use super::{LawError, VolumeMeasure};
@@ -35,7 +35,8 @@ impl Volumetric {
         }
     }
 
-    /// `[U, U', U'']` at the volume ratio `v`, in J/m³ = Pa. Where the law does not exist: `[∞, 0, 0]`.
+    /// `[U, U', U'']` at the volume ratio `v`, in J/m³ = Pa. Where the law does not exist:
+    /// `[∞, 0, 0]`.
     #[inline]
     pub fn evaluate(&self, v: f64) -> [f64; 3] {
         match *self {

@@ -19,8 +19,8 @@ pub struct Yeoh {
 }
 
 impl Yeoh {
-    /// From the constants `[C10, C20, C30]`, in Pa: the first positive, the others such that the energy grows with
-    /// strain throughout.
+    /// From the constants `[C10, C20, C30]`, in Pa: the first positive, the others such that the
+    /// energy grows with strain throughout.
     ///
     /// # Errors
     /// A constant that is not finite, `C10` not positive, or an energy that stops growing.
@@ -38,8 +38,8 @@ impl Yeoh {
         })
     }
 
-    /// From Young's modulus (Pa), Poisson's ratio and the ratios `[C20/C10, C30/C10]`, with the quadratic volumetric
-    /// energy.
+    /// From Young's modulus (Pa), Poisson's ratio and the ratios `[C20/C10, C30/C10]`, with the
+    /// quadratic volumetric energy.
     ///
     /// # Errors
     /// A modulus that is not positive, a ratio outside (−1, ½), or an energy that stops growing.

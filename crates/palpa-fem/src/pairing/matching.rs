@@ -1,7 +1,8 @@
-//! Matchings of a general graph: as many pairs as possible, and cheap ones.
+//! Matchings of a general graph: as many pairs as possible, at low cost.
 //!
-//! Greedy by cost, then augmented from every vertex left alone by Edmonds' blossom search (1965), which reaches the largest
-//! possible number of pairs; then cheaper at the same number, by swapping along short alternating cycles and paths.
+//! First greedy by cost. Then Edmonds' blossom search (1965) augments from every unpaired vertex,
+//! which gives the largest possible number of pairs. Then swaps along short alternating cycles and
+//! paths lower the cost at the same number.
 
 use std::collections::VecDeque;
 
@@ -10,7 +11,7 @@ use super::swaps::Swaps;
 /// No vertex.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// An edge of the graph: its ends, and what it costs to pair them (not negative).
+/// An edge of the graph: its ends, and the cost of pairing them (not negative).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) ends: [u32; 2],
@@ -59,10 +60,11 @@ impl Graph {
     }
 }
 
-/// The partner of each of `n` vertices, or `None`, in a matching with as many pairs as the graph allows.
+/// The partner of each of `n` vertices, or `None`, in a matching with as many pairs as the graph
+/// allows.
 ///
-/// Among the matchings of that size it prefers those without edges above `avoided_cost`, and cheap ones; the least cost
-/// is not promised. The same graph always gives the same matching.
+/// Among the matchings of that size it prefers those without edges above `avoided_cost`, and cheap
+/// ones. It does not guarantee the least cost. The same graph always gives the same matching.
 pub(super) fn matching(n: usize, edges: &[Edge], avoided_cost: f64) -> Vec<Option<u32>> {
     let wanted = edges.iter().copied().filter(|e| e.cost <= avoided_cost);
     let mut mate = greedy(n, wanted.clone());
@@ -98,7 +100,8 @@ fn augment(graph: &Graph, mate: &mut [u32]) {
     }
 }
 
-/// Does without avoided edges where a path of others leads round: each is given up, and its ends paired otherwise.
+/// Replaces avoided edges if a path of other edges exists: each is given up, and its ends are
+/// paired otherwise.
 fn replace_avoided(edges: &[Edge], avoided_cost: f64, preferred: &Graph, mate: &mut [u32]) {
     let mut search = Search::new(mate.len());
     for &Edge { ends: [a, b], cost } in edges {
@@ -124,7 +127,8 @@ enum Label {
     Dead,
 }
 
-/// One alternating tree at a time. What a search has touched is undone after it, so that its cost is its own size.
+/// One alternating tree at a time. After a search, its changes are undone vertex by vertex, so its
+/// cost is its own size.
 #[derive(Debug)]
 struct Search {
     label: Vec<Label>,
@@ -151,8 +155,8 @@ impl Search {
         }
     }
 
-    /// Grows a tree from an unpaired root and flips the first augmenting path. If there is none, the tree is left for the
-    /// caller to clear.
+    /// Grows a tree from an unpaired root and flips the first augmenting path. If there is none,
+    /// the caller must clear the tree.
     fn augment_from(&mut self, root: u32, graph: &Graph, mate: &mut [u32]) -> bool {
         self.queue.clear();
         self.touch(root, Label::Even);
@@ -241,7 +245,8 @@ impl Search {
         }
     }
 
-    /// Draws one arm of a blossom, from `v` down to `base`, into it; `from` is the other end of the closing edge.
+    /// Draws one arm of a blossom, from `v` down to `base`, into it; `from` is the other end of the
+    /// closing edge.
     fn contract(&mut self, mut v: u32, mut from: u32, base: u32, mate: &[u32]) {
         while self.find(v) != base {
             self.before[v as usize] = from;

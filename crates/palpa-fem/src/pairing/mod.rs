@@ -1,7 +1,8 @@
 //! Pairs of skin triangles, over which the element takes its mean strains.
 //!
-//! A wedge alone locks where tissue keeps its volume; two of them with one mean dilatation do not. So the triangles of
-//! the skin are matched: as many pairs as there can be, each near to a rectangle.
+//! A single wedge locks if the tissue is nearly incompressible; two wedges with one mean dilatation
+//! do not. So the triangles of the skin are matched into as many pairs as possible, each near to a
+//! rectangle.
 //!
 //! ```text
 //!        j                   pair of t0 = (a, i, j) and t1 = (b, j, i)
@@ -12,11 +13,13 @@
 //!       \|/
 //!        i
 //! ```
-//! - The number of pairs comes first, since a triangle left alone locks. An odd number of triangles, or a triangle
-//!   that has no partner it could have, leaves some alone.
-//! - Triangles are never paired across a fold of more than 60°: a mean of strains says nothing there.
+//! - The number of pairs comes first, since a triangle left alone locks. An odd number of
+//!   triangles, or a triangle that has no partner it could have, leaves some alone.
+//! - Triangles are never paired across a fold of more than 60°: a mean of strains says nothing
+//!   there.
 //! - Pairs with a reflex corner (180° or more) are taken only where the number of pairs needs them.
-//! - Among these the sum of the squares of the worst corner's distance from 90° is made small (not least).
+//! - Among these the sum of the squares of the worst corner's distance from 90° is made small (not
+//!   least).
 
 mod matching;
 mod swaps;
@@ -47,9 +50,11 @@ pub struct Pairing {
     pub singles: Vec<u32>,
 }
 
-/// Matches the triangles of a skin, as the module says. Deterministic; 20,000 irregular triangles take about 0.2 s.
+/// Matches the triangles of a skin as described in the module. Deterministic; 20,000 irregular
+/// triangles take about 0.2 s.
 ///
-/// Edges that more than two triangles share, or two that disagree on the outside, are not paired across.
+/// No pairs are made across edges that more than two triangles share, or across edges whose two
+/// triangles disagree on the outside.
 pub fn pair_triangles(skin: &Surface) -> Pairing {
     let candidates = candidates(skin);
     let edges: Vec<Edge> = candidates
@@ -97,10 +102,11 @@ fn angle(u: Vec3, v: Vec3) -> f64 {
     u.cross(&v).norm().atan2(u.dot(&v))
 }
 
-/// Every pair that may be made, with its cost, ascending by triangles; of two triangles that share two edges, the
-/// better.
+/// Every allowed pair with its cost, ascending by triangles. Of two triangles that share two edges,
+/// only the better pair.
 fn candidates(skin: &Surface) -> Vec<(Pair, f64)> {
-    // (smaller end, larger end, triangle, corner opposite): the triangles on one edge stand together.
+    // (smaller end, larger end, triangle, corner opposite): the triangles on one edge stand
+    // together.
     let mut sides: Vec<([u32; 2], u32, usize)> = (0..skin.triangles.len() as u32)
         .flat_map(|t| {
             let triangle = skin.triangles[t as usize];

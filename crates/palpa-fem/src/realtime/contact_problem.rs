@@ -12,13 +12,13 @@
 //! ```text
 //! s = s0 + w (f − p0),   p = f − κ s,   0 ≤ g0 + s − s0 ⟂ p ≥ 0
 //! ```
-//! along the normals: `s` the displacement of a vertex, m, `p` its pressing force, N, `g` its gap,
-//! m, `f` the force that the linear system takes, N. Where `κ > 0` the compliance `w`, m/N, is that
-//! of a body whose vertex is held by a spring, and `p` leaves the spring out again: deep under a
-//! tool the free body is not stable, and only the tool holds it. Without friction this is all, and
-//! an active set solves it exactly. With friction, `|t| ≤ μ p`, and where `t` reaches that limit it
-//! opposes the slip from the anchor; projected Gauss–Seidel sweeps go on from the solution without
-//! friction.
+//! along the normals. `s` is the displacement of a vertex, m, `p` its pressing force, N, `g` its
+//! gap, m, and `f` the force in the linear system, N. Where `κ > 0`, a spring holds the vertex in
+//! the linear system: deep under a tool the free body is not stable, and only the tool holds it.
+//! The compliance `w`, m/N, includes the spring; `p` excludes the spring's force. Without friction
+//! this is the whole problem, and an active set solves it exactly. With friction, `|t| ≤ μ p`, and
+//! where `t` reaches that limit it opposes the slip from the anchor. Projected Gauss–Seidel sweeps
+//! then start from the frictionless solution.
 
 #![expect(
     clippy::needless_range_loop,
@@ -32,13 +32,13 @@ use super::candidate::Candidate;
 use crate::Mat3;
 use crate::posed_tool::PosedTool;
 
-/// Changes of the active set.
+/// Largest number of changes of the active set.
 const MOST_CHANGES: usize = 40;
-/// Sweeps with friction.
+/// Largest number of sweeps with friction.
 const SWEEPS: usize = 60;
-/// Change of the forces in a sweep, as a share of all, that counts as none.
+/// Relative change of the forces in a sweep below which they count as settled.
 const SETTLED: f64 = 1e-6;
-/// A gap (m) that counts as none.
+/// Gaps below this (m) count as zero.
 const NO_GAP: f64 = 1e-12;
 
 /// The problem, in memory for [`MOST_CANDIDATES`].
@@ -46,18 +46,18 @@ const NO_GAP: f64 = 1e-12;
 pub(super) struct ContactProblem {
     /// Sorted by vertex.
     pub(super) candidates: Vec<Candidate>,
-    /// Whether any tool has friction: then there are three unknowns to a candidate, else one.
+    /// Whether any tool has friction: a candidate then has three unknowns, otherwise one.
     pub(super) has_friction: bool,
     /// Compliance, column by column, m/N: `n × n` along the normals, or `3 n × 3 n` along the axes
     /// with friction.
     pub(super) compliance: Vec<f64>,
-    /// By how much the force that the linear system takes is more than before: `f − p0` along the
-    /// normals, or along the axes, N.
+    /// Change of the force in the linear system, `f − p0`: along the normals, or along the axes
+    /// with friction, N.
     pub(super) change: Vec<f64>,
     /// Compliance along the normals, m/N.
     pub(super) along: Vec<f64>,
     pub(super) factor: Vec<f64>,
-    /// Compliance without the supports, as far as it has one, and where it is made.
+    /// Compliance with the supports removed as far as possible, and scratch memory for it.
     pub(super) released: Vec<f64>,
     pub(super) spread: Vec<f64>,
     is_active: [bool; MOST_CANDIDATES],
@@ -79,7 +79,7 @@ impl ContactProblem {
         }
     }
 
-    /// The candidates that press.
+    /// The candidates with a pressing force.
     pub(super) fn pressing(&self) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().filter(|c| c.pressure > 0.0)
     }
@@ -90,8 +90,8 @@ impl ContactProblem {
         Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
 
-    /// Finds forces and displacements. Cost: some n³ of vertices that press, and with friction n²
-    /// of candidates a sweep.
+    /// Finds forces and displacements. Cost: proportional to n³ for n pressing vertices; with
+    /// friction, also n² for n candidates in each sweep.
     pub(super) fn solve(&mut self, tools: &[PosedTool]) {
         let (n, has_friction) = (self.candidates.len(), self.has_friction);
         self.change.fill(0.0);
@@ -113,18 +113,18 @@ impl ContactProblem {
         }
         let before: [Vec3; MOST_CANDIDATES] =
             std::array::from_fn(|i| self.candidates.get(i).map_or(Vec3::zeros(), |c| c.friction));
-        // Pressures have been found along the normals; what they do across these is not yet in the
-        // displacements.
+        // The pressures were found along the normals. Their effect across the normals is not yet in
+        // the displacements.
         self.respond();
         self.rub(tools, &start, &before);
     }
 
-    /// The linear system's force along the normal: pressure, and what the support takes.
+    /// Normal force in the linear system: the pressure plus the support's share.
     fn taken(candidate: &Candidate) -> f64 {
         candidate.pressure + candidate.support * candidate.displacement.dot(&candidate.normal)
     }
 
-    /// Pressures that leave no gap negative, by an active set.
+    /// Finds the pressures that leave no gap negative, by an active set.
     fn press(&mut self, start: &[f64; MOST_CANDIDATES]) {
         let n = self.candidates.len();
         let mut rest = [0.0; MOST_CANDIDATES];
@@ -133,7 +133,7 @@ impl ContactProblem {
             self.is_active[i] = candidate.pressure > 0.0;
             rest[i] = candidate.displacement.dot(&candidate.normal);
         }
-        // Those in the system: that press, or have a support to do without.
+        // Candidates in the system: those that press, or whose support must be removed.
         let mut rows = [0_usize; MOST_CANDIDATES];
         let mut taken = [0.0; MOST_CANDIDATES];
         let mut slides = rest;
@@ -145,7 +145,7 @@ impl ContactProblem {
                     m += 1;
                 }
             }
-            // Forces at the start act until they are changed.
+            // The forces at the start act until they are changed.
             let mut right = [0.0; MOST_CANDIDATES];
             for (right, &i) in right.iter_mut().zip(&rows[..m]) {
                 let released: f64 = (0..n)
@@ -170,7 +170,7 @@ impl ContactProblem {
                 };
                 along[i + n * j] - own
             };
-            // Change from the start of those in the system.
+            // Change from the start for the rows of the system.
             let offset: [f64; MOST_CANDIDATES] = std::array::from_fn(|r| {
                 if r < m && !is_active[rows[r]] {
                     start[rows[r]] / candidates[rows[r]].support
@@ -225,8 +225,8 @@ impl ContactProblem {
         }
     }
 
-    /// Adds what the change of the pressures does across the normals, which the frictionless
-    /// solution leaves out.
+    /// Adds the effect of the pressure changes across the normals, which the frictionless solution
+    /// leaves out.
     fn respond(&mut self) {
         let n = self.candidates.len();
         for i in 0..n {
@@ -239,7 +239,7 @@ impl ContactProblem {
         }
     }
 
-    /// Sweeps with friction; leaves `change` along the axes.
+    /// Sweeps with friction; the result is in `change`, along the axes.
     fn rub(
         &mut self,
         tools: &[PosedTool],
@@ -263,7 +263,8 @@ impl ContactProblem {
                 let across = 0.5 * (own.trace() - along);
                 let slide = candidate.displacement.dot(&normal);
                 let gap = candidate.gap + slide;
-                // What closes the gap; or, if that would pull, what takes the pressure off.
+                // The force that closes the gap; if that would pull, the force that removes the
+                // pressure.
                 let present = taken[i].dot(&normal) - candidate.support * slide;
                 let share = 1.0 - candidate.support * along;
                 let mut push = -gap / along;
@@ -306,7 +307,7 @@ impl ContactProblem {
     }
 }
 
-/// Factors a dense symmetric matrix by `LDLᵀ`. False where a pivot is nearly zero.
+/// Factors a dense symmetric matrix as `LDLᵀ`. Returns false if a pivot is nearly zero.
 pub(super) fn factor_symmetric(
     n: usize,
     entry: impl Fn(usize, usize) -> f64,

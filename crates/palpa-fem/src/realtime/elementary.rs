@@ -9,11 +9,11 @@ use std::f64::consts::LOG2_E;
 
 use super::lanes::Lanes;
 
-/// `ln 2` but for [`LN_2_REST`], in so few bits that whole numbers times it are exact in single
-/// precision, too.
+/// `ln 2` minus [`LN_2_REST`]. It has so few bits that its product with a whole number is exact,
+/// even in single precision.
 const LN_2_SHORT: f64 = 0.693359375;
 const LN_2_REST: f64 = -2.121_944_400_546_905_8e-4;
-/// Exponents of `e` beyond this size would leave the normal numbers of single precision.
+/// Largest exponent of `e`; beyond it, the result is not a normal number in single precision.
 const LARGEST_EXPONENT: f64 = 87.0;
 
 /// `ln x` of positive normal numbers.
@@ -37,7 +37,7 @@ pub(super) fn ln<R: Lanes>(token: R::Token, x: R) -> R {
     k.mul_add(c(LN_2_SHORT), small)
 }
 
-/// `e^x`, of exponents within ±87; beyond, that of the nearest of these.
+/// `e^x`. Exponents beyond ±87 are clamped.
 #[inline(always)]
 pub(super) fn exp<R: Lanes>(token: R::Token, x: R) -> R {
     let c = |x: f64| R::splat(token, x);

@@ -1,4 +1,4 @@
-//! The zone: its prisms, whose stiffness is made anew in every step, and its factor.
+//! The zone: its prisms, whose stiffness is computed anew in every step, and its factor.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
@@ -15,8 +15,8 @@ use super::plan::{Plan, Trouble};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// First shift of a zone that is not positive definite, relative to its diagonal; its growth; and
-/// how often it may grow.
+/// First shift of a zone that is not positive definite, relative to its diagonal; its growth
+/// factor; and the largest number of increases.
 const FIRST_SHIFT: f32 = 1e-3;
 const SHIFT_GROWTH: f32 = 4.0;
 const MOST_SHIFTS: usize = 8;
@@ -57,7 +57,7 @@ impl Inside {
         }
     }
 
-    /// Makes the zone's stiffness at these displacements.
+    /// Assembles the zone's stiffness at these displacements.
     pub(super) fn assemble(
         &mut self,
         model: &Model,
@@ -88,7 +88,7 @@ impl Inside {
         if n > 0.0 { sum / n } else { 0.0 }
     }
 
-    /// Adds springs of stiffness `by`, N/m, along the normals of supported vertices.
+    /// Adds springs of stiffness `by` (N/m) along the normals of supported vertices.
     pub(super) fn add_springs(&mut self, pattern: &ColumnPattern, springs: &[Candidate], by: f64) {
         for spring in springs.iter().filter(|s| s.support > 0.0) {
             let block = &mut self.blocks[pattern.own(spring.vertex as usize)];
@@ -100,8 +100,8 @@ impl Inside {
         }
     }
 
-    /// Factors the zone; with a share of the diagonal added to it, until it is positive definite.
-    /// Returns that share.
+    /// Factors the zone. If it is not positive definite, adds a growing share of the diagonal until
+    /// it is. Returns that share.
     pub(super) fn factor(
         &mut self,
         model: &Model,
@@ -142,7 +142,7 @@ impl Inside {
         Err(Trouble::Singular)
     }
 
-    /// Empties the blocks that the zone's prisms are in.
+    /// Clears the blocks of the zone's prisms.
     fn clear(&mut self, pattern: &ColumnPattern, plan: &Plan) {
         let n = pattern.n_levels();
         for &v in &plan.vertices {
@@ -170,7 +170,7 @@ impl Inside {
         back_substitute(&plan.tree, Half::Zone, &self.factor, x, &mut self.solve);
     }
 
-    /// Fills a contact problem's compliance.
+    /// Fills in the compliance of a contact problem.
     pub(super) fn comply(&mut self, plan: &Plan, problem: &mut ContactProblem) {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         self.pushes.clear();
@@ -195,7 +195,8 @@ impl Inside {
         }
     }
 
-    /// Fills a contact problem's displacements by the right side whose forward substitution is `z`.
+    /// Fills in the displacements of a contact problem. `z` is the forward substitution of the
+    /// right side.
     pub(super) fn project(&mut self, plan: &Plan, z: &[f32], problem: &mut ContactProblem) {
         let (n, has_friction) = (self.pushes.len(), problem.has_friction);
         self.compliance.project(&plan.tree, z, &mut self.moves[..n]);
@@ -208,8 +209,7 @@ impl Inside {
         }
     }
 
-    /// Adds the forces that a contact problem has found to a right side that has been substituted
-    /// forwards.
+    /// Adds the forces found by a contact problem to a right side after forward substitution.
     pub(super) fn push(&mut self, plan: &Plan, problem: &ContactProblem, z: &mut [f32]) {
         let n = self.pushes.len();
         for (force, change) in self.moves[..n].iter_mut().zip(&problem.change) {

@@ -1,23 +1,23 @@
-//! Several numbers at once, whatever the machine's vectors are: the kernel is written on [`Lanes`]
-//! and compiled for each instruction set; which one runs is decided when the program starts.
+//! Vectors of numbers, independent of the machine's vector size. The kernel is written with
+//! [`Lanes`] and compiled for each instruction set; the program chooses one when it starts.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use palpa_sparse::fronts::Number;
 use pulp::Simd;
 
-/// Numbers of the widest vector.
+/// Number of lanes of the widest vector.
 const WIDTH: usize = 16;
 
 /// A vector of numbers of the kernel's precision.
 pub(super) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// One of the numbers.
+    /// Type of one number.
     type Element: Number;
     /// A proof that the machine has the instructions.
     type Token: Copy;
-    /// How many there are.
+    /// Number of lanes.
     const N: usize;
     /// Distance of 1 to the next number.
     const EPSILON: f64;
@@ -34,9 +34,9 @@ pub(super) trait Lanes:
     fn sqrt(self) -> Self;
     /// `then` where `self < other`, `otherwise` elsewhere.
     fn select_less(self, other: Self, then: Self, otherwise: Self) -> Self;
-    /// `m` of √½ to √2 and the whole number `k` with `self = m 2^k`; of positive normal numbers.
+    /// `m` from √½ to √2 and the whole number `k` with `self = m 2^k`, for positive normal numbers.
     fn split(self) -> [Self; 2];
-    /// `2^self` of whole numbers that a normal number can have as exponent.
+    /// `2^self`, for whole numbers in the range of normal exponents.
     fn power_of_two(self) -> Self;
 }
 

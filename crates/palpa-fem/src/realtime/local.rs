@@ -1,4 +1,4 @@
-//! The local model of a body under its tools, which the haptic loop works with between steps.
+//! The local model of a body under its tools. The haptic loop uses it between two steps.
 //!
 //! ```text
 //! x_i = x0_i + Σ_j W_ij (r_j − r0_j)
@@ -13,14 +13,15 @@ use crate::Mat3;
 use crate::posed_tool::PosedTool;
 use crate::shape::Pose;
 
-/// A skin vertex under or near a tool, or two that press side by side.
+/// A skin vertex under or near a tool, or two neighbouring pressing vertices merged into one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalContact {
-    /// Skin vertex; of two a number of their own, the same in every step and no vertex's.
+    /// Index of the skin vertex. A merged contact has a number of its own, the same in every step
+    /// and never that of a vertex.
     pub vertex: u32,
-    /// Which tool.
+    /// Index of the tool.
     pub tool: usize,
-    /// Where it is, m.
+    /// Position, m.
     pub position: Vec3,
     /// Force of the tool on it, N.
     pub force: Vec3,
@@ -30,21 +31,21 @@ pub struct LocalContact {
     pub normal: Vec3,
     /// The tool's curvature there, in the tool's frame, 1/m.
     pub curvature: Mat3,
-    /// Where friction holds it, in the tool's frame, m.
+    /// Its anchor, the point where friction holds it, in the tool's frame, m.
     pub anchor: Vec3,
 }
 
 /// A tool, and the body's force on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalTool {
-    /// Where it is.
+    /// Pose of the tool.
     pub pose: Pose,
-    /// Its coefficient of friction.
+    /// Coefficient of friction.
     pub friction: f64,
-    /// Force of the tissue on it, N.
+    /// Force of the tissue on the tool, N.
     pub force: Vec3,
-    /// By how much that force resists a displacement of the tool, along the normals of the vertices
-    /// that press, N/m.
+    /// Stiffness of that force against a displacement of the tool, along the normals of the
+    /// pressing vertices, N/m.
     pub stiffness: Mat3,
 }
 
@@ -55,20 +56,20 @@ pub struct LocalModel {
     pub contacts: Vec<LocalContact>,
     /// The tools.
     pub tools: Vec<LocalTool>,
-    /// Compliance `W`, `3 n × 3 n` column by column, symmetric, m/N.
+    /// Compliance `W`, `3 n × 3 n`, column-major, symmetric, m/N.
     pub compliance: Vec<f64>,
 }
 
 impl LocalModel {
-    /// The displacement of contact `i` by a force on contact `j`, m/N.
+    /// Compliance block: displacement of contact `i` per force on contact `j`, m/N.
     pub fn block(&self, i: usize, j: usize) -> Mat3 {
         let n = 3 * self.contacts.len();
         Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
 }
 
-/// Pivot below which a body without its supports counts as not stable, relative to what it would be
-/// on its own.
+/// If removing the supports leaves a pivot below this share of its own diagonal entry, the body
+/// counts as unstable.
 const LEAST_RELEASE: f64 = 0.05;
 
 /// One or two candidates, and their share of the force.
@@ -108,7 +109,8 @@ impl ContactProblem {
             let PosedTool { tool, pose } = &tools[members[0].tool as usize];
             let local = pose.inverse_transform_point(&position.into()).coords;
             let distance = tool.shape().distance(&local);
-            // The middle between two points of a curved tool is inside it, but they both touch.
+            // The midpoint of two points on a curved tool lies inside it; use the surface point and
+            // normal of both.
             let (surface, normal) = if share[1] > 0.0 {
                 let mean = members[0].normal * share[0] + members[1].normal * share[1];
                 (
@@ -166,16 +168,16 @@ impl ContactProblem {
         }
     }
 
-    /// Makes the compliance without the supports, which only the step's matrix has: with those of
-    /// the vertices that have one in `N`,
+    /// Removes the supports, which exist only in the step's matrix, from the compliance. With the
+    /// normals of the supported vertices in `N`,
     ///
     /// ```text
     /// W + W N (1/κ − Nᵀ W N)⁻¹ Nᵀ W
     /// ```
-    /// Where the free body is not stable this is no compliance of anything, and as much of the
-    /// supports is left as it takes.
+    /// If the free body is not stable, this is not a valid compliance. Then only as much of the
+    /// supports is removed as leaves it stable.
     fn release(&mut self) {
-        /// Shares of the supports that are tried to be left out.
+        /// Shares of the supports that are removed, tried in this order.
         const SHARES: [f64; 5] = [1.0, 0.9, 0.7, 0.4, 0.1];
         let (n, has_friction) = (self.candidates.len(), self.has_friction);
         let per = if has_friction { 3 } else { 1 };
@@ -206,7 +208,7 @@ impl ContactProblem {
         if !is_stable {
             return;
         }
-        // Column r of the spread: what a push along the normal of row r moves.
+        // Column r of the spread: displacements by a unit force along the normal of row r.
         for (r, &i) in rows.iter().enumerate() {
             for k in 0..size {
                 self.spread[k + size * r] = if has_friction {
@@ -246,14 +248,14 @@ impl ContactProblem {
         self.candidates[i].normal * self.candidates[j].normal.transpose() * along
     }
 
-    /// Puts neighbours that press together until there are few enough, and leaves out the farthest
-    /// of the others.
+    /// Merges neighbouring pressing candidates until there are at most `most`, and leaves out the
+    /// farthest of the others.
     fn clusters(&self, skin: &[Vec3], most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
         let n = self.candidates.len();
         let mut partner = [usize::MAX; MOST_CANDIDATES];
         let pressing = |i: usize| self.candidates[i].pressure > 0.0;
         let n_idle = (0..n).filter(|&i| !pressing(i)).count();
-        // Of what is only near, a few that are nearest are enough.
+        // Of the candidates that do not press, a few of the nearest are enough.
         let n_kept_idle = n_idle.min((most / 6).max(most.saturating_sub(n - n_idle)));
         let mut n_over = (n - n_idle + n_kept_idle).saturating_sub(most);
         while n_over > 0 {
@@ -261,7 +263,7 @@ impl ContactProblem {
             for i in (0..n).filter(|&i| pressing(i) && partner[i] == usize::MAX) {
                 for j in (i + 1..n).filter(|&j| pressing(j) && partner[j] == usize::MAX) {
                     let (a, b) = (&self.candidates[i], &self.candidates[j]);
-                    // At rest, so that the same are together in every step.
+                    // Distances at rest, so that the same candidates are merged in every step.
                     let points = [a, b].map(|c| skin[c.vertex as usize]);
                     let distance = (points[0] - points[1]).norm_squared();
                     if a.tool == b.tool && distance < best.0 {
@@ -319,7 +321,7 @@ impl ContactProblem {
         filled
     }
 
-    /// By how much the vertices that press resist a displacement of their tool, along their
+    /// Stiffness of the pressing vertices against a displacement of their tool, along their
     /// normals, N/m.
     fn tool_stiffness(&mut self, tool: usize) -> Mat3 {
         let mut rows = [0; MOST_CANDIDATES];
@@ -358,13 +360,13 @@ impl ContactProblem {
     }
 }
 
-/// A number for two vertices that is none of a vertex.
+/// A number for a merged pair of vertices, different from all vertex numbers.
 fn number_of_pair(a: u32, b: u32) -> u32 {
     let (a, b) = (a.min(b), a.max(b));
     a.wrapping_mul(0x9e37_79b1).wrapping_add(b) | 1 << 31
 }
 
-/// Where a candidate is at the end of the iteration.
+/// Position of a candidate at the end of the iteration.
 fn place(candidate: &Candidate) -> Vec3 {
     candidate.start + candidate.displacement
 }

@@ -1,10 +1,10 @@
-//! The moving step: the same element and laws, fast enough for a hand.
+//! Real-time steps: the same element and laws, fast enough for a hand.
 //!
-//! A step follows the tools by one Newton iteration, or two where forces are far out of balance.
-//! The stiffness of a *zone* round the tools is made anew in every step, in single precision.
-//! Forces and displacements are in double precision, so that the stiffness decides how fast a step
-//! converges, and not to which result. The stiffness of the rest of the body, the *exterior*, is an
-//! earlier one, made anew in the background ([`Rebuild`]). Contact is a small problem of its own on
+//! A step follows the tools by one Newton iteration, or by two where forces are far out of balance.
+//! The stiffness of a *zone* around the tools is computed anew in every step, in single precision.
+//! Forces and displacements are in double precision. So the stiffness determines how fast a step
+//! converges, but not the result. The stiffness of the rest of the body, the *exterior*, is an
+//! earlier one; the background renews it ([`Rebuild`]). Contact is a small problem of its own on
 //! the compliance of a few vertices (`contact_problem.rs`); the haptic loop gets the same
 //! compliance.
 //!
@@ -40,10 +40,10 @@ use palpa_sparse::ColumnPattern;
 
 use crate::model::Model;
 
-/// Most skin vertices that may be candidates for contact.
+/// Largest number of contact candidates.
 pub const MOST_CANDIDATES: usize = 160;
 
-/// The columns of a body's skin, and which of them are neighbours.
+/// The columns of a body's skin, and their neighbours.
 fn column_pattern(model: &Model) -> ColumnPattern {
     let edges = model.structure.groups.iter().flat_map(|group| {
         let vertices = &group.vertices[..group.n_columns()];

@@ -1,4 +1,4 @@
-//! The exterior: the body outside the zone, whose stiffness is that of an earlier state.
+//! The exterior: the body outside the zone, with the stiffness of an earlier state.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
@@ -12,18 +12,17 @@ use super::plan::{Plan, Trouble};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// The rest of the body, linear about a state in the past.
+/// The exterior, linearised about an earlier state.
 #[derive(Debug, Clone)]
 pub(super) struct Outside {
-    /// Counts factors.
+    /// Number of the factor.
     pub(super) id: u64,
-    /// The zone that it is the exterior of.
+    /// Number of the zone that this is the exterior of.
     pub(super) plan: u64,
     pub(super) factor: Exterior<f32>,
-    /// The right side that is left of the exterior's own unknowns after elimination, and what it
-    /// pushes the ring with.
+    /// The exterior's own right side after elimination, and its force on the ring.
     right: Vec<f32>,
-    /// Displacements of all nodes about which it is linear, m.
+    /// Displacements of all nodes at the point of linearisation, m. `[n_nodes]`
     pub(super) at: Vec<Vec3>,
 }
 
@@ -38,8 +37,8 @@ impl Outside {
         }
     }
 
-    /// Adds the exterior's force on the ring, at these displacements, to a right side. Cost: the square
-    /// of the ring.
+    /// Adds the exterior's force on the ring, at these displacements, to a right side. Cost:
+    /// quadratic in the size of the ring.
     pub(super) fn push(
         &self,
         plan: &Plan,
@@ -67,9 +66,8 @@ impl Outside {
         }
     }
 
-    /// Displacements of the exterior that go with those of the ring: brings `displacements` up to
-    /// date. Cost: a substitution through the exterior; of some columns only, through the fronts
-    /// above them.
+    /// Updates the displacements of the exterior to follow those of the ring. Cost: a substitution
+    /// through the exterior; for some columns only, through the fronts above them.
     pub(super) fn settle(
         &self,
         model: &Model,
@@ -110,7 +108,8 @@ impl Outside {
         }
     }
 
-    /// Makes the exterior's stiffness and factor at these displacements, and is linear about them.
+    /// Assembles and factors the exterior's stiffness at these displacements, and linearises about
+    /// them.
     #[expect(
         clippy::too_many_arguments,
         reason = "a model, its zone and two rooms to work in"
@@ -134,15 +133,15 @@ impl Outside {
             self.factor
                 .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
         }
-        // The stiffness is the true one: nothing can have turned.
+        // The stiffness is that of the present state, so no forces can have reversed.
         follower.forces.fill(Vec3::zeros());
         follower.share = 1.0;
         self.follow(model, memory, plan, follower, displacements)?;
         Ok(())
     }
 
-    /// Is linear about other displacements, with the stiffness that it has. Cost: forces of the
-    /// exterior's prisms and a substitution. Returns the exterior's own forces out of balance, N.
+    /// Linearises about other displacements, with the old stiffness. Cost: the forces of the
+    /// exterior's prisms and a substitution. Returns the exterior's own unbalanced forces, N.
     pub(super) fn follow(
         &mut self,
         model: &Model,
@@ -195,13 +194,13 @@ impl Outside {
     }
 }
 
-/// The exterior's prisms and scratch.
+/// The exterior's prisms, and scratch memory.
 #[derive(Debug)]
 pub(super) struct Follower {
     pub(super) batches: Batches,
     forces: Vec<Vec3>,
     before: Vec<Vec3>,
-    /// Share of its forces out of balance that is taken back at once.
+    /// Share of the unbalanced forces that is corrected at once.
     share: f64,
     pub(super) solve: SolveScratch<f32>,
 }
@@ -229,11 +228,11 @@ impl Follower {
         }
     }
 
-    /// Where forces turn back on themselves from step to step (`turned` is the product of two) the
-    /// old stiffness is less than half the true one somewhere, and to take them back whole would
-    /// raise them.
+    /// Adapts the share of the unbalanced forces that is corrected. `turned` is the product of the
+    /// forces of two steps. If they reverse from step to step, the old stiffness is somewhere less
+    /// than half the true one, and a full correction would increase the forces.
     fn relax(&mut self, turned: f64) {
-        /// The least share, and its growth where they do not turn.
+        /// The least share, and its growth factor while forces do not reverse.
         const LEAST: f64 = 0.2;
         const GROWTH: f64 = 1.1;
         self.share = if turned < 0.0 {
@@ -244,7 +243,7 @@ impl Follower {
     }
 }
 
-/// Where exteriors are factored.
+/// Memory for factoring exteriors.
 #[derive(Debug)]
 pub(super) struct Workshop {
     blocks: Vec<Block<f32>>,
@@ -262,7 +261,7 @@ impl Workshop {
     }
 }
 
-/// `y −= A x` of a symmetric matrix whose lower triangle is given, column by column.
+/// `y −= A x` for a symmetric matrix given by its lower triangle, column by column.
 fn subtract_symmetric(a: &[f32], n: usize, x: &[f32], y: &mut [f32]) {
     pulp::Arch::new().dispatch(SubtractSymmetric { a, n, x, y });
 }

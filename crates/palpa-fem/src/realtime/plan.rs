@@ -1,4 +1,4 @@
-//! Which columns of a body are in the zone, and in which order all are eliminated.
+//! The columns of a zone, and the elimination order of all columns.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::Tree;
@@ -10,7 +10,7 @@ use crate::model::Model;
 
 /// Stiffness of the springs that hold a supported node, relative to its own.
 const SUPPORT: f64 = 1e3;
-/// Why a step could not be made.
+/// The reason why a step failed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Trouble {
     /// A prism is turned inside out; its middle at rest, m.
@@ -31,14 +31,14 @@ impl From<Singular> for Trouble {
     }
 }
 
-/// Which columns are in a zone, and in which order all are eliminated.
+/// The columns of a zone, and the elimination order of all columns.
 #[derive(Debug)]
 pub(super) struct Plan {
     /// Number of the zone, counted from 1.
     pub(super) id: u64,
-    /// Its middle at rest, m.
+    /// Centre at rest, m.
     pub(super) centre: Vec3,
-    /// m; infinite for the whole body.
+    /// Radius, m; infinite for the whole body.
     pub(super) radius: f64,
     /// Order of elimination: exterior, zone, ring.
     pub(super) tree: Tree,
@@ -46,16 +46,16 @@ pub(super) struct Plan {
     pub(super) is_inside: Vec<bool>,
     /// Skin vertices of the zone, ascending.
     pub(super) vertices: Vec<u32>,
-    /// Nodes that have unknowns, each with the first of its three: those of the zone, of the ring
-    /// (which are in the zone, too), and of the exterior.
+    /// Nodes with unknowns, each with the first of its three unknowns: nodes of the zone (ring
+    /// included), of the ring, and of the exterior.
     pub(super) zone: Vec<[u32; 2]>,
     pub(super) ring: Vec<[u32; 2]>,
     pub(super) exterior: Vec<[u32; 2]>,
 }
 
 impl Plan {
-    /// The zone of all columns whose skin vertex is, at rest, within `radius` of `centre`; all if
-    /// there is none.
+    /// The zone of all columns whose skin vertex at rest is within `radius` of `centre`; all
+    /// columns if there is none.
     pub(super) fn new(
         model: &Model,
         pattern: &ColumnPattern,

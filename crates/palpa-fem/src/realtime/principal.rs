@@ -9,8 +9,8 @@
 //! dS_aa = Σ_b (h_ab − 2 δ_ab g_a)/(x_a x_b) dE_bb,      dS_ab = 2 (S_a − S_b)/(x_a − x_b) dE_ab,   a ≠ b
 //! ```
 //! in the frame of the `v_a`. Differences are taken as
-//! `λ̄_a^α − λ̄_b^α = 2 (λ̄_a λ̄_b)^(α/2) sinh z`, `z = α (e_a − e_b)/2`, so that equal stretches are
-//! no special case. Work on vectors is written as loops: closures may be compiled without the
+//! `λ̄_a^α − λ̄_b^α = 2 (λ̄_a λ̄_b)^(α/2) sinh z`, `z = α (e_a − e_b)/2`, so that equal stretches
+//! are no special case. Work on vectors is written as loops: closures may be compiled without the
 //! machine's instructions.
 
 #![expect(
@@ -25,11 +25,12 @@ use super::kernel::{M3, V3, WIDTH, axpy, dot, mul, scale};
 use super::lanes::Lanes;
 use crate::law::Powers;
 
-/// Sweeps of rotations at most. Each squares what is off the diagonal: five do in double precision.
+/// Largest number of sweeps of rotations. Each sweep squares the off-diagonal part; five are enough
+/// in double precision.
 const SWEEPS: usize = 6;
-/// What is off the diagonal, as a share of the trace and in units of rounding, that is left.
+/// Off-diagonal part that may remain, as a share of the trace, in units of rounding.
 const LEFT: f64 = 0.1;
-/// Where `sinh` comes from powers rather than from its series.
+/// From this size on, `sinh` is computed from powers instead of its series.
 const WIDE: f64 = 0.5;
 
 /// Symmetric: `xx, yy, zz, xy, yz, zx`.
@@ -103,7 +104,7 @@ pub(super) fn respond<R: Lanes>(
     let (x, axes) = eigen(token, cauchy_green);
     let (mut inverse, mut stretch, mut half_ln) = ([zero; 3], [zero; 3], [zero; 3]);
     for a in 0..3 {
-        // Only where a prism is inside out may it be less.
+        // It can be less only if a prism is inside out.
         let x = x[a].max(c(1e-30));
         inverse[a] = c(1.0).divided_by(x);
         stretch[a] = x.sqrt();
@@ -179,7 +180,7 @@ pub(super) fn respond<R: Lanes>(
 /// Rows and columns of six numbers.
 pub(super) const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
 
-/// `sinh z / z`, where also `2 middle sinh z = difference` is known.
+/// `sinh z / z`, if `2 middle sinh z = difference` is also known.
 #[inline(always)]
 fn sinh_by<R: Lanes>(token: R::Token, z: R, difference: R, middle: R) -> R {
     let twice = (middle + middle) * z;

@@ -27,7 +27,8 @@ impl Noise {
     }
 }
 
-/// Seven by five cells: an odd number of batches, and one that is not full; three layers of different stiffness.
+/// Seven by five cells: an odd number of batches, and one that is not full; three layers of
+/// different stiffness.
 fn body() -> LayeredBody {
     let levels = LevelStack {
         depths: vec![0.0, 2e-3, 5e-3, 9e-3],

@@ -14,8 +14,8 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// A capsule of this radius whose straight part has this length, in metres; from end to end it measures
-    /// `length + 2 radius`.
+    /// A capsule of this radius whose straight part has this length, in metres; from end to end it
+    /// measures `length + 2 radius`.
     ///
     /// # Errors
     /// When one of them is not between 1 µm and 10 m.

@@ -1,4 +1,5 @@
-//! A cone with a rounded tip, point down, that passes through a rounded rim into a shaft without end.
+//! A cone with a rounded tip, point down, that passes through a rounded rim into a shaft without
+//! end.
 //!
 //! ```text
 //!   |<- radius ->|
@@ -10,9 +11,9 @@
 //!            `---o---'            tip: rounded by tip_radius
 //! ```
 //! All four parts are smooth and meet without a corner. In the half plane of distance from the axis
-//! and height, `n = (cos α, −sin α)` is the flank's normal and `τ = (sin α, cos α)` goes up along it. A
-//! convex body is all that lies behind its supporting lines, and a point's distance is that from the
-//! farthest of these, outside as inside:
+//! and height, `n = (cos α, −sin α)` is the flank's normal and `τ = (sin α, cos α)` goes up along
+//! it. A convex body is all that lies behind its supporting lines, and a point's distance is that
+//! from the farthest of these, outside as inside:
 //!
 //! ```text
 //! tip    where (p − c_tip)·τ ≤ 0            |p − c_tip| − tip_radius
@@ -45,12 +46,13 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// A cone whose shaft has this radius and whose flank this angle to the axis (rad), with tip and rim rounded by
-    /// `tip_radius` and `edge_radius`, `radius` at most. An edge radius of 0 is sharp. In metres.
+    /// A cone whose shaft has this radius and whose flank this angle to the axis (rad), with tip
+    /// and rim rounded by `tip_radius` and `edge_radius`, `radius` at most. An edge radius of 0 is
+    /// sharp. In metres.
     ///
     /// # Errors
-    /// When radius or tip radius is not between 1 µm and 10 m, a rounding is negative or larger than it, or the half angle is not
-    /// between 0.05 and 1.55 rad.
+    /// When radius or tip radius is not between 1 µm and 10 m, a rounding is negative or larger
+    /// than it, or the half angle is not between 0.05 and 1.55 rad.
     pub fn new(
         radius: f64,
         half_angle: f64,
@@ -98,8 +100,9 @@ impl Cone {
         self.edge_radius
     }
 
-    /// A distance with the unit normal `out · radial − down · z`, on a surface whose curvature radius in the half plane is
-    /// `bend` (infinite where it is straight), at a point of this distance from the axis.
+    /// A distance with the unit normal `out · radial − down · z`, on a surface whose curvature
+    /// radius in the half plane is `bend` (infinite where it is straight), at a point of this
+    /// distance from the axis.
     fn on_meridian(
         &self,
         distance: f64,
@@ -118,7 +121,8 @@ impl Cone {
                 0.0
             }
         };
-        // Round the axis the surface turns with the radius of the nearest point, seen along the normal.
+        // Round the axis the surface turns with the radius of the nearest point, seen along the
+        // normal.
         let on_surface = (from_axis - distance * out).max(0.0);
         let turn = if out > 0.0 {
             on_surface / out

@@ -6,8 +6,9 @@
 //! equation     N(t) = ‖eᵢ pᵢ / (t + eᵢ²)‖ = 1             its largest root, t > −min eᵢ²
 //! distance     t ‖∇‖, normal ∇/‖∇‖, shape operator  S = (1 − n nᵀ) diag(1/eᵢ²) (1 − n nᵀ) / ‖∇‖
 //! ```
-//! N falls from ∞ to 0 there, and 1/N is concave and nearly straight, so Newton's method on 1/N = 1 from the left
-//! converges in a few steps without overshooting (as in trust regions: Conn, Gould, Toint 2000, §7.3.3).
+//! N falls from ∞ to 0 there, and 1/N is concave and nearly straight, so Newton's method on 1/N = 1
+//! from the left converges in a few steps without overshooting (as in trust regions: Conn, Gould,
+//! Toint 2000, §7.3.3).
 
 use palpa_mesh::Vec3;
 
@@ -16,7 +17,8 @@ use crate::Mat3;
 
 const NAME: &str = "ellipsoid";
 
-/// More steps than rounding leaves to take; from a bad start an aspect ratio of 10⁷ takes about ten.
+/// More steps than rounding leaves to take; from a bad start an aspect ratio of 10⁷ takes about
+/// ten.
 const MAX_STEPS: usize = 60;
 
 /// Coordinates below this share of the shortest radius are none: their squares would vanish.
@@ -64,7 +66,8 @@ impl Ellipsoid {
 
     /// The surface point nearest to `p`, given by its unit vector `xᵢ/eᵢ`.
     fn nearest(&self, p: &Vec3) -> Vec3 {
-        // Lengths in units of the shortest radius, and s = t + 1, exact also where t nears −1: the poles are at s = −cᵢ.
+        // Lengths in units of the shortest radius, and s = t + 1, exact also where t nears −1: the
+        // poles are at s = −cᵢ.
         let shortest = self.radii.min();
         let e = self.radii / shortest;
         let p = (p / shortest).map(|p| if p.abs() < NOTHING { 0.0 } else { p });
@@ -83,7 +86,8 @@ impl Ellipsoid {
             .max(0.0);
         let mut x = at(s);
         if s == 0.0 && x.norm_squared() <= 1.0 {
-            // On the medial axis, where s = 0 is the root: across it the nearest points lie on all sides.
+            // On the medial axis, where s = 0 is the root: across it the nearest points lie on all
+            // sides.
             let side = if c.z == 0.0 {
                 -Vec3::z()
             } else if c.x == 0.0 {

@@ -24,8 +24,8 @@ pub struct FlatPunch {
 }
 
 impl FlatPunch {
-    /// A punch whose shaft has this radius and whose rim is rounded by `edge_radius`: 0 is sharp, `radius` half a ball.
-    /// In metres.
+    /// A punch whose shaft has this radius and whose rim is rounded by `edge_radius`: 0 is sharp,
+    /// `radius` half a ball. In metres.
     ///
     /// # Errors
     /// When the radius is not between 1 µm and 10 m, or the edge radius is negative or larger.
@@ -52,14 +52,16 @@ impl FlatPunch {
         self.radius - self.edge_radius
     }
 
-    /// To the quarter torus, whose middle line has the radius of the flat and lies at `z = edge_radius`.
+    /// To the quarter torus, whose middle line has the radius of the flat and lies at
+    /// `z = edge_radius`.
     fn distance_to_rim(&self, from_axis: f64, radial: &Vec3, out: f64, down: f64) -> Distance {
         let from_line = out.hypot(down);
         let distance = from_line - self.edge_radius;
         let normal = (radial * out - Vec3::z() * down) / from_line;
         let along_meridian = (radial * down + Vec3::z() * out) / from_line;
         let around = Vec3::z().cross(radial);
-        // The second curvature is normal·radial / from_axis, bounded like the first by the share that `out` is of it.
+        // The second curvature is normal·radial / from_axis, bounded like the first by the share
+        // that `out` is of it.
         let bend = 1.0 / offset_radius(self.edge_radius, distance, self.radius);
         let share = if out < from_axis {
             out / from_axis

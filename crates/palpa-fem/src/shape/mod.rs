@@ -1,13 +1,14 @@
 //! Rigid shapes with exact distance: tools that press, and lumps in the tissue.
 //!
-//! To add a shape: a file here with its `RigidShape` (`flat_punch.rs` is an example); its name in the
-//! lists of this file (`mod`, `pub use`, [`Shape`], `of_each!`, `from_shape!`) and in `cases` of
-//! `tests/it/shape.rs`, which runs all tests of shapes over it. Then it can be used from Rust. For
-//! scenes: its sizes in `palpa-scene/src/shape.rs`, an arm of `tool_shape` in `palpa/src/continuum.rs`,
-//! its drawing and menu entry in `web/src/scene`, and a word in `docs/theory/contact.md`.
+//! To add a shape: a file here with its `RigidShape` (`flat_punch.rs` is an example); its name in
+//! the lists of this file (`mod`, `pub use`, [`Shape`], `of_each!`, `from_shape!`) and in `cases`
+//! of `tests/it/shape.rs`, which runs all tests of shapes over it. Then it can be used from Rust.
+//! For scenes: its sizes in `palpa-scene/src/shape.rs`, an arm of `tool_shape` in
+//! `palpa/src/continuum.rs`, its drawing and menu entry in `web/src/scene`, and a word in
+//! `docs/theory/contact.md`.
 //!
-//! A shape stands in a frame of its own. Its origin is the *tip*, the point that touches first when the shape moves
-//! along −z; z points out of the tissue:
+//! A shape stands in a frame of its own. Its origin is the *tip*, the point that touches first when
+//! the shape moves along −z; z points out of the tissue:
 //!
 //! ```text
 //!      |    |  shaft           z
@@ -16,8 +17,9 @@
 //!  ------o-------- skin        o--> x
 //! ```
 //!
-//! All shapes are convex, so outside them the distance is smooth (once differentiable everywhere, twice except where
-//! the regions of a surface meet). Inside, it is smooth down to the medial axis, where the nearest surface point jumps.
+//! All shapes are convex, so outside them the distance is smooth (once differentiable everywhere,
+//! twice except where the regions of a surface meet). Inside, it is smooth down to the medial axis,
+//! where the nearest surface point jumps.
 
 mod capsule;
 mod cone;
@@ -42,7 +44,8 @@ use crate::Mat3;
 /// What a size may be, in metres: below, rounding would show; above, nothing is pressed.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-6..=10.0;
 
-/// Curvature radii smaller than this share of the shape count as this: a sharp edge would bend the distance infinitely.
+/// Curvature radii smaller than this share of the shape count as this: a sharp edge would bend the
+/// distance infinitely.
 const SHARPEST: f64 = 1e-3;
 
 /// The distance of a point from a shape, to second order.
@@ -50,15 +53,17 @@ const SHARPEST: f64 = 1e-3;
 pub struct Distance {
     /// Distance to the nearest point of the surface, negative inside. m
     pub distance: f64,
-    /// Its gradient: the unit vector from the nearest surface point, out of the shape. `p − distance · normal` is that
-    /// nearest point, inside as outside. Where several points are equally near (on the medial axis), it is that of the
-    /// pressing side, toward −z, if that is among them.
+    /// Its gradient: the unit vector from the nearest surface point, out of the shape.
+    /// `p − distance · normal` is that nearest point, inside as outside. Where several points are
+    /// equally near (on the medial axis), it is that of the pressing side, toward −z, if that is
+    /// among them.
     pub normal: Vec3,
     /// Its second derivative, symmetric, positive semidefinite, zero along `normal`. 1/m
     ///
-    /// A principal curvature is 1/(ρ + d) for a surface of curvature radius ρ at distance d. That is exact outside and
-    /// down to half of ρ inside. Deeper, where it would grow without limit toward the medial axis, it stays 2/ρ; and
-    /// ρ + d counts as no less than a thousandth of the shape, which only sharp edges notice.
+    /// A principal curvature is 1/(ρ + d) for a surface of curvature radius ρ at distance d. That
+    /// is exact outside and down to half of ρ inside. Deeper, where it would grow without limit
+    /// toward the medial axis, it stays 2/ρ; and ρ + d counts as no less than a thousandth of the
+    /// shape, which only sharp edges notice.
     pub curvature: Mat3,
 }
 
@@ -146,7 +151,8 @@ trait RigidShape {
     /// The point that lies farthest along the unit vector `u`; `None` up a shaft without end.
     fn support(&self, u: &Vec3) -> Option<Vec3>;
 
-    /// The larger principal radius of curvature at the tip, infinite where the tip is flat or straight.
+    /// The larger principal radius of curvature at the tip, infinite where the tip is flat or
+    /// straight.
     fn tip_radius(&self) -> f64;
 
     /// Radius of a ball round the tip that holds the shape; infinite for a shaft.
@@ -173,19 +179,21 @@ macro_rules! of_each {
 impl Shape {
     /// The distance of the point `p_local`, in the shape's frame.
     ///
-    /// Any finite point is answered, also deep inside: distance and normal are then those of the nearest surface.
+    /// Any finite point is answered, also deep inside: distance and normal are then those of the
+    /// nearest surface.
     pub fn distance(&self, p_local: &Vec3) -> Distance {
         of_each!(self, shape => shape.distance(p_local))
     }
 
-    /// The point of the shape that lies farthest along `direction` (of any length but 0), in the shape's frame; `None`
-    /// where the shape has no end, up the shaft of a punch.
+    /// The point of the shape that lies farthest along `direction` (of any length but 0), in the
+    /// shape's frame; `None` where the shape has no end, up the shaft of a punch.
     pub fn support(&self, direction: &Vec3) -> Option<Vec3> {
         let u = direction.normalize();
         of_each!(self, shape => shape.support(&u))
     }
 
-    /// The larger principal radius of curvature at the tip, infinite where the tip is flat or straight. m
+    /// The larger principal radius of curvature at the tip, infinite where the tip is flat or
+    /// straight. m
     pub fn tip_radius(&self) -> f64 {
         of_each!(self, shape => shape.tip_radius())
     }
@@ -195,7 +203,8 @@ impl Shape {
         of_each!(self, shape => shape.bounding_radius())
     }
 
-    /// Radius of the cylinder round z that holds the shape: how far its shadow on the skin reaches. m
+    /// Radius of the cylinder round z that holds the shape: how far its shadow on the skin reaches.
+    /// m
     pub fn footprint_radius(&self) -> f64 {
         of_each!(self, shape => shape.footprint_radius())
     }
@@ -239,8 +248,8 @@ fn checked_edge(shape: &'static str, value: f64, limit: f64) -> Result<f64, Shap
     }
 }
 
-/// ρ + d, the curvature radius at distance `d` from a surface of curvature radius `rho`, kept from 0 as
-/// [`Distance::curvature`] tells.
+/// ρ + d, the curvature radius at distance `d` from a surface of curvature radius `rho`, kept from
+/// 0 as [`Distance::curvature`] tells.
 fn offset_radius(rho: f64, d: f64, size: f64) -> f64 {
     (rho + d).max(0.5 * rho).max(SHARPEST * size)
 }

@@ -15,11 +15,12 @@ pub struct RoundedBox {
 }
 
 impl RoundedBox {
-    /// A box that reaches this far from its middle, rounding included, and whose edges and corners are rounded by
-    /// `edge_radius`; 0 is sharp. In metres.
+    /// A box that reaches this far from its middle, rounding included, and whose edges and corners
+    /// are rounded by `edge_radius`; 0 is sharp. In metres.
     ///
     /// # Errors
-    /// When an extent is not between 1 µm and 10 m, or the edge radius is negative or larger than the smallest.
+    /// When an extent is not between 1 µm and 10 m, or the edge radius is negative or larger than
+    /// the smallest.
     pub fn new(half_extents: Vec3, edge_radius: f64) -> Result<Self, ShapeError> {
         for (what, value) in ["half width", "half length", "half height"]
             .into_iter()
@@ -80,7 +81,8 @@ impl RigidShape for RoundedBox {
 
     fn distance(&self, p: &Vec3) -> Distance {
         let p = p - Vec3::z() * self.half_extents.z;
-        // By symmetry in the octant of positive coordinates; in the middle, the pressing side is the lower one.
+        // By symmetry in the octant of positive coordinates; in the middle, the pressing side is
+        // the lower one.
         let sign = Vec3::new(
             1.0_f64.copysign(p.x),
             1.0_f64.copysign(p.y),
@@ -94,7 +96,8 @@ impl RigidShape for RoundedBox {
         }
         let normal = (outward / from_core).component_mul(&sign);
         let distance = from_core - self.edge_radius;
-        // Round along the axes on which the point is beyond the core: none at a face, one at an edge, all at a corner.
+        // Round along the axes on which the point is beyond the core: none at a face, one at an
+        // edge, all at a corner.
         let is_round =
             Vec3::from_fn(|i, _| f64::from(u8::from(outward[i] > 0.0 || self.core()[i] == 0.0)));
         let round = Mat3::from_diagonal(&is_round);

@@ -39,7 +39,8 @@ impl Tool {
         self.friction
     }
 
-    /// The distance of the point `p_world` from the tool at `pose`; normal and curvature are in world axes, too.
+    /// The distance of the point `p_world` from the tool at `pose`; normal and curvature are in
+    /// world axes, too.
     pub fn distance_at(&self, pose: &Pose, p_world: &Vec3) -> Distance {
         let p_local = pose
             .rotation

@@ -1,11 +1,10 @@
-//! Which skin vertices touch which tool, and where the tool holds them.
+//! The skin vertices in contact with tools, and their anchors.
 //!
-//! Contact is a complementarity problem, solved as one: a vertex either has a gap and no traction,
-//! or no gap and a traction that presses, `0 ≤ g ⟂ λ ≥ 0`. With friction its tangential traction
-//! lies in Coulomb's cone, `|t| ≤ μ λ`, and opposes its slip where it reaches the border. Newton's
-//! method and the choice of the active vertices go together (a primal–dual active set): vertices
-//! with a gap below zero are held on the tool's surface, vertices that would be pulled are let go,
-//! and so on until nothing changes.
+//! Contact is a complementarity problem: a vertex has either a gap and no traction, or no gap and a
+//! pressing traction, `0 ≤ g ⟂ λ ≥ 0`. With friction its tangential traction lies in Coulomb's
+//! cone, `|t| ≤ μ λ`, and opposes the slip if it reaches the cone's border. Newton's method and the
+//! choice of the active vertices go together (a primal–dual active set): vertices with a negative
+//! gap are held on the tool's surface, vertices under tension are released, until nothing changes.
 
 use palpa_mesh::Vec3;
 
@@ -15,7 +14,7 @@ use crate::posed_tool::PosedTool;
 use crate::state::Touch;
 use crate::system::Hold;
 
-/// A slip below this (m) has no direction of its own.
+/// A slip below this (m) has no defined direction.
 const LEAST_SLIP: f64 = 1e-10;
 
 /// A vertex that touches a tool, at the current positions.
@@ -27,13 +26,13 @@ pub(super) struct ActiveVertex {
     /// Coefficient of friction of its tool.
     pub(super) friction: f64,
     pub(super) touch: Touch,
-    /// m, negative inside the tool.
+    /// Gap, m; negative inside the tool.
     pub(super) gap: f64,
     /// Unit normal of the tool's surface, from the tool to the tissue.
     normal: Vec3,
     /// Curvature of the tool's surface, 1/m.
     curvature: Mat3,
-    /// From the vertex to its anchor, m.
+    /// Vector from the vertex to its anchor, m.
     to_anchor: Vec3,
     /// See [`ActiveSet::smoothing`].
     smoothing: f64,
@@ -43,33 +42,33 @@ pub(super) struct ActiveVertex {
 #[derive(Debug, Default)]
 pub(super) struct ActiveSet {
     pub(super) active: Vec<ActiveVertex>,
-    /// A slip (m) over which friction turns round gradually, all vertices sliding: a detour to a
-    /// good first guess where the exact law does not converge from afar. 0 is the exact law.
+    /// Slip (m) over which the direction of friction changes gradually, with all vertices sliding.
+    /// It gives a good first guess where the exact law does not converge. 0 is the exact law.
     pub(super) smoothing: f64,
 }
 
-/// How far a state is from obeying the laws of contact.
+/// Violation of the laws of contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct ContactResiduals {
     /// Deepest penetration or largest gap of an active vertex, m.
     pub gap: f64,
     /// Deepest penetration of a vertex that should be open, m.
     pub penetration: f64,
-    /// Largest pull at an active vertex, N.
+    /// Largest tensile force at an active vertex, N.
     pub tension: f64,
-    /// Largest tangential force beyond the friction cone, N.
+    /// Largest tangential force in excess of the friction cone, N.
     pub cone: f64,
-    /// Largest part of a friction force at the cone's border that does not oppose the slip, as a
-    /// share of it.
+    /// Largest part of a friction force at the cone's border that does not oppose the slip,
+    /// relative to the force.
     pub slip: f64,
 }
 
 impl ActiveSet {
-    /// Finds gaps, normals and anchors of the vertices that touch now, and takes up those that have
-    /// come to touch.
+    /// Finds gaps, normals and anchors of the vertices in contact, and adds vertices that have come
+    /// into contact.
     ///
-    /// `touches` is the state; vertices that are `held` in all directions cannot touch. Returns how
-    /// many are new.
+    /// `touches` is the state. Vertices that are `held` in all directions cannot be in contact.
+    /// Returns the number of new vertices.
     pub(super) fn update(
         &mut self,
         model: &Model,
@@ -139,7 +138,7 @@ impl ActiveSet {
 }
 
 impl ActiveVertex {
-    /// A touching vertex at the place `x`.
+    /// A vertex in contact at the position `x`.
     fn new(node: usize, vertex: usize, touch: Touch, tool: &PosedTool, x: &Vec3) -> Self {
         let PosedTool { tool, pose } = tool;
         let distance = tool.distance_at(pose, x);
@@ -162,7 +161,7 @@ impl ActiveVertex {
         }
     }
 
-    /// The same vertex at another place.
+    /// The same vertex at the position `x`.
     pub(super) fn moved(&self, tools: &[PosedTool], x: &Vec3) -> Self {
         match self.touch.tool() {
             Some(tool) => Self::new(self.node, self.vertex, self.touch, &tools[tool], x),
@@ -170,11 +169,12 @@ impl ActiveVertex {
         }
     }
 
-    /// What the tool demands: directions held, and the move along them. `body_force` is what
-    /// friction has held against.
+    /// The tool's constraint: held directions, and the displacement along them. `body_force` is the
+    /// force that friction has balanced.
     ///
-    /// A vertex that is just released can only go against the friction that held it: that of a slip
-    /// as short turns at once to wherever the vertex goes, which is infinitely stiff across.
+    /// A vertex that has just been released can move only against the friction that held it. For a
+    /// slip that short, friction would turn at once with any movement, which is infinitely stiff
+    /// across.
     pub(super) fn demand(&self, hold: Hold, body_force: &Vec3) -> (Hold, Vec3) {
         match self.touch {
             Touch::Stick { .. } => return (Hold::all(), self.to_anchor),
@@ -189,21 +189,21 @@ impl ActiveVertex {
         (hold.and(&self.normal), -self.normal * self.gap)
     }
 
-    /// Pressing part of the tool's force on the vertex, which balances the body's force on it, N.
+    /// Normal part of the tool's force on the vertex, which balances the body's force on it, N.
     pub(super) fn pressure(&self, body_force: &Vec3) -> f64 {
         body_force.dot(&self.normal)
     }
 
-    /// Whether friction has held the vertex until now. It then leaves in the direction in which it
-    /// was held back: what would soften it, a bent surface and friction that falls as it slides, is
-    /// left out until it does.
+    /// Whether friction has held the vertex until now. The vertex then leaves in the direction in
+    /// which it was held back. Terms that would soften it (the tool's curvature, and friction that
+    /// falls with slip) are left out until it slides.
     fn is_just_released(&self) -> bool {
         self.friction > 0.0
             && self.smoothing == 0.0
             && self.tangential(&self.to_anchor).norm() <= LEAST_SLIP
     }
 
-    /// Largest curvature of the tool's surface here, 1/m.
+    /// Largest curvature of the tool's surface at the vertex, 1/m.
     pub(super) fn sharpness(&self) -> f64 {
         self.curvature.norm()
     }
@@ -213,18 +213,18 @@ impl ActiveVertex {
     }
 
     /// Friction on a sliding vertex, N, and its stiffness (`−∂t/∂u`, positive semidefinite).
-    /// `body_force` is that of the last iteration, whose pressure and, before there is any slip,
-    /// direction are taken.
+    /// `body_force` is that of the last iteration. It gives the pressure and, before there is any
+    /// slip, the direction.
     pub(super) fn friction(&self, body_force: &Vec3) -> (Vec3, Mat3) {
         let limit = self.friction * self.pressure(body_force).max(0.0);
         if limit == 0.0 {
             return (Vec3::zeros(), Mat3::zeros());
         }
-        // From the vertex back to its anchor: against the slip.
+        // From the vertex back to its anchor, opposite to the slip.
         let back = self.tangential(&self.to_anchor);
         let slip = back.norm().hypot(self.smoothing);
         if slip <= LEAST_SLIP {
-            // It is about to slide: friction points where it has held until now.
+            // The vertex is about to slide: friction keeps the direction in which it has held.
             let tangential = self.tangential(body_force);
             let size = tangential.norm();
             let force = if size > 0.0 {
@@ -234,7 +234,7 @@ impl ActiveVertex {
             };
             return (force, Mat3::zeros());
         }
-        // Shorter than 1 while friction is smoothed.
+        // Length below 1 while friction is smoothed.
         let direction = back / slip;
         let across = Mat3::identity()
             - self.normal * self.normal.transpose()
@@ -242,7 +242,7 @@ impl ActiveVertex {
         (direction * limit, across * (limit / slip))
     }
 
-    /// Stiffness that the bending of the tool's surface adds at an active vertex: `−λ ∂n/∂x`.
+    /// Stiffness due to the curvature of the tool's surface at an active vertex: `−λ ∂n/∂x`.
     pub(super) fn geometric(&self, body_force: &Vec3) -> Mat3 {
         match self.touch {
             Touch::Stick { .. } => Mat3::zeros(),
@@ -251,9 +251,9 @@ impl ActiveVertex {
         }
     }
 
-    /// The other touch that the laws of contact ask for, if they do, and by which force, N, the
-    /// present one breaks them. `body_force` is that on the vertex; `least` is a force that counts
-    /// as none.
+    /// The touch required by the laws of contact if it differs from the present one, and the force
+    /// by which the present one violates them, N. `body_force` is the body's force on the vertex;
+    /// forces below `least` count as zero.
     pub(super) fn revised(&self, body_force: &Vec3, least: f64) -> Option<(Touch, f64)> {
         let pressure = self.pressure(body_force);
         if pressure < -least {
@@ -262,12 +262,12 @@ impl ActiveVertex {
         let tangential = self.tangential(body_force);
         match self.touch {
             Touch::Stick { tool, anchor } => {
-                // The cone's border belongs to sticking; a little beyond is rounding.
+                // At the border of the cone the vertex still sticks; a small excess is rounding.
                 let excess = tangential.norm() - self.friction * pressure.max(0.0) * (1.0 + 1e-9);
                 (excess > least).then_some((Touch::Slip { tool, anchor }, excess))
             }
             Touch::Slip { tool, anchor } if self.friction > 0.0 && self.smoothing == 0.0 => {
-                // Friction that would push it on has turned it round: it sticks.
+                // Equilibrium would need friction in the direction of the slip: the vertex sticks.
                 let back = self.tangential(&self.to_anchor);
                 let is_turned = back.norm() > LEAST_SLIP && back.dot(&tangential) < 0.0;
                 is_turned.then_some((Touch::Stick { tool, anchor }, tangential.norm()))
@@ -276,7 +276,7 @@ impl ActiveVertex {
         }
     }
 
-    /// What a vertex that slides with smoothed friction most likely does by the exact law.
+    /// The most likely touch by the exact law of a vertex that slides with smoothed friction.
     pub(super) fn sharpened(&self) -> Touch {
         match self.touch {
             Touch::Slip { tool, anchor }
@@ -307,7 +307,7 @@ impl ActiveVertex {
     }
 }
 
-/// Ends a step: vertices that slide are anchored where they are now.
+/// Ends a step: sets the anchors of sliding vertices to their present positions.
 pub(super) fn anchor_slides(
     model: &Model,
     displacements: &[Vec3],

@@ -1,4 +1,4 @@
-//! Which vertices touch, and what supports, loads and tools put on the linear system.
+//! Chooses the vertices in contact, and puts supports, loads and tools on the linear system.
 
 use palpa_mesh::Vec3;
 
@@ -6,25 +6,25 @@ use super::newton::{Imbalance, Newton};
 use super::workspace::Workspace;
 use crate::state::{State, Touch};
 
-/// From this iteration on the active set changes only when forces have settled, so that it cannot
-/// chatter.
+/// From this iteration on, the active set changes only when forces have settled, so that it cannot
+/// oscillate.
 const SETTLE_AFTER: usize = 12;
-/// A share of the largest contact force that counts as none.
+/// Share of the largest contact force below which a force counts as zero.
 const NO_FORCE: f64 = 1e-9;
 
-/// The forces by which touches are judged.
+/// The forces that decide on contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ForcesBy {
-    /// Forces at the present displacements: right in equilibrium. After a large step they may be
-    /// many times too large, and pull.
+    /// Forces at the present displacements: correct in equilibrium. After a large step they may be
+    /// many times too large, or tensile.
     Present,
-    /// Forces to which the linear system leads, as if they were unknowns of their own.
+    /// Forces predicted by the linear system, as if they were unknowns of their own.
     Predicted,
 }
 
 impl Newton<'_> {
-    /// A force below which the body counts as free of forces, N. The tolerance is a share of it,
-    /// which is still above rounding.
+    /// Force below which the body counts as free of forces, N. The tolerance is relative to at
+    /// least this force, which keeps it above rounding.
     fn floor(&self) -> f64 {
         let stiffest = self
             .model
@@ -36,9 +36,9 @@ impl Newton<'_> {
         1e-6 * stiffest * area / self.model.skin_areas.len() as f64
     }
 
-    /// Lets go vertices that would be pulled, and turns sticking to sliding and back. Late in a
-    /// solve only one vertex changes, the one that breaks the laws of contact by the largest force,
-    /// so that touches cannot chatter. Returns how many have changed.
+    /// Releases vertices under tension, and switches between sticking and sliding. Late in a solve
+    /// only one vertex changes, the one that violates the laws of contact by the largest force, so
+    /// that contact cannot oscillate. Returns the number of changes.
     pub(super) fn revise(&self, state: &mut State, ws: &mut Workspace, by: ForcesBy) -> usize {
         let forces = match by {
             ForcesBy::Present => &ws.forces,
@@ -75,15 +75,15 @@ impl Newton<'_> {
         changes.len()
     }
 
-    /// Collects the directions that are held and the displacements that are demanded along them;
-    /// puts friction and the tools' curvature into the system.
+    /// Collects the held directions and the prescribed displacements along them; adds friction and
+    /// the tools' curvature to the system.
     pub(super) fn put_constraints(
         &mut self,
         state: &State,
         ws: &mut Workspace,
         by: ForcesBy,
     ) -> Imbalance {
-        // The stiffness that contact has added since the last assembly comes off first.
+        // First remove the stiffness that contact has added since the last assembly.
         for (block, stiffness) in ws.added.drain(..) {
             ws.system.blocks[block] -= stiffness;
         }
@@ -104,7 +104,7 @@ impl Newton<'_> {
         }
     }
 
-    /// Displacements that holds and guides demand. Returns the largest, m.
+    /// Displacements prescribed by holds and guides. Returns the largest, m.
     fn demand_of_loads(&self, state: &State, ws: &mut Workspace) -> f64 {
         let mut largest = 0.0_f64;
         for &(node, target) in self.load.held {
@@ -120,8 +120,8 @@ impl Newton<'_> {
         largest
     }
 
-    /// Holds, displacements, friction and stiffness of the vertices that touch. Returns the largest
-    /// displacement demanded, m, or `largest`.
+    /// Holds, displacements, friction and stiffness of the vertices in contact. Returns the largest
+    /// prescribed displacement, m, or `largest`.
     fn constrain_contacts(&self, ws: &mut Workspace, mut largest: f64) -> f64 {
         for contact in &ws.contacts.active {
             let node = contact.node;

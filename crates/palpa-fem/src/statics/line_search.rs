@@ -1,18 +1,19 @@
-//! The line search: how far to go along a Newton step.
+//! The line search: the share of a Newton step that is taken.
 
 use super::newton::{Imbalance, Newton};
 use super::workspace::Workspace;
 use crate::assembly::{Inverted, assemble};
 use crate::state::State;
 
-/// How often a Newton step may be halved before it counts as failed.
+/// Number of halvings after which a Newton step has failed.
 const MOST_HALVINGS: usize = 8;
-/// A sliding vertex may leave the tool's surface in an iteration by this share of the surface's
-/// radius of curvature.
+/// Distance by which a sliding vertex may leave the tool's surface in an iteration, as a share of
+/// the surface's radius of curvature.
 const NEAR_SURFACE: f64 = 0.05;
 
 impl Newton<'_> {
-    /// Goes along `δ` as far as no prism inverts and forces do not grow. Returns the share of `δ`.
+    /// Moves along `δ` as far as no prism inverts and the forces do not grow. Returns the share of
+    /// `δ`.
     pub(super) fn search(
         &self,
         state: &mut State,
@@ -21,7 +22,7 @@ impl Newton<'_> {
     ) -> Result<f64, Inverted> {
         let mut share = 1.0;
         let mut last = None;
-        // While the tool still has to be met, forces must grow.
+        // While the skin still has to be moved to the tool, forces must grow.
         let must_fall = imbalance.demand <= self.params.gap_tolerance.max(1e-6)
             && ws.contacts.active.iter().all(|c| c.friction == 0.0);
         for _ in 0..=MOST_HALVINGS {
@@ -53,13 +54,14 @@ impl Newton<'_> {
         if let Some(inverted) = last {
             return Err(inverted);
         }
-        // Rounding, or a bad model of the forces: the shortest move, and the iterations decide.
+        // Due to rounding or a poor linear model: take the shortest move, and let the next
+        // iterations decide.
         std::mem::swap(&mut state.displacements, &mut ws.trial);
         Ok(2.0 * share)
     }
 
-    /// Whether sliding vertices stay near the tool's surface, whose bend the linear step does not
-    /// see.
+    /// Whether sliding vertices stay near the tool's surface. The linear step ignores its
+    /// curvature.
     fn keeps_touch(&self, ws: &Workspace, share: f64) -> bool {
         ws.contacts.active.iter().all(|contact| {
             let x = self.model.body.positions[contact.node] + ws.trial[contact.node];

@@ -1,4 +1,4 @@
-//! The step of a Newton iteration: the solution of the linear system, with friction and with kept
+//! The step of a Newton iteration: solution of the linear system, with friction and with kept
 //! factors.
 
 use palpa_mesh::Vec3;
@@ -10,21 +10,22 @@ use crate::system::Hold;
 
 /// Residual of a linear system with friction, relative to its right side.
 const GMRES_TOLERANCE: f64 = 1e-6;
-/// Longest basis for it.
+/// Largest basis for such a system.
 const GMRES_VECTORS: usize = 40;
-/// The same with the factor of an earlier iteration: a smaller residual would save no iteration,
-/// and beyond that many vectors a new factor is cheaper.
+/// Tolerance and largest basis with the factor of an earlier iteration. A smaller residual would
+/// save no iteration, and with a larger basis a new factor is cheaper.
 const STALE_TOLERANCE: f64 = 1e-3;
 const STALE_VECTORS: usize = 16;
 
 impl Newton<'_> {
-    /// Finds the step `δ`: the demand in held directions, and the balance of the linearised forces
-    /// in free ones. Returns whether they are in balance, which an old factor may not achieve.
+    /// Finds the step `δ`: the prescribed displacements in held directions, and the balance of the
+    /// linearised forces in free ones. Returns whether the forces are in balance, which an old
+    /// factor may not achieve.
     ///
-    /// Friction at a sliding vertex grows with its pressure, which makes the stiffness unsymmetric,
-    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good guess for
-    /// GMRES, as is that of a stiffness which has changed little, under constraints of which few
-    /// have changed.
+    /// Friction on a sliding vertex grows with its pressure, which makes the stiffness unsymmetric:
+    /// `(I − μ d ⊗ n) K` in the rows of that vertex. The symmetric factor is then a good
+    /// preconditioner for GMRES. So is the factor of an earlier stiffness that has changed little,
+    /// under constraints of which few have changed.
     pub(super) fn solve(&self, ws: &mut Workspace, is_stale: bool) -> bool {
         let structure = &self.model.structure;
         let Workspace {
@@ -73,7 +74,7 @@ impl Newton<'_> {
             *delta += demand;
         }
         structure.multiply(&system.blocks, delta, predicted);
-        // The stiffness that contact has added is not the body's.
+        // The stiffness that contact has added does not belong to the body.
         for (contact, (_, stiffness)) in contacts.active.iter().zip(added.iter()) {
             predicted[contact.node] -= stiffness * delta[contact.node];
         }
@@ -81,7 +82,7 @@ impl Newton<'_> {
     }
 }
 
-/// Gives sliding vertices the friction of the pressure in `forces`: `f −= μ d (n · f)`.
+/// Adds to sliding vertices the friction due to the pressure in `forces`: `f −= μ d (n · f)`.
 fn couple(sliding: &[(usize, Vec3, Vec3)], forces: &mut [Vec3]) {
     for (node, friction, normal) in sliding {
         let pressure = normal.dot(&forces[*node]);
@@ -89,7 +90,7 @@ fn couple(sliding: &[(usize, Vec3, Vec3)], forces: &mut [Vec3]) {
     }
 }
 
-/// Takes from every vector its part in held directions.
+/// Removes from every vector its part in held directions.
 fn keep_free(holds: &[Hold], vectors: &mut [Vec3]) {
     for (vector, hold) in vectors.iter_mut().zip(holds) {
         *vector = hold.free_part(vector);

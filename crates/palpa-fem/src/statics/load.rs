@@ -8,33 +8,33 @@ use crate::posed_tool::PosedTool;
 /// Tools, displacements and forces that act on a body at the end of a step.
 #[derive(Debug, Clone, Default)]
 pub struct Load<'a> {
-    /// Tools, at their places at the end.
+    /// Tools with their poses at the end.
     pub tools: &'a [PosedTool],
-    /// Nodes that are held in all directions, and their displacement at the end, m.
+    /// Nodes held in all directions, with their displacements at the end, m.
     pub held: &'a [(usize, Vec3)],
-    /// Nodes that are guided: node, unit direction, and displacement along it at the end, m. Across
-    /// it they are free.
+    /// Guided nodes: node, unit direction, and displacement along it at the end, m. They are free
+    /// across it.
     pub guided: &'a [(usize, Vec3, f64)],
-    /// Dead forces on all nodes, N; none if empty. `[n_nodes]` or `[0]`
+    /// Dead forces on all nodes, N; empty for none. `[n_nodes]` or `[0]`
     pub forces: &'a [Vec3],
-    /// Duration of the step, s; 0 is a sudden step, ∞ relaxes fully.
+    /// Duration of the step, s; 0 is instantaneous, ∞ relaxes fully.
     pub duration: f64,
-    /// Inertia and damping; quasi-static without.
+    /// Inertia and damping; `None` for quasi-static.
     pub dynamics: Option<Dynamics>,
 }
 
-/// Tolerances of a solve, and when it gives up.
+/// Tolerances and limits of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolveParams {
-    /// Norm of the forces that are out of balance, as a share of those that hold the body.
+    /// Tolerance of the norm of the unbalanced forces, relative to the forces that hold the body.
     pub tolerance: f64,
     /// Largest gap of an active vertex, m.
     pub gap_tolerance: f64,
-    /// Newton iterations of one load step.
+    /// Largest number of Newton iterations in one load step.
     pub max_iterations: usize,
-    /// Number of free nodes from which on a factor is kept over iterations and steps, as the
-    /// preconditioner of the next systems, until that no longer pays. The cost of a factor grows
-    /// faster with the body than that of its use.
+    /// Number of free nodes from which a factor is kept over iterations and steps, as the
+    /// preconditioner of the next systems, as long as that pays. The cost of a factor grows faster
+    /// with the body than the cost of using it.
     pub keep_factor_from: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Load steps that adapt: a step that does not converge is divided.
+//! Adaptive load steps: a step that does not converge is divided.
 
 use palpa_mesh::Vec3;
 
@@ -11,11 +11,11 @@ use crate::posed_tool::PosedTool;
 use crate::shape::Pose;
 use crate::state::State;
 
-/// Share of a load step below which halving it further is given up.
+/// Least share of a load step; below it, halving is given up.
 const LEAST_SUBSTEP: f64 = 1.0 / 128.0;
-/// A step that keeps failing is given up after this many times the iterations of one solve.
+/// A failing step is given up after this multiple of the iterations of one solve.
 const MOST_SOLVES: usize = 10;
-/// Newton iterations up to which the next substep may be longer.
+/// Number of Newton iterations up to which the next substep may be longer.
 const EASY: usize = 8;
 
 /// Sums and maxima over the substeps of a step.
@@ -35,7 +35,7 @@ impl Spent {
         self.smoothing = self.smoothing.max(report.friction_smoothing);
     }
 
-    /// The report of the last substep as that of the whole step.
+    /// The report of the last substep, extended to the whole step.
     fn report(&self, last: StepReport) -> StepReport {
         StepReport {
             iterations: self.iterations,
@@ -47,10 +47,10 @@ impl Spent {
     }
 }
 
-/// Takes the body to equilibrium under `load`, in as many substeps as that needs. `before` says
-/// where the tools were at the beginning of the step.
+/// Brings the body to equilibrium under `load`, in as many substeps as needed. `before` has the
+/// tools at the start of the step.
 ///
-/// A step that fails leaves the state as it was; its report says where it failed.
+/// A failed step leaves the state unchanged; the report says where it failed.
 pub fn advance(
     model: &Model,
     state: &mut State,
@@ -84,8 +84,8 @@ pub fn advance(
                 size *= 2.0;
             }
         } else {
-            // Equilibrium from here on is not found: go back to the last good state, and try half
-            // as far.
+            // No equilibrium is found from here: go back to the last good state, and try half the
+            // distance.
             if let Some(saved) = saved {
                 *state = saved;
             } else {
@@ -100,7 +100,7 @@ pub fn advance(
     }
 }
 
-/// Solves the part of a step between two shares of it.
+/// Solves one part of a step, given by its start and end as shares of the step.
 fn substep(
     model: &Model,
     state: &mut State,
@@ -121,7 +121,7 @@ fn substep(
     equilibrate(model, state, ws, &part, params)
 }
 
-/// Poses between two lists of tools.
+/// Poses interpolated between two lists of tools.
 fn between(before: &[PosedTool], after: &[PosedTool], share: f64) -> Vec<PosedTool> {
     after
         .iter()

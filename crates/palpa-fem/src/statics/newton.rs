@@ -1,4 +1,4 @@
-//! Newton's method with a line search, for tools, holds and forces that stay where they are.
+//! Newton's method with a line search, for tools, holds and forces that do not move.
 
 use std::ops::ControlFlow;
 
@@ -15,14 +15,14 @@ use crate::model::Model;
 use crate::state::State;
 use crate::system::Hold;
 
-/// Residual below which tools press and rub by present forces instead of predicted ones.
+/// Residual below which contact uses present forces instead of predicted ones.
 const NEAR_EQUILIBRIUM: f64 = 1e-3;
-/// Iterations without any progress after which a solve is given up; and the residual, as a share of
-/// the best so far, that counts as progress.
+/// Number of iterations without progress after which a solve is given up, and the ratio to the best
+/// residual so far that counts as progress.
 const PATIENCE: usize = 12;
 const PROGRESS: f64 = 0.7;
-/// Residual that is near enough where it falls no further: a body about to buckle has no stiffness
-/// that could be factored without a shift, and is approached ever more slowly.
+/// Residual that is accepted if it falls no further: a body about to buckle can be factored only
+/// with a shift, and then converges ever more slowly.
 const STALLED: f64 = 1e-6;
 
 /// One solve, without dividing the step. The state is not restored if the solve fails.
@@ -58,7 +58,7 @@ pub fn equilibrate(
     newton.report(state, ws, outcome)
 }
 
-/// One solve under way.
+/// The state of one solve.
 pub(super) struct Newton<'a> {
     pub(super) model: &'a Model,
     pub(super) load: &'a Load<'a>,
@@ -66,31 +66,31 @@ pub(super) struct Newton<'a> {
     pub(super) params: &'a SolveParams,
     /// Newton iterations so far.
     pub(super) iterations: usize,
-    /// Largest shift of the stiffness so far, as a share of its diagonal.
+    /// Largest shift of the stiffness so far, relative to its diagonal.
     pub(super) shift: f64,
-    /// Forces out of balance, as a share of those that hold the body.
+    /// Residual: unbalanced forces relative to the forces that hold the body.
     pub(super) residual: f64,
     /// Strain energy, J.
     pub(super) energy: f64,
 }
 
-/// How far a state is from satisfying the solve.
+/// The distance of a state from equilibrium.
 #[derive(Clone, Copy)]
 pub(super) struct Imbalance {
     /// Norm of the forces in free directions, N.
     pub(super) free: f64,
-    /// Largest displacement that holds, guides and tools demand, m.
+    /// Largest displacement still prescribed by holds, guides and tools, m.
     pub(super) demand: f64,
 }
 
-/// The smallest residual so far, and the iteration that had it.
+/// The smallest residual so far, and its iteration.
 struct Best {
     residual: f64,
     iteration: usize,
 }
 
 impl<'a> Newton<'a> {
-    /// Prepares a solve: memory, contacts, inertia, and what holds the nodes.
+    /// Prepares a solve: memory, contacts, inertia, and supports.
     fn begin(
         model: &'a Model,
         state: &State,
@@ -125,7 +125,7 @@ impl<'a> Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Iterates until the state satisfies all laws, or the solve is given up.
+    /// Iterates until all laws are satisfied, or the solve is given up.
     pub(super) fn run(&mut self, state: &mut State, ws: &mut Workspace) -> Outcome {
         let mut best = Best {
             residual: f64::INFINITY,
@@ -138,7 +138,7 @@ impl Newton<'_> {
         }
     }
 
-    /// One iteration; breaks where the solve ends.
+    /// One iteration; breaks when the solve ends.
     fn iterate(
         &mut self,
         state: &mut State,
@@ -148,7 +148,7 @@ impl Newton<'_> {
         let n_new = self.linearise(state, ws)?;
         let mut imbalance = self.constrain(state, ws, n_new);
         if n_new == 0 && self.is_settled(imbalance, self.params.tolerance) {
-            // Forces are right for these touches; are the touches right for these forces?
+            // The forces are correct for these touches. Now check the touches against the forces.
             if self.iterations == 0 || self.revise(state, ws, ForcesBy::Present) == 0 {
                 return ControlFlow::Break(Outcome::Converged);
             }
@@ -173,8 +173,8 @@ impl Newton<'_> {
         self.take_step(state, ws, imbalance)
     }
 
-    /// Finds the vertices that touch, and the forces and stiffness of the body. Returns how many
-    /// vertices are new.
+    /// Finds the vertices in contact, and the forces and stiffness of the body. Returns the number
+    /// of new vertices.
     fn linearise(&mut self, state: &mut State, ws: &mut Workspace) -> ControlFlow<Outcome, usize> {
         let n_new = ws.contacts.update(
             self.model,
@@ -199,8 +199,8 @@ impl Newton<'_> {
         ControlFlow::Continue(n_new)
     }
 
-    /// Revises touches and puts constraints on the system: by predicted forces far from
-    /// equilibrium, by present ones near it.
+    /// Revises touches and puts constraints on the system, using predicted forces far from
+    /// equilibrium and present forces near it.
     fn constrain(&mut self, state: &mut State, ws: &mut Workspace, n_new: usize) -> Imbalance {
         if self.iterations > 0 && n_new == 0 {
             self.revise(state, ws, ForcesBy::Predicted);
@@ -223,7 +223,7 @@ impl Newton<'_> {
         self.residual <= tolerance && imbalance.demand <= self.params.gap_tolerance
     }
 
-    /// The outcome of a solve that makes no progress.
+    /// The outcome of a solve without progress.
     fn give_up(
         &self,
         state: &mut State,
@@ -240,12 +240,12 @@ impl Newton<'_> {
         }
     }
 
-    /// Solves the linear system, with a factor of its own or, in a large body, with that of an
-    /// earlier iteration while that serves.
+    /// Solves the linear system with a new factor or, in a large body, with that of an earlier
+    /// iteration while it works well enough.
     fn find_step(&mut self, ws: &mut Workspace) -> ControlFlow<Outcome> {
         let model = self.model;
         let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
-        // The first step of a load is the largest, and stiffness after it near that at the end.
+        // The first step of a load is the largest. After it, the stiffness is near that at the end.
         let is_kept = is_large && ws.system.is_factored && self.iterations != 2;
         if !(is_kept && self.solve(ws, true)) {
             match ws.system.refactor(&model.structure, &ws.holds) {
@@ -257,8 +257,8 @@ impl Newton<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Goes along the step as far as the line search allows, and keeps the forces that the linear
-    /// system predicts there.
+    /// Takes the step as far as the line search allows, and keeps the forces that the linear system
+    /// predicts there.
     fn take_step(
         &self,
         state: &mut State,
@@ -276,7 +276,7 @@ impl Newton<'_> {
         }
     }
 
-    /// Takes loads off the forces, and adds forces and stiffness of inertia.
+    /// Subtracts loads from the forces, and adds forces and stiffness of inertia.
     fn add_loads(&self, state: &State, ws: &mut Workspace) {
         for (force, load) in ws.forces.iter_mut().zip(self.load.forces) {
             *force -= load;
@@ -291,7 +291,7 @@ impl Newton<'_> {
         }
     }
 
-    /// The node whose free forces are largest, at rest, m.
+    /// Position at rest of the node with the largest unbalanced force, m.
     fn worst_node(&self, ws: &Workspace) -> Vec3 {
         let worst = (0..ws.holds.len()).max_by(|&a, &b| {
             let size = |n: usize| ws.holds[n].free_part(&ws.right_side[n]).norm();

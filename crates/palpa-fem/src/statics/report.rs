@@ -8,20 +8,20 @@ use super::workspace::Workspace;
 use crate::posed_tool::PosedTool;
 use crate::state::{State, Touch};
 
-/// How a step ended.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Outcome {
-    /// All laws hold to the tolerances.
+    /// All laws hold within the tolerances.
     Converged,
-    /// The iterations were used up.
+    /// The iteration limit was reached.
     IterationLimit {
-        /// Where the forces are most out of balance, at rest, m.
+        /// Place of the largest unbalanced force, at rest, m.
         at: [f64; 3],
     },
     /// Tissue would be turned inside out.
     Inverted {
-        /// Where, at rest, m.
+        /// The place, at rest, m.
         at: [f64; 3],
     },
     /// The stiffness could not be made positive definite.
@@ -31,32 +31,32 @@ pub enum Outcome {
 /// Figures of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepReport {
-    /// How it ended; unless it converged, the state is as it was before.
+    /// The outcome. Unless the step converged, the state is unchanged.
     pub outcome: Outcome,
     /// Newton iterations, of all substeps.
     pub iterations: usize,
-    /// Substeps into which the step was divided, 1 if it went in one.
+    /// Number of substeps, 1 if the step was not divided.
     pub substeps: usize,
-    /// Forces out of balance, as a share of those that hold the body.
+    /// Residual: unbalanced forces relative to the forces that hold the body.
     pub residual: f64,
-    /// How far the state is from obeying the laws of contact.
+    /// Violation of the laws of contact.
     pub contact: ContactResiduals,
-    /// Slip over which friction had to be smoothed, m; vertices that would be held creep by about
-    /// as much. 0 for the exact law, which nearly every step obeys.
+    /// Slip over which friction had to be smoothed, m: vertices that would stick creep by about
+    /// this much. 0 for the exact law, which nearly every step satisfies.
     pub friction_smoothing: f64,
-    /// Strain energy, J; of a viscous material, the energy of the step's potential.
+    /// Strain energy, J; for a viscous material, the energy of the step's potential.
     pub energy: f64,
-    /// For each tool the force of the tissue on it, N.
+    /// Force of the tissue on each tool, N.
     pub tool_forces: Vec<Vec3>,
-    /// For each tool the area of skin that touches it, m² at rest.
+    /// Area of skin in contact with each tool, m² at rest.
     pub tool_areas: Vec<f64>,
-    /// For each tool the largest pressure on a vertex, Pa (force by its area at rest).
+    /// Largest pressure on a vertex under each tool, Pa (force divided by its area at rest).
     pub tool_pressures: Vec<f64>,
     /// Force of the tissue on the holds and guides of nodes, N.
     pub held_force: Vec3,
     /// Force of the tissue on its supports (bone, cut faces), N.
     pub support_force: Vec3,
-    /// Largest shift that the stiffness needed to be positive definite, as a share of its diagonal.
+    /// Largest shift that made the stiffness positive definite, relative to its diagonal.
     pub shift: f64,
 }
 
@@ -84,7 +84,7 @@ impl Newton<'_> {
         report
     }
 
-    /// Forces on the tools, and how well the laws of contact hold.
+    /// Forces on the tools, and the violation of the laws of contact.
     fn report_contacts(&self, state: &State, ws: &Workspace, report: &mut StepReport) {
         let model = self.model;
         for contact in &ws.contacts.active {

@@ -1,18 +1,18 @@
-//! Smoothed friction: a detour where the exact law does not converge at once.
+//! Smoothed friction, for steps where the exact law does not converge at once.
 
 use super::newton::Newton;
 use super::report::Outcome;
 use super::workspace::Workspace;
 use crate::state::{State, Touch};
 
-/// Slips over which friction is smoothed, one after the other, m.
+/// Slips over which friction is smoothed, in this order, m.
 const SMOOTHING: [f64; 4] = [1e-3, 2e-4, 4e-5, 1e-5];
-/// Smoothing that is small enough to be an answer where the exact law has none within reach, m.
+/// Largest smoothing that is accepted as a result if the exact law does not converge, m.
 const FINE_SMOOTHING: f64 = 5e-5;
 
 impl Newton<'_> {
-    /// Solves with smoothed friction, then with the exact law from there. If that has no answer
-    /// within reach, a fine smoothing is the answer.
+    /// Solves with smoothed friction, then with the exact law from there. If the exact law does not
+    /// converge, a fine smoothing gives the result.
     pub(super) fn run_smoothed(&mut self, state: &mut State, ws: &mut Workspace) -> Outcome {
         for touch in &mut state.touches {
             if let Touch::Stick { tool, anchor } = *touch {

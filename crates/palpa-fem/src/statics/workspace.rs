@@ -1,4 +1,4 @@
-//! Arrays that the static solver works in.
+//! Arrays of the static solver.
 
 use palpa_mesh::Vec3;
 
@@ -8,25 +8,25 @@ use crate::model::Model;
 use crate::state::Memory;
 use crate::system::{Hold, LinearSystem};
 
-/// Scratch of the solver. Between calls it keeps nothing that a result depends on by more than the
+/// Scratch memory of the solver. Its content between calls changes no result by more than the
 /// tolerance.
 #[derive(Debug)]
 pub struct Workspace {
     pub(super) system: LinearSystem,
     pub(crate) memory: Memory,
-    /// Forces out of balance at the present displacements, without those of contact, N. `[n_nodes]`
+    /// Unbalanced forces at the present displacements, without those of contact, N. `[n_nodes]`
     pub(super) forces: Vec<Vec3>,
-    /// The same at the displacements of a trial, N. `[n_nodes]`
+    /// Unbalanced forces at the displacements of a trial, N. `[n_nodes]`
     pub(super) trial_forces: Vec<Vec3>,
     /// Forces with friction, N. `[n_nodes]`
     pub(super) right_side: Vec<Vec3>,
-    /// Displacements that holds, guides and tools demand, m. `[n_nodes]`
+    /// Displacements prescribed by holds, guides and tools, m. `[n_nodes]`
     pub(super) demand: Vec<Vec3>,
     /// The linear system's solution, m. `[n_nodes]`
     pub(super) delta: Vec<Vec3>,
-    /// Forces on nodes as the linear system has them after the step that was taken, N. `[n_nodes]`
+    /// Forces on nodes as the linear system predicts them after the step, N. `[n_nodes]`
     pub(super) predicted: Vec<Vec3>,
-    /// The forces, present or predicted, that pressure and friction are taken from, N. `[n_nodes]`
+    /// The forces, present or predicted, that determine pressure and friction, N. `[n_nodes]`
     pub(super) contact_forces: Vec<Vec3>,
     /// Displacements of a trial, m. `[n_nodes]`
     pub(super) trial: Vec<Vec3>,
@@ -61,8 +61,7 @@ impl Workspace {
         }
     }
 
-    /// Force that holds every node at the state that was solved last, N; zero where a node is free.
-    /// `[n_nodes]`
+    /// Force that holds each node in the last solved state, N; zero for a free node. `[n_nodes]`
     pub fn reactions(&self) -> &[Vec3] {
         &self.forces
     }

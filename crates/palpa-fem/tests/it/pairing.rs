@@ -100,7 +100,8 @@ fn graded_blocks_leave_at_most_the_odd_triangle_alone() {
                     pairing.singles.len()
                 );
                 assert_eq!(pairing.singles.len(), skin.triangles.len() % 2);
-                // A reflex corner only where its triangles would be left alone: round vertices of three triangles.
+                // A reflex corner only where its triangles would be left alone: round vertices of
+                // three triangles.
                 let is_reflex = |pair: &&Pair| worst_corner(&skin, pair).to_degrees() >= 90.0;
                 let n_reflex = pairing.pairs.iter().filter(is_reflex).count();
                 assert!(n_reflex <= skin.triangles.len() / 500, "{n_reflex}");
@@ -130,7 +131,8 @@ fn a_locally_refined_skin_is_paired_too() {
             pairing.singles.len()
         );
         assert_eq!(pairing.singles.len(), skin.triangles.len() % 2);
-        // The two halves of a green triangle make a quad with one corner of 180°, where nothing better is left.
+        // The two halves of a green triangle make a quad with one corner of 180°, where nothing
+        // better is left.
         assert!(max < 90.0 + 1e-6);
     }
 }

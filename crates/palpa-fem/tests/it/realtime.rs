@@ -100,7 +100,8 @@ fn converged(model: &Model, path: &[[PosedTool; 1]]) -> Vec3 {
     force
 }
 
-/// Follows a path in steps; jobs are done at once. Returns the last force and how many zones there were.
+/// Follows a path in steps; jobs are done at once. Returns the last force and how many zones there
+/// were.
 fn follow(live: &mut Live, path: impl Iterator<Item = [PosedTool; 1]>) -> (Vec3, u64) {
     let mut zones = 0;
     for tools in path {
@@ -193,8 +194,9 @@ fn a_stroke_goes_from_zone_to_zone() {
     }
 }
 
-/// Where the coarse block is near to giving way under the ball, the true stiffness of the exterior is more than twice that of
-/// a moment before: taken back whole, its forces out of balance would grow from step to step, and swing.
+/// Where the coarse block is near to giving way under the ball, the true stiffness of the exterior
+/// is more than twice that of a moment before: taken back whole, its forces out of balance would
+/// grow from step to step, and swing.
 #[test]
 fn a_followed_exterior_does_not_swing() {
     let levels = LevelStack {
@@ -481,7 +483,8 @@ fn a_body_at_rest_is_let_be_and_wakes_when_touched() {
         .flat_map(|prony| MODES.map(|mode| (prony, mode)))
     {
         let what = format!("viscous: {}, {mode:?}", prony.is_some());
-        // A linear exterior is that of the depth at which it was last brought up to date, at rest or not.
+        // A linear exterior is that of the depth at which it was last brought up to date, at rest
+        // or not.
         let (left_bound, force_bound) = match mode.1 {
             ExteriorMode::Followed => (5e-7, 1e-3),
             ExteriorMode::Linear => (2e-5, 0.04),

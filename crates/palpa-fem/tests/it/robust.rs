@@ -1,4 +1,5 @@
-//! Random scenes: each press converges, or says where and why not; none panics, hangs or answers with a NaN.
+//! Random scenes: each press converges, or says where and why not; none panics, hangs or answers
+//! with a NaN.
 
 use palpa_fem::law::{
     Fung, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm, Volumetric,

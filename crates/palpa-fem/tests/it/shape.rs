@@ -7,7 +7,8 @@ use palpa_fem::shape::{
 };
 use palpa_mesh::Vec3;
 
-/// A shape beside what decides, independently of it, which points are inside, and points all over its surface.
+/// A shape beside what decides, independently of it, which points are inside, and points all over
+/// its surface.
 struct Case {
     shape: Shape,
     is_inside: Box<dyn Fn(&Vec3) -> bool>,
@@ -101,7 +102,8 @@ fn rounded_box(half: Vec3, e: f64) -> Case {
                 && (on_core == p || (p - on_core).norm() < e)
         }),
         surface: Box::new(move |a, b| {
-            // The middle projected: a ball's directions onto the box of half extents, then pushed onto the rounding.
+            // The middle projected: a ball's directions onto the box of half extents, then pushed
+            // onto the rounding.
             let u = unit(a, b).component_mul(&half);
             let on_box = u / u.component_div(&half).amax();
             let on_core = on_box.sup(&-core).inf(&core);
@@ -319,7 +321,8 @@ fn the_nearest_point_is_on_the_surface_and_none_is_nearer() {
     }
 }
 
-/// A convex shape is what lies behind all its supporting planes: `d(p) = max u·p − h(u)`, outside as inside.
+/// A convex shape is what lies behind all its supporting planes: `d(p) = max u·p − h(u)`, outside
+/// as inside.
 #[test]
 fn the_distance_is_that_of_the_furthest_supporting_plane() {
     let mut random = Random::new(3);
@@ -579,7 +582,8 @@ fn points_deep_inside_are_pushed_out_somewhere() {
     }
 }
 
-/// On an axis of revolution the nearest point has a closed form, down to the middle of the extreme shapes.
+/// On an axis of revolution the nearest point has a closed form, down to the middle of the extreme
+/// shapes.
 #[test]
 fn the_ellipsoid_is_exact_on_its_axes_at_any_aspect_ratio() {
     for aspect in [1.0, 1.5, 30.0, 1e3, 1e5, 1e7] {

@@ -79,7 +79,8 @@ fn forces_do_not_depend_on_whether_factors_are_kept() {
             iterations(&fresh),
             iterations(&kept)
         );
-        // Where vertices stick or slide, the order in which that is found may lead to one of several balances.
+        // Where vertices stick or slide, the order in which that is found may lead to one of
+        // several balances.
         let tolerance = if friction == 0.0 { 1e-6 } else { 0.01 };
         for (a, b) in fresh.iter().zip(&kept) {
             let (a, b) = (a.tool_forces[0], b.tool_forces[0]);

@@ -1,4 +1,4 @@
-//! What is pressed.
+//! The cases of the benchmark: bodies, tools and modes.
 
 use std::sync::{Arc, LazyLock};
 
@@ -16,18 +16,19 @@ use super::row::Mode;
 
 /// Side and thickness of the blocks, m.
 const SIDE: f64 = 0.1;
-/// Thickness of skin, fat and muscle, m, and their Young's moduli, Pa.
+/// Thickness, m, and Young's modulus, Pa, of skin, fat and muscle.
 const LAYERS: [(f64, f64); 3] = [(2e-3, 100e3), (10e-3, 5e3), (28e-3, 30e3)];
-/// Young's modulus of the block of one tissue, Pa, and its thickness, m.
+/// Young's modulus, Pa, and thickness, m, of the block of one tissue.
 const ONE_TISSUE: (f64, f64) = (30e3, 40e-3);
 /// Poisson's ratio of all tissues.
 const POISSON: f64 = 0.45;
 /// Exponent of the hardening tissue.
 const OGDEN_EXPONENT: f64 = 8.0;
-/// Shares and times (s) of the tissue that relaxes: half of it, at once and slowly.
+/// Prony terms (share, time in s) of the relaxing tissue: half of the stiffness relaxes, one part
+/// fast and one slowly.
 const RELAXING: [(f64, f64); 2] = [(0.3, 0.1), (0.2, 1.0)];
 
-/// Length, radius, and radius of the bone of the limb, m.
+/// Length of the limb, its radius, and the radius of its bone, m.
 const LIMB: [f64; 3] = [0.2, 0.04, 0.012];
 
 /// The tissue of all layers.
@@ -35,25 +36,25 @@ const LIMB: [f64; 3] = [0.2, 0.04, 0.012];
 pub enum Tissue {
     /// Neo-Hookean.
     Elastic,
-    /// The same, relaxing.
+    /// Neo-Hookean, relaxing.
     Relaxing,
-    /// Hardening.
+    /// Hardening: Ogden.
     Ogden,
 }
 
 /// The shape and its mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BenchShape {
-    /// The layered block, of so many equal columns a side and an interval a layer.
+    /// The layered block with equal columns and one interval per layer.
     Block {
-        /// Columns a side.
+        /// Columns along each side.
         columns: usize,
     },
     /// The layered block, fine where it is pressed.
     Graded(BenchGrading),
     /// A block of one tissue, fine where it is pressed.
     OneTissue(BenchGrading),
-    /// A limb about its bone, an interval a layer.
+    /// A limb around its bone.
     Limb {
         /// Length of the skin's edges, m.
         spacing: f64,
@@ -62,56 +63,57 @@ pub enum BenchShape {
     },
 }
 
-/// A mesh that is graded toward a tool in its middle.
+/// A mesh that is graded towards a tool in its middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BenchGrading {
-    /// Length of edges in the ring, m.
+    /// Edge length inside the ring, m.
     pub spacing: f64,
-    /// Its radius, m.
+    /// Radius of the ring, m.
     pub ring: f64,
-    /// By how much edges lengthen per metre beyond it.
+    /// Growth of the edge length outside the ring, per metre of distance.
     pub growth: f64,
-    /// First height (m) and growth of each layer's levels; the first only, of one tissue.
+    /// First height (m) and growth of each layer's levels. A block of one tissue uses the first
+    /// entry only.
     pub levels: [(f64, f64); 3],
-    /// Where the middle is, m.
+    /// Position of the middle, m.
     pub centre: [f64; 2],
-    /// Where the tool is from there, in spacings.
+    /// Offset of the tool from the middle, in spacings.
     pub beside: [f64; 2],
 }
 
-/// One line of the table that is to be measured.
+/// One line of the table to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
-    /// What a step makes anew.
+    /// Part of the stiffness that a step recomputes.
     pub mode: Mode,
     /// Radius of the zone, m.
     pub zone_radius: f64,
-    /// Indentation after which the exterior is made anew, m; as shipped if not given.
+    /// Indentation after which the exterior is factored anew, m; `None` for the default.
     pub stale: Option<f64>,
-    /// Steps per second that are asked for.
+    /// Required steps per second.
     pub target: Option<f64>,
 }
 
-/// A body, a tool on its way, and the modes to measure.
+/// A body, the path of a tool, and the modes to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BenchCase {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
     /// The body.
     pub shape: BenchShape,
-    /// What it is made of.
+    /// The tissue of the layers.
     pub tissue: Tissue,
     /// Radius of the sphere, m.
     pub radius: f64,
-    /// How deep it presses, m, and how far it strokes, m.
+    /// Depth of the press and length of the stroke, m.
     pub way: [f64; 2],
-    /// The same on a refined mesh.
+    /// The same problem on a refined mesh.
     pub problem: Problem,
-    /// Every which place is compared with the converged body.
+    /// Every `every`-th place is compared with the converged body.
     pub every: usize,
-    /// The lines.
+    /// The lines of the table.
     pub runs: Vec<Run>,
-    /// Whether it is small enough for a quick look.
+    /// Whether the case is small enough for `--quick`.
     pub is_quick: bool,
 }
 
@@ -203,7 +205,7 @@ impl BenchShape {
         }
     }
 
-    /// Length of edges under the tool, m.
+    /// Edge length under the tool, m.
     pub fn h_contact(&self) -> f64 {
         match *self {
             Self::Block { columns } => SIDE / (columns - 1) as f64,
@@ -217,15 +219,15 @@ impl BenchCase {
     /// The body with its materials, on its bone.
     ///
     /// # Errors
-    /// When it cannot be computed with.
+    /// If the body cannot be computed with.
     pub fn model(&self) -> Result<Arc<Model>, FemError> {
         self.model_of(&self.shape)
     }
 
-    /// The same of another mesh.
+    /// The model of the same case on another mesh.
     ///
     /// # Errors
-    /// When it cannot be computed with.
+    /// If the body cannot be computed with.
     pub fn model_of(&self, shape: &BenchShape) -> Result<Arc<Model>, FemError> {
         let body = shape.body();
         let youngs: Vec<f64> = match shape {
@@ -245,7 +247,7 @@ impl BenchCase {
         Ok(Arc::new(model))
     }
 
-    /// The way of the tool.
+    /// The path of the tool.
     pub fn ride(&self) -> Ride {
         let at = match self.shape {
             BenchShape::Block { .. } => Vec3::new(-0.5 * self.way[1], 0.0, 0.0),
@@ -265,7 +267,7 @@ impl BenchCase {
     }
 }
 
-/// Radii of spheres, m.
+/// Radii of the two spheres, m.
 const LARGE: f64 = 10e-3;
 const SMALL: f64 = 5e-3;
 
@@ -278,7 +280,7 @@ fn run(mode: Mode, zone_radius: f64, target: Option<f64>) -> Run {
     }
 }
 
-/// A block of equal columns under modes with their targets.
+/// A block of equal columns, with the modes to run and their targets.
 fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> BenchCase {
     BenchCase {
         name,
@@ -293,7 +295,7 @@ fn block(name: &'static str, columns: usize, runs: Vec<Run>) -> BenchCase {
     }
 }
 
-/// What a mesh that is graded toward the tool is measured with, pressed straight down.
+/// A case on a mesh that is graded towards the tool, pressed straight down.
 fn graded(name: &'static str, shape: BenchShape, problem: Problem, depth: f64) -> BenchCase {
     let runs = vec![
         run(Mode::Full, 15e-3, None),
@@ -308,9 +310,10 @@ fn graded(name: &'static str, shape: BenchShape, problem: Problem, depth: f64) -
     }
 }
 
-/// Meshes that a search over edges, ring, growth and levels found fastest at their error. The error is the worst of four
-/// places of the sphere over a triangle (on a vertex, an edge's middle, near the triangle's middle and half-way there), and
-/// `beside` is that place.
+/// Meshes that are the fastest at their error, found by a search over edge length, ring, growth and
+/// levels. The error is the largest of four positions of the sphere over a triangle: on a vertex,
+/// on the middle of an edge, near the triangle's middle, and half-way to it. `beside` is the
+/// position of that largest error.
 fn grading(
     [ring, n_on_radius]: [f64; 2],
     growth: f64,
@@ -340,7 +343,7 @@ fn layers(name: &'static str, grading: BenchGrading) -> BenchCase {
     graded(name, BenchShape::Graded(grading), Problem::Layers, 5e-3)
 }
 
-/// Near the middle of a triangle, and half-way there from a vertex, in spacings.
+/// Offsets from a vertex to a point near the middle of a triangle and half-way to it, in spacings.
 const INSIDE: [f64; 2] = [0.5, 0.3];
 const HALF_WAY: [f64; 2] = [0.25, 0.15];
 

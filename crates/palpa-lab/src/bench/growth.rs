@@ -1,13 +1,13 @@
-//! How the cost grows with the body.
+//! Growth of the cost with the size of the body.
 
 use serde::Serialize;
 
 use super::row::{BenchRow, Mode};
 
-/// Time of a step as a power of the nodes, fitted.
+/// Fit of the time of a step as a power of the number of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Growth {
-    /// Of which steps.
+    /// Mode of the steps.
     pub mode: Mode,
     /// The exponent.
     pub exponent: f64,
@@ -15,7 +15,8 @@ pub struct Growth {
     pub nodes: [usize; 2],
 }
 
-/// Fits a line through the logarithms of time and nodes of each mode's rows; those of two bodies at least.
+/// Fits a line to the logarithms of time and number of nodes of each mode's rows. Modes with fewer
+/// than two bodies are left out.
 pub fn growth<'a>(rows: &(impl Iterator<Item = &'a BenchRow> + Clone)) -> Vec<Growth> {
     [Mode::Full, Mode::Whole, Mode::Zone]
         .into_iter()

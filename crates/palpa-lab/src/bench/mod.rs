@@ -1,7 +1,9 @@
-//! What a moving step costs, and what it is worth: rates of the shipped step with the errors that it has at them.
+//! Cost and accuracy of the moving step: its rates with default settings, and its errors at these
+//! rates.
 //!
-//! A tool presses to 5 mm, strokes 20 mm sideways and lifts, at the row's own rate, with contact that changes, zones that
-//! are left and the background's work, which comes as late as it takes. Errors are those of the forces on the way.
+//! A tool presses to 5 mm, strokes 20 mm sideways and lifts, at the rate of the row. Contact
+//! changes on the way, the tool leaves zones, and results of the background's work arrive as late
+//! as it takes. The errors are errors of the force along the path.
 
 pub mod cases;
 pub mod growth;

@@ -1,9 +1,9 @@
-//! The rates in one picture.
+//! Plot of the rates.
 
 use super::row::{BenchReport, BenchRow, Mode};
 use palpa_plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 
-/// Rates and errors against the size of the body.
+/// Draws rates and errors against the size of the body.
 pub fn draw(report: &BenchReport, of_growth: impl Fn(&BenchRow) -> bool) -> Picture {
     let rows: Vec<&BenchRow> = report.rows.iter().filter(|row| of_growth(row)).collect();
     let modes = [Mode::Full, Mode::Whole, Mode::Zone];

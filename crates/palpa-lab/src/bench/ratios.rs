@@ -1,4 +1,4 @@
-//! The moving step against a dense inverse and against a full factor.
+//! Comparison of the moving step with a dense inverse and with a full factorization.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,37 +12,39 @@ use serde::Serialize;
 
 use crate::reproduce;
 
-/// What the moving step is compared with.
+/// Comparison of the moving step with another method.
 #[derive(Debug, Clone, Serialize)]
 pub struct Ratio {
-    /// The other way.
+    /// Name of the other method.
     pub against: &'static str,
-    /// The row that it is compared with: case and mode.
+    /// The row of the table that is compared: case and mode.
     pub row: String,
-    /// Nodes of the row's body, and of the other's.
+    /// Number of nodes: in the row, and in the other method's body.
     pub nodes: [usize; 2],
-    /// Time of the other way over that of the moving step.
+    /// Time of the other method divided by the time of the moving step.
     pub ratio: f64,
-    /// Median time of the other way, ms.
+    /// Median time of the other method, ms.
     pub other_ms: f64,
 }
 
-/// Median time of a step of the reference method with its dense inverse, s, of `n × n` columns of 4.
+/// Median time of a step of the reference method with its dense inverse, s, on `n × n` columns of 4
+/// nodes; and the number of nodes.
 ///
 /// # Errors
-/// When its model cannot be built.
+/// If its model cannot be built.
 pub fn dense_inverse(n: usize, budget: Duration) -> anyhow::Result<(f64, usize)> {
     let shape = reproduce::Shape::thesis(n);
     let rate = reproduce::speed::steps_per_s(&shape, Solver::HistoricalInverse, budget)?;
     Ok((1.0 / rate, shape.n_nodes()))
 }
 
-/// Median time of a factor, of a right side solved with it and of nothing else, s, in double precision by faer's
-/// supernodes in an order of minimum degree, of a matrix with the pattern of the model's stiffness. Its values do not
-/// count for the time: they are those of a grid of springs.
+/// Median time, s, to factor a matrix with the pattern of the model's stiffness and to solve for
+/// one right-hand side, nothing else. It uses faer's supernodal factorization in double precision
+/// with a minimum-degree ordering. The values of the matrix do not affect the time, so those of a
+/// grid of springs are used.
 ///
 /// # Errors
-/// When the factor would be too large.
+/// If the factor would be too large.
 pub fn full_factor(model: &Arc<Model>, n_times: usize) -> anyhow::Result<f64> {
     let body = model.body();
     let n_free = body.n_levels - 1;
@@ -74,7 +76,7 @@ pub fn full_factor(model: &Arc<Model>, n_times: usize) -> anyhow::Result<f64> {
     for (i, &column) in order.iter().enumerate() {
         rank[column] = i;
     }
-    // Node (column of rank r, level l) is r n_free + l.
+    // The node at level l of the column with rank r has the number r n_free + l.
     let mut nodes: NodePattern = Vec::with_capacity(n_columns * n_free);
     for &column in &order {
         for level in 0..n_free {
@@ -94,7 +96,8 @@ pub fn full_factor(model: &Arc<Model>, n_times: usize) -> anyhow::Result<f64> {
     let n = 3 * nodes.len();
     let pattern = Pattern::sparse(&nodes, n, |node| (3 * node, 3))
         .map_err(|_| anyhow::anyhow!("the factor of {n} unknowns is too large"))?;
-    // Springs along every edge, and one to the ground: diagonally dominant.
+    // A spring along every edge and one from each node to the ground make the matrix diagonally
+    // dominant.
     let mut values = vec![0.0; pattern.n_entries()];
     let mut scale = vec![1e-3; n];
     for (node, later) in &nodes {

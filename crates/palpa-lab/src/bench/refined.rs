@@ -1,4 +1,4 @@
-//! The same problems on refined meshes: what a mesh does to a force.
+//! The same problems on refined meshes, to find the error that a mesh causes in the force.
 
 use palpa_fem::Outcome;
 use serde::Serialize;
@@ -7,13 +7,13 @@ use super::cases::{BenchCase, BenchGrading, BenchShape, Tissue, cases};
 use super::ride::{Known, Ride, converged};
 use palpa_fem::FemError;
 
-/// What is pressed, whatever the mesh.
+/// A problem without its mesh: body and tool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Problem {
     /// The layered block under the sphere of 10 mm radius.
     Layers,
-    /// The same under that of 5 mm.
+    /// The layered block under the sphere of 5 mm radius.
     LayersSmall,
     /// The hardening block.
     Ogden,
@@ -27,7 +27,7 @@ pub enum Problem {
 pub type Curve = &'static [(f64, f64)];
 
 impl Problem {
-    /// All of them.
+    /// All problems.
     pub const ALL: [Self; 5] = [
         Self::Layers,
         Self::LayersSmall,
@@ -36,8 +36,8 @@ impl Problem {
         Self::OneTissue,
     ];
 
-    /// The force straight down (N) at the depths of a ride, recorded from [`Self::compute`] (`palpa bench --refined`,
-    /// on 9,000 to 11,000 nodes).
+    /// Forces (N) of the straight press at the depths of a ride, recorded from [`Self::compute`]
+    /// (`palpa bench --refined`, on 9,000 to 11,000 nodes).
     pub fn recorded(self) -> Curve {
         match self {
             Self::Layers => &[
@@ -59,19 +59,19 @@ impl Problem {
                 (5e-3, 1.99155),
                 (6e-3, 2.62103),
             ],
-            // On the limb's mesh halved once, 32,000 nodes.
+            // Computed on the limb's mesh with edges halved once, 32,000 nodes.
             Self::Limb => &[
                 (2e-3, 0.16918),
                 (3e-3, 0.30497),
                 (4e-3, 0.48379),
                 (5e-3, 0.74066),
             ],
-            // Not recorded yet: rows have no error of the mesh.
+            // Not recorded yet, so these rows have no mesh error.
             Self::LayersSmall => &[],
         }
     }
 
-    /// The recorded force (N) at a depth (m), where there is one.
+    /// The recorded force (N) at a depth (m), if there is one.
     pub fn force_at(self, depth: f64) -> Option<f64> {
         let known = self
             .recorded()
@@ -104,10 +104,11 @@ impl Problem {
         }
     }
 
-    /// Forces while the tool goes straight down, and the nodes of the mesh.
+    /// Computes the forces of the straight press. Returns them with the number of nodes of the
+    /// mesh.
     ///
     /// # Errors
-    /// When the body cannot be computed with, and when a step does not converge.
+    /// If the body cannot be computed with, or if a step does not converge.
     pub fn compute(self) -> Result<(Vec<Known>, usize), RefinedError> {
         let like = cases()
             .iter()
@@ -146,9 +147,9 @@ pub enum RefinedError {
     Fem(FemError),
     /// A step did not converge.
     Outcome {
-        /// Where on the way, m.
+        /// Position along the path, m.
         at: f64,
-        /// How it ended.
+        /// How the step ended.
         outcome: Outcome,
     },
 }

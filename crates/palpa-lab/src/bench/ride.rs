@@ -1,4 +1,4 @@
-//! The way of a tool, and the moving step on it.
+//! The path of a tool, and the moving step along it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,39 +11,40 @@ use palpa_fem::{
 };
 use palpa_mesh::Vec3;
 
-/// How fast a tool goes where the steps allow it, m/s.
+/// Speed of the tool if the steps allow it, m/s.
 const FASTEST: f64 = 0.05;
-/// It goes slower than that rather than further than this in a step, m.
+/// Largest travel of the tool in a step, m; the tool goes slower to keep it.
 const LONGEST_TRAVEL: f64 = 0.25e-3;
-/// Steps between two millimetres of the way at most: more would only take longer.
+/// Largest number of steps per millimetre of the path; more would only take longer.
 const MOST_STEPS_PER_MM: usize = 60;
-/// How far above the skin the tool starts and ends, m.
+/// Height above the skin at which the tool starts and ends, m.
 const ABOVE: f64 = 1e-3;
-/// Depth from which on forces are compared, m.
+/// Smallest depth at which forces are compared, m.
 pub const JUDGED_FROM: f64 = 2e-3;
-/// Distance of the places where they are compared, m; the ways are multiples of it.
+/// Distance between the places where forces are compared, m; all paths are multiples of it.
 const JUDGED_EVERY: f64 = 1e-3;
 
-/// The way of a sphere: from above the skin straight down, sideways, and up. In whole millimetres.
+/// The path of a sphere: from above the skin straight down, sideways, and up. All parts are whole
+/// millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ride {
-    /// Point of the skin that it is pressed on, m.
+    /// Point of the skin that the sphere presses, m.
     pub at: Vec3,
     /// Radius of the sphere, m.
     pub radius: f64,
-    /// How deep it is pressed along −z, m.
+    /// Depth of the press along −z, m.
     pub depth: f64,
-    /// How far it strokes along x, m.
+    /// Length of the stroke along x, m.
     pub stroke: f64,
 }
 
 impl Ride {
-    /// Its length, m.
+    /// Length of the path, m.
     pub fn length(&self) -> f64 {
         2.0 * (self.depth + ABOVE) + self.stroke
     }
 
-    /// Depth (m) and place of the tool after a length of the way (m).
+    /// Depth (m) and pose of the tool at the position `s` along the path (m).
     fn at_length(&self, s: f64) -> (f64, PosedTool) {
         let down = self.depth + ABOVE;
         let (x, depth) = if s <= down {
@@ -62,7 +63,7 @@ impl Ride {
         (depth, tool)
     }
 
-    /// The places where forces are compared: lengths of the way, m.
+    /// The places where forces are compared: positions along the path, m.
     pub fn judged(&self) -> Vec<f64> {
         let n = (self.length() / JUDGED_EVERY).round() as usize;
         let lengths = (0..=n).map(|i| i as f64 * JUDGED_EVERY);
@@ -72,24 +73,25 @@ impl Ride {
     }
 }
 
-/// A force that is known to be right on its mesh.
+/// A converged force, exact on its mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
-    /// Where on the way, m.
+    /// Position along the path, m.
     pub at: f64,
     /// Depth of the tool, m.
     pub depth: f64,
-    /// Whether the tool has not yet gone sideways.
+    /// Whether the tool has not moved sideways yet.
     pub is_press: bool,
     /// Force of the tissue on the tool, N.
     pub force: Vec3,
 }
 
-/// Forces of the converged body, from step to step at the speed of the tool, at every `every`th place of
-/// [`Ride::judged`] and where it is deepest first. `speed` matters where tissue remembers, m/s.
+/// Forces of the converged body, computed step by step at the speed of the tool. The places are
+/// every `every`-th of [`Ride::judged`] and the one where the tool first reaches its depth.
+/// `speed`, m/s, matters for tissue that relaxes.
 ///
 /// # Errors
-/// The place (m along the way) and how the step ended, where one did not converge.
+/// If a step does not converge: its place (m along the path) and how it ended.
 pub fn converged(
     model: &Model,
     ride: &Ride,
@@ -134,53 +136,53 @@ pub fn converged(
     Ok(known)
 }
 
-/// What a ride has shown.
+/// Result of a ride.
 #[derive(Debug)]
 pub struct Ridden {
     /// Times of the steps in contact, s, ascending.
     pub times: Vec<f64>,
-    /// All steps.
+    /// Number of all steps.
     pub n_steps: usize,
-    /// CPU time of the background's work, and of the steps, s.
+    /// CPU time of the background's work and of the steps, s.
     pub cpu: [f64; 2],
-    /// Pieces of background work.
+    /// Number of background jobs.
     pub n_jobs: usize,
-    /// Time between steps, s, and how far the tool went in it, m.
+    /// Time between two steps, s.
     pub dt: f64,
-    /// See `dt`.
+    /// Travel of the tool between two steps, m.
     pub travel: f64,
-    /// Lengths of the way (m) and forces (N) after every step.
+    /// Position along the path (m) and force (N) after every step.
     pub forces: Vec<(f64, Vec3)>,
-    /// As in the table.
+    /// Number of zones that were taken over.
     pub n_zone_switches: usize,
-    /// As in the table.
+    /// Number of factors of the exterior that were taken over, new zones included.
     pub n_factors: usize,
-    /// As in the table.
+    /// Number of steps after which the number of pressing vertices changed.
     pub n_active_changes: usize,
-    /// Most vertices that pressed at once, and most candidates.
+    /// Largest number of vertices that pressed at once, and of candidates.
     pub most: [usize; 2],
-    /// Newton iterations of all steps.
+    /// Total Newton iterations of all steps.
     pub n_iterations: usize,
-    /// Steps that went part of the way, and that failed.
+    /// Number of steps that went part of the way, and that failed.
     pub n_bad: [usize; 2],
-    /// Columns of the last zone.
+    /// Number of columns of the last zone.
     pub zone_columns: usize,
 }
 
 impl Ridden {
-    /// The median time of a step in contact, s; of all steps if none was.
+    /// Median time of the steps in contact, s; NaN if there was none.
     pub fn median(&self) -> f64 {
         self.quantile(0.5)
     }
 
-    /// A quantile of the times of the steps in contact, s.
+    /// Quantile `q` (0 to 1) of the times of the steps in contact, s; NaN if there was none.
     pub fn quantile(&self, q: f64) -> f64 {
         let last = self.times.len().saturating_sub(1);
         let at = (q * last as f64).round() as usize;
         self.times.get(at).copied().unwrap_or(f64::NAN)
     }
 
-    /// Largest error against known forces, as a share of them.
+    /// Largest relative error of the forces against known ones.
     pub fn error(&self, known: &[Known]) -> f64 {
         let errors = known.iter().filter_map(|k| {
             let found = self.forces.iter().find(|f| (f.0 - k.at).abs() < 1e-9)?;
@@ -190,26 +192,28 @@ impl Ridden {
     }
 }
 
-/// Work of the background that is under way.
+/// A running background job.
 struct Under {
     result: Rebuilt,
-    /// The step before which it is done.
+    /// Number of the step before which the result is installed.
     due: usize,
 }
 
-/// Rides at the step's own rate, which a short ride finds first. Background work is run at once and taken over as many
-/// steps later as its CPU time is long: as from a second thread, but the same from run to run but for the time.
+/// Rides at the step's own rate, which a short pilot ride measures first. A background job runs at
+/// once, and its result is installed as many steps later as its CPU time is long. This imitates a
+/// second thread, but apart from the times it gives the same result in every run.
 ///
 /// # Errors
-/// When the body cannot be at rest or is too large.
+/// If the body has no state of rest or is too large.
 pub fn ride(model: &Arc<Model>, ride: &Ride, params: LiveParams) -> Result<Ridden, FemError> {
-    /// As long as finds the median to a few per cent.
+    /// Depth of the pilot ride, m: enough to find the median time to a few per cent.
     const PILOT: f64 = 4e-3;
     let pilot = run(model, ride, params, LONGEST_TRAVEL, None, ABOVE + PILOT)?;
     let rate = 1.0 / pilot.median();
     let mut speed = FASTEST;
     if pilot.n_jobs > 0 && params.zone_radius.is_finite() {
-        // No faster than zones come, and where the exterior is followed with an old stiffness, its stiffness.
+        // The tool goes no faster than new zones arrive and, if the exterior is followed with an
+        // old stiffness, its new factors.
         let job = pilot.cpu[0] / pilot.n_jobs as f64;
         speed = speed.min(params.longest_way() / job);
     }
@@ -228,7 +232,7 @@ fn run(
     dt: Option<f64>,
     length: f64,
 ) -> Result<Ridden, FemError> {
-    // Without a rate of its own, a step is as long as at the usual speed.
+    // Without a given `dt`, a step takes the time of the usual speed.
     let dt = dt.unwrap_or(travel / FASTEST);
     let mut live = Live::new(Arc::clone(model), &[ride.at_length(0.0).1], params)?;
     let n_steps = (length / travel).round() as usize;
@@ -300,7 +304,7 @@ impl Ridden {
     }
 }
 
-/// The parameters of a mode.
+/// Parameters of the moving step in a mode.
 pub fn params(mode: super::Mode, zone_radius: f64) -> LiveParams {
     let shipped = LiveParams::default();
     match mode {

@@ -1,24 +1,26 @@
-//! What is found.
+//! Rows of the benchmark table and the report.
 
 use serde::{Deserialize, Serialize};
 
 use super::growth::Growth;
 use super::ratios::Ratio;
 
-/// What a step makes anew.
+/// Part of the stiffness that a step recomputes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// The stiffness of the whole body, in every step.
+    /// The stiffness of the whole body.
     Full,
-    /// That of a zone; the rest of the body is brought to equilibrium with an earlier one.
+    /// The stiffness of a zone; the rest of the body is brought to equilibrium with an earlier
+    /// stiffness.
     Whole,
-    /// That of a zone; the rest of the body answers linearly, and the background brings it up to date.
+    /// The stiffness of a zone; the rest of the body responds linearly, and the background updates
+    /// it.
     Zone,
 }
 
 impl Mode {
-    /// Its name in tables and pictures.
+    /// Name in tables and plots.
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
@@ -31,31 +33,31 @@ impl Mode {
 /// One line of the table.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BenchRow {
-    /// What is pressed.
+    /// Name of the case.
     pub case: String,
-    /// Nodes of the body, those of its fixed base among them.
+    /// Nodes of the body, including those of its fixed base.
     pub nodes: usize,
-    /// Nodes that the step makes anew the stiffness of.
+    /// Nodes whose stiffness a step recomputes.
     pub zone_nodes: usize,
-    /// Nodes of a column.
+    /// Nodes per column.
     pub levels: usize,
-    /// What a step makes anew.
+    /// Part of the stiffness that a step recomputes.
     pub mode: Mode,
-    /// Radius of the zone; none where it is the body.
+    /// Radius of the zone; `None` if the zone is the whole body.
     pub zone_radius_mm: Option<f64>,
-    /// Length of edges under the tool.
+    /// Edge length under the tool.
     pub h_contact_mm: f64,
-    /// Radius of the sphere that presses.
+    /// Radius of the sphere.
     pub tool_radius_mm: f64,
-    /// The inverse of the median.
+    /// Steps per second: the inverse of the median time.
     pub steps_per_s: f64,
-    /// What is asked of the row, if anything is.
+    /// Required steps per second, if there is a target.
     pub target_steps_per_s: Option<f64>,
     /// Median thread-CPU time of the steps in contact.
     pub step_ms_median: f64,
-    /// 99th percentile of the same.
+    /// 99th percentile of the thread-CPU time of the steps in contact.
     pub step_ms_p99: f64,
-    /// CPU time of the background's work over that of the steps.
+    /// CPU time of the background's work, relative to that of the steps.
     pub background_cpu_share: f64,
     /// Largest error of the force past 2 mm against the converged force on the same mesh.
     pub step_error: f64,
@@ -63,41 +65,41 @@ pub struct BenchRow {
     pub mesh_error: Option<f64>,
     /// Largest error of the moving step's forces past 2 mm against those on a refined mesh.
     pub total_error: Option<f64>,
-    /// How fast the tool went.
+    /// Speed of the tool.
     pub tool_mm_per_s: f64,
-    /// How far it went in a step.
+    /// Travel of the tool in a step.
     pub travel_mm: f64,
-    /// Steps in contact, of all that were taken.
+    /// Number of steps in contact.
     pub n_steps: usize,
-    /// Zones that were taken over.
+    /// Number of zones that were taken over.
     pub n_zone_switches: usize,
-    /// Factors of the exterior that were taken over, those of new zones among them.
+    /// Number of factors of the exterior that were taken over, new zones included.
     pub n_factors: usize,
-    /// Steps after which another number of vertices pressed.
+    /// Number of steps after which the number of pressing vertices changed.
     pub n_active_changes: usize,
-    /// Most vertices that pressed at once.
+    /// Largest number of vertices that pressed at once.
     pub most_active: usize,
-    /// Most candidates at once.
+    /// Largest number of candidates at once.
     pub most_candidates: usize,
-    /// Newton iterations of a step, the mean.
+    /// Mean number of Newton iterations per step.
     pub iterations: f64,
-    /// Steps that went part of the way only.
+    /// Number of steps that went only part of the way.
     pub n_backed_off: usize,
-    /// Steps that failed.
+    /// Number of steps that failed.
     pub n_failed: usize,
 }
 
-/// All that was measured. After an interruption it holds what was done until then.
+/// The report of all measurements. After an interruption it holds those completed so far.
 #[derive(Debug, Default, Serialize)]
 pub struct BenchReport {
-    /// Whether all of it was done; not after an interruption.
+    /// Whether all cases were measured; false after an interruption.
     pub is_complete: bool,
     /// The table.
     pub rows: Vec<BenchRow>,
-    /// How the cost grows with the body.
+    /// Growth of the cost with the size of the body.
     pub growth: Vec<Growth>,
-    /// Against other ways to solve.
+    /// Comparisons with other methods.
     pub ratios: Vec<Ratio>,
-    /// How the table is measured.
+    /// Description of how the table is measured.
     pub method: &'static str,
 }

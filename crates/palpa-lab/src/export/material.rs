@@ -1,29 +1,31 @@
-//! Materials in CalculiX's words, in megapascals.
+//! Materials in CalculiX's terms, in megapascals.
 //!
-//! All its energies are `W_d + Σ (J − 1)²ⁱ/Dᵢ` with `D1 = 2/K`. That each of them is the law meant was tried with CalculiX
-//! 2.20 on one confined element, to 7 digits. There, a second or third D of 0 stands for a default, not for nothing.
+//! All energies of CalculiX are `W_d + Σ (J − 1)²ⁱ/Dᵢ` with `D1 = 2/K`. A test with CalculiX 2.20
+//! on one confined element confirmed to 7 digits that each one is the intended law. In CalculiX, a
+//! second or third D of 0 means a default value, not a missing term.
 
 use anyhow::bail;
 use palpa_fem::law::{Law, Material, OgdenTerm, Volumetric, Yeoh};
 
-/// Terms of Ogden's energy that CalculiX takes.
+/// Largest number of terms of Ogden's energy that CalculiX accepts.
 const MOST_OGDEN_TERMS: usize = 3;
-/// A `D2` or `D3` that leaves the term out.
+/// Value of `D2` or `D3` that makes its term vanish.
 const NO_TERM: f64 = 1e20;
 const MPA_PER_PA: f64 = 1e-6;
 
-/// A material as it stands in the deck.
+/// A material as written in the deck.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Card {
-    /// Name of its element set and of itself.
+    /// Name of the material and of its element set.
     pub(super) name: String,
-    /// Its keyword with parameters, without the asterisk.
+    /// The keyword with parameters, without the asterisk.
     pub(super) keyword: String,
-    /// The lines under it, eight numbers at most on each.
+    /// The lines under the keyword, with at most eight numbers each.
     pub(super) lines: Vec<String>,
 }
 
-/// The material with this number; what the card does not say as meant goes to `departures`.
+/// The card of a material. Everything that the card cannot express exactly is added to
+/// `departures`.
 pub(super) fn card(
     number: usize,
     material: &Material,
@@ -36,7 +38,8 @@ pub(super) fn card(
             "the tension at rest of layer \"{name}\" is left out"
         ));
     }
-    // All that CalculiX has for hyperelastic solids is time-independent: a press so slow that all has relaxed.
+    // CalculiX has only time-independent laws for hyperelastic solids, so the card describes the
+    // fully relaxed material, as in a very slow press.
     let (mut shear_scale, mut bulk_scale) = (1.0, 1.0);
     if let Some(prony) = &material.prony {
         notes.push(format!(
@@ -119,7 +122,7 @@ fn ogden(terms: &[OgdenTerm], to_mpa: f64, bulk: f64) -> (String, Vec<f64>) {
     hyperelastic(&format!("OGDEN, N={n}"), &constants, bulk, n)
 }
 
-/// The keyword, and the constants followed by `n_volumetric` numbers D.
+/// Returns the keyword, and the constants followed by `n_volumetric` numbers D.
 fn hyperelastic(
     law: &str,
     constants: &[f64],
@@ -132,13 +135,13 @@ fn hyperelastic(
     (format!("HYPERELASTIC, {law}"), numbers)
 }
 
-/// Ten digits each: eight such numbers keep to the 132 characters of a line.
+/// Formats numbers with ten digits, so that eight of them fit into the 132 characters of a line.
 fn line(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|x| format!("{x:.9e}")).collect();
     numbers.join(",")
 }
 
-/// A name of letters, digits and `_`.
+/// The name with only letters, digits and `_`.
 fn plain(name: &str) -> String {
     let plain = name.chars().take(40).map(|c| {
         if c.is_ascii_alphanumeric() {

@@ -21,10 +21,10 @@ use super::{Element, Export};
 
 /// The mesh of a deck.
 #[derive(Debug)]
-pub(super) struct Mesh {
-    /// Positions: the body's nodes, then the middles of edges. m
+pub(super) struct DeckMesh {
+    /// Positions: the body's nodes, then the middles of edges, m.
     pub(super) nodes: Vec<Vec3>,
-    /// For each middle node the ends of its edge.
+    /// For each middle node, the two ends of its edge.
     pub(super) ends: Vec<[usize; 2]>,
     /// Nodes of each element in CalculiX's order.
     pub(super) elements: Vec<Vec<usize>>,
@@ -32,7 +32,7 @@ pub(super) struct Mesh {
     pub(super) material: Vec<usize>,
 }
 
-impl Mesh {
+impl DeckMesh {
     pub(super) fn build(export: &Export<'_>) -> Self {
         let body = export.body;
         let middles = (export.element == Element::C3d15).then(|| Middles::new(export));
@@ -69,7 +69,7 @@ impl Mesh {
         }
     }
 
-    /// The marked nodes of the body, and the middles of edges both of whose ends are marked.
+    /// The marked nodes of the body, and the middles of edges with both ends marked.
     pub(super) fn with_middles(&self, is_marked: &[bool]) -> Vec<usize> {
         let n = is_marked.len();
         let nodes = (0..n).filter(|&node| is_marked[node]);
@@ -80,7 +80,8 @@ impl Mesh {
     }
 }
 
-/// The numbering of the middles of edges: first those in the levels, edge by edge, then the vertical ones.
+/// Numbering of the middles of edges: first the edges in the levels, edge by edge, then the
+/// vertical ones.
 struct Middles<'a> {
     export: &'a Export<'a>,
     edges: Vec<[u32; 2]>,
@@ -107,7 +108,8 @@ impl<'a> Middles<'a> {
         ends
     }
 
-    /// The middle nodes of the prism under triangle `t`: of its lower edges, its upper, its vertical ones.
+    /// The middle nodes of the prism under triangle `t`: of its lower, upper and vertical edges, in
+    /// this order.
     fn of_prism(&self, t: usize, interval: usize) -> impl Iterator<Item = usize> {
         let body = self.export.body;
         let [a, b, c] = body.skin.triangles[t];

@@ -1,10 +1,13 @@
-//! A layered body and its press as an input deck for CalculiX, so that anyone can check our forces with another solver.
+//! Writes a layered body and its press as an input deck for CalculiX, to check the forces with
+//! another solver.
 //!
-//! Lengths in the deck are millimetres, forces newtons, stresses megapascals. Nodes of the body keep their order, numbered
-//! from 1; middle nodes of edges follow. The same prisms carry the same materials and supports as in our own model, but the
-//! element is CalculiX's, so both agree only as far as both meshes are fine enough.
+//! Lengths in the deck are in millimetres, forces in newtons, stresses in megapascals. Nodes of the
+//! body keep their order, numbered from 1; the middle nodes of edges follow. Prisms, materials and
+//! supports are those of Palpa's model, but the element is CalculiX's, so the forces agree only as
+//! far as both meshes are fine enough.
 //!
-//! What CalculiX cannot say is a *departure*: the deck is refused, unless the caller takes the nearest that it can say.
+//! A feature that CalculiX cannot express is a *departure*. With a departure the deck is refused,
+//! unless the caller accepts the nearest feature that CalculiX has.
 
 mod material;
 mod mesh;
@@ -23,41 +26,42 @@ use palpa_fem::lump::Lump;
 use palpa_mesh::{LayeredBody, Vec3};
 
 use self::material::{Card, card};
-use self::mesh::Mesh;
+use self::mesh::DeckMesh;
 use self::sets::Sets;
 
-/// The element that a prism becomes.
+/// The CalculiX element used for a prism.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Element {
-    /// Quadratic, 15 nodes: CalculiX's own answer at its best
+    /// Quadratic, 15 nodes: the most accurate
     #[default]
     C3d15,
-    /// Linear, 6 nodes: small, but much too stiff where tissue keeps its volume
+    /// Linear, 6 nodes: a small file, but much too stiff for nearly incompressible tissue
     C3d6,
 }
 
-/// What is exported.
+/// The input of an export.
 #[derive(Debug, Clone, Copy)]
 pub struct Export<'a> {
     /// The body at rest.
     pub body: &'a LayeredBody,
-    /// Its materials: of the i-th layer the i-th, and those that the lumps name.
+    /// Materials: entry i for layer i, then those that the lumps refer to.
     pub materials: &'a [Material],
-    /// Its lumps; where two overlap, the later one counts. A prism is a lump's if its middle is.
+    /// Lumps; where two overlap, the later one counts. A prism belongs to a lump if its middle
+    /// does.
     pub lumps: &'a [Lump],
-    /// What holds it.
+    /// Supports of the body.
     pub supports: &'a Supports,
-    /// Nodes that move with the tool; they are held by nothing else.
+    /// Nodes that move with the tool; nothing else holds them.
     pub patch: &'a [usize],
-    /// How far the tool moves, straight. m
+    /// Straight travel of the tool, m.
     pub travel: Vec3,
-    /// Results on the way, equally spaced, at least 1.
+    /// Number of results along the travel, equally spaced; at least 1.
     pub n_results: usize,
-    /// What a prism becomes.
+    /// Element type for the prisms.
     pub element: Element,
-    /// Whether the nearest is good enough where CalculiX cannot say what is meant.
+    /// Whether to write the nearest feature where CalculiX cannot express the exact one.
     pub is_approximate: bool,
-    /// Lines of comment on top.
+    /// Comment lines at the top of the deck.
     pub title: &'a [String],
 }
 
@@ -65,22 +69,22 @@ pub struct Export<'a> {
 #[derive(Debug)]
 pub struct Deck<'a> {
     export: Export<'a>,
-    mesh: Mesh,
+    mesh: DeckMesh,
     cards: Vec<Card>,
     sets: Sets,
     is_linear: bool,
-    /// Where the deck is not what was meant, or what to know beside it.
+    /// Notes for the user: departures of the deck, and other facts about it.
     pub notes: Vec<String>,
 }
 
-/// A material of the deck and where it is.
+/// A material of the deck and its elements.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Section {
-    /// Name of its element set and of its material.
+    /// Name of the material and of its element set.
     pub name: String,
-    /// The law as CalculiX calls it.
+    /// CalculiX's name of the law.
     pub law: String,
-    /// Number of its elements.
+    /// Number of elements with this material.
     pub n_elements: usize,
 }
 
@@ -88,8 +92,8 @@ impl<'a> Deck<'a> {
     /// Makes the deck.
     ///
     /// # Errors
-    /// When CalculiX has no law like one of the materials, or has one like it only nearly and that is not good enough; when
-    /// nothing moves; when a layer or lump has no material.
+    /// If CalculiX has no law like that of a material, or only an approximate one and
+    /// `is_approximate` is false; if nothing moves; if a layer or lump has no material.
     pub fn build(export: &Export<'a>) -> anyhow::Result<Self> {
         if export.patch.is_empty() || export.travel.norm() == 0.0 || export.n_results == 0 {
             bail!("nothing is pressed: give nodes that move, a way to go and at least one result");
@@ -110,12 +114,12 @@ impl<'a> Deck<'a> {
         }
         if !departures.is_empty() && !export.is_approximate {
             bail!(
-                "CalculiX cannot say all of this scene: {}. With --approximate this is done and noted in the deck",
+                "CalculiX cannot represent all of this scene: {}. With --approximate, Palpa writes the nearest and notes it in the deck",
                 departures.join("; ")
             );
         }
         notes.extend(departures);
-        let mesh = Mesh::build(export);
+        let mesh = DeckMesh::build(export);
         for lump in export.lumps {
             if !mesh.material.contains(&lump.material()) {
                 notes.push(format!(
@@ -136,7 +140,7 @@ impl<'a> Deck<'a> {
         })
     }
 
-    /// Number of nodes, those in the middle of edges included.
+    /// Number of nodes, including the middle nodes of edges.
     pub fn n_nodes(&self) -> usize {
         self.mesh.nodes.len()
     }
@@ -146,12 +150,12 @@ impl<'a> Deck<'a> {
         self.mesh.elements.len()
     }
 
-    /// Number of nodes that move with the tool, those in the middle of edges included.
+    /// Number of nodes that move with the tool, including the middle nodes of edges.
     pub fn n_patch_nodes(&self) -> usize {
         self.sets.patch.len()
     }
 
-    /// The materials in their order, and how much of the body each is.
+    /// The materials in their order, with the number of elements of each.
     pub fn sections(&self) -> Vec<Section> {
         let count = |i| self.mesh.material.iter().filter(|&&m| m == i).count();
         self.cards
@@ -168,13 +172,13 @@ impl<'a> Deck<'a> {
     /// Writes the deck.
     ///
     /// # Errors
-    /// When `out` cannot be written.
+    /// If `out` cannot be written.
     pub fn write(&self, out: &mut dyn io::Write) -> io::Result<()> {
         write::write(self, out)
     }
 }
 
-/// Whether the body is one of small strain, in which no law but the linear one may occur.
+/// Whether the body is computed at small strain. Then all laws must be linear.
 fn is_linear(materials: &[Material]) -> anyhow::Result<bool> {
     let linear = |m: &&Material| matches!(m.law, Law::Linear(_));
     let first = materials.iter().find(linear);

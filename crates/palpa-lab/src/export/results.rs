@@ -1,4 +1,4 @@
-//! What CalculiX has computed from a deck.
+//! Reads the results that CalculiX computed from a deck.
 
 use palpa_mesh::Vec3;
 
@@ -7,11 +7,12 @@ use palpa_mesh::Vec3;
 pub struct PatchForce {
     /// Share of the travel, 0 to 1.
     pub share: f64,
-    /// What holds the patch in its place. N
+    /// Force that holds the patch in its place, N.
     pub force: Vec3,
 }
 
-/// The forces on the patch in the text of a `.dat` file, in its order. What is not such a force is passed over.
+/// The forces on the patch in the text of a `.dat` file, in the order of the file. Other content is
+/// skipped.
 pub fn patch_forces(dat: &str) -> Vec<PatchForce> {
     const BEFORE: &str = "total force (fx,fy,fz) for set PATCH and time";
     let mut forces = Vec::new();
@@ -32,7 +33,7 @@ pub fn patch_forces(dat: &str) -> Vec<PatchForce> {
     forces
 }
 
-/// A number as Fortran writes it: without the E where the exponent has three digits.
+/// Reads a number as Fortran writes it: without the E if the exponent has three digits.
 fn number(text: &str) -> Option<f64> {
     let text = text.trim();
     text.parse().ok().or_else(|| {

@@ -1,41 +1,41 @@
-//! Sets of nodes: which move with the tool, stay, or stay in a plane.
+//! Sets of nodes: those that move with the tool, those that stay, and those that stay in a plane.
 //!
-//! The middle of an edge does what both of its ends do.
+//! The middle node of an edge belongs to a set if both ends do.
 
 use palpa_mesh::Vec3;
 
 use super::Export;
-use super::mesh::Mesh;
+use super::mesh::DeckMesh;
 
-/// Below this sine between two normals they are taken for one.
+/// Two normals with a smaller sine between them count as the same.
 const PARALLEL: f64 = 1e-6;
 
-/// Sets of nodes, numbered from 0, and directions. All are disjoint, except `base` and `cut_faces`, which are for the
-/// reader's own use.
+/// Sets of nodes, numbered from 0, and directions. All are disjoint, except `base` and `cut_faces`,
+/// which are for the user of the deck.
 #[derive(Debug)]
 pub(super) struct Sets {
     /// Nodes that move with the tool.
     pub(super) patch: Vec<usize>,
     /// Nodes that stay.
     pub(super) fixed: Vec<usize>,
-    /// Nodes that keep some directions, by these directions.
+    /// Nodes that cannot move along some directions, grouped by these directions.
     pub(super) sliding: Vec<Sliding>,
     /// The rigid base.
     pub(super) base: Vec<usize>,
-    /// Each face at which the body was cut from the rest.
+    /// Nodes of each cut face.
     pub(super) cut_faces: Vec<Vec<usize>>,
 }
 
 /// Nodes that cannot move along one or two directions.
 #[derive(Debug)]
 pub(super) struct Sliding {
-    /// These directions: unit vectors at right angles.
+    /// The held directions: unit vectors at right angles.
     pub(super) held: Vec<Vec3>,
     pub(super) nodes: Vec<usize>,
 }
 
 impl Sets {
-    pub(super) fn build(export: &Export<'_>, mesh: &Mesh) -> Self {
+    pub(super) fn build(export: &Export<'_>, mesh: &DeckMesh) -> Self {
         let body = export.body;
         let n = body.n_nodes();
         let marked = |nodes: &mut dyn Iterator<Item = usize>| {
@@ -91,8 +91,8 @@ impl Sets {
     }
 }
 
-/// For each node the normals of the planes that it stays in.
-fn all_normals(export: &Export<'_>, mesh: &Mesh) -> Vec<Vec<Vec3>> {
+/// For each node, the normals of the planes in which it stays.
+fn all_normals(export: &Export<'_>, mesh: &DeckMesh) -> Vec<Vec<Vec3>> {
     let mut normals = vec![Vec::new(); mesh.nodes.len()];
     for &(node, normal) in &export.supports.planes {
         normals[node].push(normal);

@@ -8,15 +8,16 @@ use super::sets::Sliding;
 use super::{Deck, Element};
 
 const MM_PER_M: f64 = 1e3;
-/// Numbers of nodes or elements on a line; CalculiX takes 16.
+/// Node or element numbers per line; CalculiX accepts 16.
 const PER_LINE: usize = 12;
-/// Lines longer than this are folded in comments; CalculiX reads 132 characters.
+/// Comment lines longer than this are folded; CalculiX reads 132 characters.
 const COMMENT_WIDTH: usize = 110;
-/// A direction this near to an axis is that axis.
+/// Largest difference at which a direction counts as an axis.
 const ALONG_AXIS: f64 = 1e-12;
-/// Travel of the tool in one increment, m: CalculiX takes shorter ones by itself where it must.
+/// Largest travel of the tool in one increment, m. CalculiX chooses shorter increments by itself if
+/// needed.
 const LARGEST_INCREMENT: f64 = 1e-3;
-/// The shortest that it takes, as a share of the whole travel.
+/// Smallest increment that CalculiX may choose, as a share of the whole travel.
 const SMALLEST_INCREMENT: f64 = 1e-6;
 
 pub(super) fn write(deck: &Deck<'_>, out: &mut dyn Write) -> io::Result<()> {
@@ -46,7 +47,7 @@ pub(super) fn write(deck: &Deck<'_>, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn header(deck: &Deck<'_>, out: &mut dyn Write) -> io::Result<()> {
-    // Plus zero: no component is "minus nothing".
+    // Adding zero turns -0 into 0.
     let direction = deck.export.travel.normalize().add_scalar(0.0);
     let (x, y, z) = (direction.x, direction.y, direction.z);
     let units = "units: mm, N, MPa".to_owned();
@@ -128,7 +129,7 @@ fn materials(deck: &Deck<'_>, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Nodes that keep some directions: along the axes as they are, else in a frame of their own.
+/// Writes the supports of sliding nodes: along the global axes if possible, else in a local frame.
 fn slide(out: &mut dyn Write, number: usize, group: &Sliding) -> io::Result<()> {
     let axis_of = |h: &Vec3| (0..3).find(|&i| (h[i].abs() - 1.0).abs() < ALONG_AXIS);
     let axes: Option<Vec<usize>> = group.held.iter().map(axis_of).collect();
@@ -166,7 +167,8 @@ fn step(deck: &Deck<'_>, out: &mut dyn Write) -> io::Result<()> {
         out,
         "*STATIC\n{increment:.12},1.,{SMALLEST_INCREMENT},{increment:.12}"
     )?;
-    // A residual of 0.1 % of the mean force and a correction of 0.5 %: Newton's last step leaves far less.
+    // Allows a residual of 0.1 % of the mean force and a correction of 0.5 %; Newton's last step
+    // leaves far less.
     writeln!(out, "*CONTROLS, PARAMETERS=FIELD\n1e-3,5e-3")?;
     writeln!(out, "*BOUNDARY")?;
     for axis in 0..3 {

@@ -1,4 +1,5 @@
-//! What the method claims beside its figures: parts of a step converge, and Euler alone is slow and diverges.
+//! Claims of the method beside its figures: splitting a step into parts converges, and explicit
+//! Euler alone is slow and diverges.
 
 use palpa_mesh::Vec3;
 use palpa_springs::{
@@ -66,18 +67,21 @@ pub fn convergence() -> Result<Vec<Convergence>, SpringError> {
 pub struct EulerRow {
     /// Step size as a fraction of the largest that is stable at rest.
     pub step_size: f64,
-    /// The shortest pull (of the uniform body, in steps of 10 mm up to 160 mm) at which it diverges, if any does.
+    /// The shortest pull (of the uniform body, in steps of 10 mm up to 160 mm) at which the method
+    /// diverges, if any.
     pub diverges_at_mm: Option<f64>,
-    /// Whether the combined method bears that pull.
+    /// Whether the combined method stays stable at that pull.
     pub is_borne_by_combined: Option<bool>,
-    /// Steps until the base feels 90 % of a push of 1 mm: uniform, hard middle, hard bottom. The combined method needs 1.
+    /// Steps until the base feels 90 % of a push of 1 mm: uniform, hard middle, hard bottom. The
+    /// combined method needs 1.
     pub steps_to_cross: [Option<usize>; 3],
 }
 
 /// Step sizes of [`euler`], as fractions of the largest that is stable at rest.
 pub const EULER_STEP_SIZES: [f64; 4] = [0.25, 0.5, 0.8, 0.95];
 
-/// Pulls, for one step size, until explicit Euler diverges, and counts steps until a force has crossed.
+/// For one step size, pulls until explicit Euler diverges, and counts the steps until a force has
+/// crossed the body.
 ///
 /// # Errors
 /// If a model cannot be built.
@@ -120,7 +124,7 @@ pub fn combined_steps_to_cross() -> Result<[Option<usize>; 3], SpringError> {
     Ok([a?, b?, c?])
 }
 
-/// Pulls outward in 40 steps and holds for 500.
+/// Whether the model stays stable while it is pulled outward in 40 steps and held for 500.
 fn is_borne(model: &SpringModel, distance: f64, params: &StepParams) -> bool {
     let (mut state, mut ws) = (SpringState::new(model), Workspace::new(model));
     (0..540).all(|i| {

@@ -1,9 +1,10 @@
-//! The same layered bodies as a continuum: from which push on is a hard layer felt?
+//! The same layered bodies as a continuum: at which push is a hard layer felt?
 //!
-//! Neo-Hookean blocks with the thesis's layers, the moduli in the ratio of its springs, under a bonded disc: one as large as
-//! the patch of skin that a node of the thesis stands for, and one like a fingertip. Elastic forces are in proportion to the
-//! modulus, so that the soft one is free; with that of the thesis's springs (`docs/theory/spring_stiffness.md`) nothing
-//! could be felt.
+//! Neo-Hookean blocks with the thesis's layers, under a bonded disc. The moduli have the ratio of
+//! the thesis's springs. One disc is as large as the patch of skin that a node of the thesis stands
+//! for, the other is like a fingertip. Elastic forces are proportional to the modulus, so the soft
+//! modulus can be chosen freely. With the modulus of the thesis's springs
+//! (`docs/theory/spring_stiffness.md`) nothing could be felt.
 
 use palpa_fem::law::NeoHookean;
 use palpa_fem::{
@@ -16,28 +17,29 @@ use serde::Serialize;
 
 use super::{Body, HARD, LEVEL_SPACING, SOFT};
 
-/// Young's modulus of the soft layers, Pa: that of soft fat.
+/// Young's modulus of the soft layers, Pa: the value of soft fat.
 const SOFT_YOUNG: f64 = 1e3;
 /// Poisson's ratio of all layers.
 const POISSON: f64 = 0.45;
-/// Share of the pair's mean deviator: what a scene has by default.
+/// Share of the pair's mean deviator: the default of a scene.
 const ALPHA: f64 = 0.8;
-/// Radius of the block, m: twice its depth, so that its free side is hardly felt.
+/// Radius of the block, m: twice its depth, so that the free side has little effect.
 const HALF_WIDTH: f64 = 0.24;
-/// A layer counts as felt from where the body is this many times as stiff (force over push) as the uniform one.
-/// Differences of stiffness of 4 to 10 % are told apart in the best of conditions (Gurari, Okamura & Kuchenbecker 2017,
-/// doi 10.1371/journal.pone.0178605), of 8 to 23 % in older work: the first for the attentive, the second for everyone.
+/// A layer counts as felt if the body is this many times as stiff (force over push) as the uniform
+/// one. Differences of stiffness of 4 to 10 % are told apart in the best conditions (Gurari,
+/// Okamura & Kuchenbecker 2017, doi 10.1371/journal.pone.0178605), and of 8 to 23 % in older work.
+/// The first ratio is for attentive people, the second for everyone.
 pub const FELT_RATIOS: [f64; 2] = [1.1, 1.23];
 
-/// A disc, and how deep it is pushed.
+/// A disc and its deepest push.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// What it is like.
+    /// Name of the disc.
     pub name: &'static str,
-    /// Its radius. m
+    /// Radius, m.
     pub radius: f64,
-    /// The deepest push, mm: beyond, the tissue at the disc's edge is squeezed so much that two meshes no longer agree
-    /// within 5 %.
+    /// The deepest push, mm. Beyond it, the tissue at the disc's edge is squeezed so much that two
+    /// meshes differ by more than 5 %.
     pub deepest_mm: usize,
 }
 
@@ -46,7 +48,7 @@ pub fn discs() -> [Disc; 2] {
     [
         Disc {
             name: "a node's patch",
-            // The area of skin that belongs to a node.
+            // The disc has the area of skin that belongs to a node.
             radius: LEVEL_SPACING / std::f64::consts::PI.sqrt(),
             deepest_mm: 35,
         },
@@ -58,25 +60,25 @@ pub fn discs() -> [Disc; 2] {
     ]
 }
 
-/// How fine the block is. Lengths in radii of the disc.
+/// Resolution of the block. Lengths in radii of the disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
-    /// Edges under the disc.
+    /// Edge length under the disc.
     pub spacing: f64,
-    /// By how much edges lengthen per length beyond the disc.
+    /// Growth of the edge length beyond the disc, per length.
     pub growth: f64,
     /// Height of the uppermost interval.
     pub first_height: f64,
 }
 
 impl Resolution {
-    /// What the report shows.
+    /// Resolution of the report.
     pub const FULL: Self = Self {
         spacing: 0.334,
         growth: 0.6,
         first_height: 0.35,
     };
-    /// For a quick look.
+    /// Resolution for a quick look.
     pub const COARSE: Self = Self {
         spacing: 0.5,
         growth: 1.0,
@@ -91,47 +93,48 @@ pub struct Continuum {
     pub soft_young_pa: f64,
     /// Young's modulus of the hard layer.
     pub hard_young_pa: f64,
-    /// Poisson's ratio of all.
+    /// Poisson's ratio of all layers.
     pub poisson: f64,
-    /// Radius of the block, whose side is free.
+    /// Radius of the block; its side is free.
     pub block_radius_mm: f64,
-    /// A layer is felt from where the body is so many times as stiff as the uniform one: by the attentive, by everyone.
+    /// Stiffness ratios to the uniform body at which a layer is felt: by attentive people, by
+    /// everyone.
     pub felt_ratios: [f64; 2],
-    /// What was pressed until an interruption.
+    /// The discs; after an interruption, those pressed until then.
     pub discs: Vec<PressedDisc>,
 }
 
 /// The bodies under one disc.
 #[derive(Debug, Clone, Serialize)]
 pub struct PressedDisc {
-    /// What the disc is like.
+    /// Name of the disc.
     pub name: &'static str,
-    /// Its radius.
+    /// Radius of the disc.
     pub radius_mm: f64,
     /// Nodes that can move.
     pub nodes: usize,
-    /// Uniform, hard middle, hard bottom.
-    pub bodies: Vec<Pressed>,
+    /// The bodies: uniform, hard middle, hard bottom.
+    pub bodies: Vec<PressedBody>,
 }
 
-/// One body, pressed as deep as it goes.
+/// One body, pressed as deep as possible.
 #[derive(Debug, Clone, Serialize)]
-pub struct Pressed {
-    /// Which.
+pub struct PressedBody {
+    /// The body.
     pub body: Body,
-    /// Force on the disc, `[mm, N]`.
+    /// Push and force on the disc, `[mm, N]`.
     pub curve: Vec<[f64; 2]>,
     /// Why the curve ends.
     pub ended_by: String,
-    /// Share of the upper layer's thickness that is left under the disc's middle at the end.
+    /// Remaining share of the upper layer's thickness under the disc's middle at the end.
     pub upper_layer_left: f64,
-    /// Stiffness (force over push) over that of the uniform body, `[mm, 1]`.
+    /// Stiffness (force over push) relative to the uniform body, `[mm, 1]`.
     pub stiffness_ratio: Vec<[f64; 2]>,
-    /// Slope of the force over that of the uniform body in each millimetre, `[mm, 1]`. It shows earlier that a layer comes
-    /// near, and is rougher.
+    /// Slope of the force relative to the uniform body in each millimetre, `[mm, 1]`. It shows a
+    /// layer earlier than the stiffness does, but is noisier.
     pub slope_ratio: Vec<[f64; 2]>,
-    /// The push from which on the layer is felt, for each of [`FELT_RATIOS`]: 0 from the first touch on, none if not as
-    /// deep as it went.
+    /// The push at which the layer is felt, mm, for each of [`FELT_RATIOS`]: 0 if it is felt from
+    /// the first touch, `None` if it is not felt within the depth of the press.
     pub felt_from_mm: [Option<f64>; 2],
 }
 
@@ -141,8 +144,8 @@ pub fn n_steps(discs: &[Disc]) -> usize {
 }
 
 impl Continuum {
-    /// Presses the three bodies under each disc, a millimetre a step. `is_stopped` is asked before each step and ends the
-    /// work; a body that was not finished is left out.
+    /// Presses the three bodies under each disc, one millimetre per step. `is_stopped` is called
+    /// before each step and ends the work if it returns true; an unfinished body is left out.
     ///
     /// # Errors
     /// If a model cannot be built.
@@ -174,7 +177,7 @@ impl Continuum {
                 };
                 pressed_disc.nodes = model.n_free_nodes();
                 let uniform = pressed_disc.bodies.first();
-                let uniform = uniform.map_or(&pressed.curve, |u: &Pressed| &u.curve);
+                let uniform = uniform.map_or(&pressed.curve, |u: &PressedBody| &u.curve);
                 let (stiffness_ratio, slope_ratio) = ratios(&pressed.curve, uniform);
                 pressed.felt_from_mm = FELT_RATIOS.map(|felt| felt_from(&stiffness_ratio, felt));
                 (pressed.stiffness_ratio, pressed.slope_ratio) = (stiffness_ratio, slope_ratio);
@@ -226,20 +229,20 @@ fn model(body: Body, layered: &LayeredBody) -> Result<Model, FemError> {
     )
 }
 
-/// Presses one body in steps of a millimetre; none if it was stopped.
+/// Presses one body in steps of a millimetre; `None` if it was stopped.
 fn press(
     body: Body,
     model: &Model,
     disc: &Disc,
     patch: &[usize],
     is_stopped: &mut impl FnMut() -> bool,
-) -> Option<Pressed> {
+) -> Option<PressedBody> {
     let (mut state, mut ws) = (State::new(model), Workspace::new(model));
     let held = |mm: usize| -> Vec<(usize, Vec3)> {
         let down = Vec3::new(0.0, 0.0, -1e-3 * mm as f64);
         patch.iter().map(|&node| (node, down)).collect()
     };
-    let mut pressed = Pressed {
+    let mut pressed = PressedBody {
         body,
         curve: vec![[0.0, 0.0]],
         ended_by: "the deepest push tried".into(),
@@ -269,7 +272,7 @@ fn press(
             break;
         }
         pressed.curve.push([mm as f64, report.held_force.z]);
-        // The middle is the first vertex of the block.
+        // The middle of the disc is the first vertex of the block.
         let sunk = |level: usize| state.displacements[layered.node(0, level)].z;
         pressed.upper_layer_left = 1.0 + (sunk(0) - sunk(n_upper)) / LEVEL_SPACING;
     }
@@ -283,7 +286,7 @@ fn bonded(held: &[(usize, Vec3)]) -> Load<'_> {
     }
 }
 
-/// A failed step in words.
+/// Text for a failed step.
 fn ending(outcome: Outcome) -> String {
     let place = |[x, y, z]: [f64; 3]| {
         let (r, depth) = (x.hypot(y) * 1e3, -z * 1e3);
@@ -297,7 +300,8 @@ fn ending(outcome: Outcome) -> String {
     }
 }
 
-/// Force over push at each millimetre, and slope within each, over those of the uniform body.
+/// Force over push at each millimetre and slope within each millimetre, both relative to the
+/// uniform body.
 fn ratios(curve: &[[f64; 2]], uniform: &[[f64; 2]]) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
     let rise = |w: &[[f64; 2]]| w[1][1] - w[0][1];
     let both = || curve.windows(2).zip(uniform.windows(2));
@@ -309,7 +313,7 @@ fn ratios(curve: &[[f64; 2]], uniform: &[[f64; 2]]) -> (Vec<[f64; 2]>, Vec<[f64;
     )
 }
 
-/// The push at which a ratio first comes to a level; 0 if it is there at the first point.
+/// The push at which a ratio first reaches `level`; 0 if the first point reaches it.
 fn felt_from(ratios: &[[f64; 2]], level: f64) -> Option<f64> {
     let i = ratios.iter().position(|[_, ratio]| *ratio >= level)?;
     let Some(before) = i.checked_sub(1) else {
@@ -346,7 +350,7 @@ mod tests {
             assert!(first(disc, 1) > first(disc, 2) && first(disc, 2) > 1.02);
         }
         assert!(first(0, 1) > first(1, 1) && first(0, 2) > first(1, 2));
-        // The deep layer is felt at once under the wide disc, and not so soon under the small one.
+        // The deep layer is felt at once under the wide disc, but not under the small one.
         assert_eq!(continuum.discs[0].bodies[2].felt_from_mm[0], Some(0.0));
         assert_eq!(continuum.discs[1].bodies[2].felt_from_mm[0], None);
     }

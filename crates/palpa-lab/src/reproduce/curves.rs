@@ -1,4 +1,5 @@
-//! Figures 4.2 to 4.4: force against the depth of the push, for the three bodies, over all that the text leaves open.
+//! Figures 4.2 to 4.4: force against the depth of the push for the three bodies, for every reading
+//! of the text.
 
 use palpa_mesh::Vec3;
 use palpa_springs::{
@@ -10,19 +11,20 @@ use serde::Serialize;
 use super::fit::{Knee, knee, line};
 use super::{Body, Shape};
 
-/// How deep the curves go, and their points, one every millimetre.
+/// Depth of the curves, mm, with one point per millimetre.
 pub const DEPTH_MM: usize = 120;
-/// The thickness of the slices in which slopes are compared.
+/// Thickness of the slices in which slopes are compared, mm.
 pub const SLICE_MM: usize = 10;
-/// Parts of each millimetre: the error of the path is then well below what is told apart here (`claims::convergence`).
+/// Parts of each millimetre. With them the error of the path is well below the differences compared
+/// here (`claims::convergence`).
 const SUBSTEPS: usize = 4;
 
-/// One reading of what the text leaves open.
+/// One reading of the details that the text leaves open.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// Columns along each side of the patch: 3 or 4.
     pub n: usize,
-    /// Distance between columns, in metres.
+    /// Distance between columns, m.
     pub lateral_spacing: f64,
     /// Material of in-level bars between two layers.
     pub interface_bars: InterfaceBars,
@@ -30,7 +32,8 @@ pub struct Reading {
     pub is_corrected: bool,
 }
 
-/// The reading that the main figures show: the spacing of the levels in all directions, in-level bars of the layer below.
+/// The reading of the main figures: the spacing of the levels in all directions, and in-level bars
+/// of the layer below.
 pub const MAIN: Reading = Reading {
     n: 4,
     lateral_spacing: 0.040,
@@ -38,7 +41,8 @@ pub const MAIN: Reading = Reading {
     is_corrected: true,
 };
 
-/// All readings: both patches, four spacings, three rules, with and without correction.
+/// All readings: both patches, four spacings, three rules for in-level bars, with and without
+/// correction.
 pub fn readings() -> Vec<Reading> {
     let mut all = Vec::new();
     for n in [3, 4] {
@@ -62,10 +66,10 @@ pub fn readings() -> Vec<Reading> {
     all
 }
 
-/// A force curve: `[mm, N]`, from rest on.
+/// A force curve: depth and force, `[mm, N]`, starting at rest.
 pub type Curve = Vec<[f64; 2]>;
 
-/// Pushes the held node straight down, a millimetre a step.
+/// Pushes the held node straight down, one millimetre per step.
 ///
 /// The curve ends early if the method diverges.
 ///
@@ -126,7 +130,7 @@ fn slopes(curve: &Curve) -> Vec<f64> {
         .collect()
 }
 
-/// Slope of a layered curve over that of the uniform one, slice by slice.
+/// Slope of a layered curve relative to the uniform one, slice by slice.
 pub fn slope_ratio(layered: &Curve, uniform: &Curve) -> Vec<f64> {
     let pairs = slopes(layered).into_iter().zip(slopes(uniform));
     pairs.map(|(l, u)| l / u).collect()
@@ -135,9 +139,9 @@ pub fn slope_ratio(layered: &Curve, uniform: &Curve) -> Vec<f64> {
 /// The three curves of one reading, in the order of [`Body::ALL`].
 #[derive(Debug, Clone)]
 pub struct Curves {
-    /// What they are curves of.
+    /// The reading of these curves.
     pub reading: Reading,
-    /// Uniform, middle, bottom.
+    /// The curves: uniform, hard middle, hard bottom.
     pub bodies: [Curve; 3],
 }
 
@@ -154,7 +158,7 @@ impl Curves {
         })
     }
 
-    /// What the sweep says of them, for one depth range.
+    /// The row of the sweep for these curves in one depth range.
     pub fn row(&self, depth_mm: usize) -> SweepRow {
         let [uniform, middle, bottom] = &self.bodies;
         let knees = [uniform, middle, bottom].map(|c| knee_of(c, depth_mm));
@@ -196,17 +200,17 @@ pub struct SweepRow {
     pub depth_mm: usize,
     /// R² of a line through the uniform body's curve.
     pub uniform_r2: Option<f64>,
-    /// Knee of the uniform body: what is no effect of layers.
+    /// Knee of the uniform body, which is not an effect of layers.
     pub uniform_knee_mm: Option<f64>,
-    /// Slope after the knee over slope before.
+    /// Slope after the knee relative to the slope before it.
     pub uniform_slope_change: Option<f64>,
-    /// Knee with the hard middle; 40 in the thesis.
+    /// Knee with the hard middle, mm; 40 in the thesis.
     pub middle_knee_mm: Option<f64>,
-    /// See `uniform_slope_change`.
+    /// Slope after the knee relative to the slope before it.
     pub middle_slope_change: Option<f64>,
-    /// Knee with the hard bottom; 80 in the thesis.
+    /// Knee with the hard bottom, mm; 80 in the thesis.
     pub bottom_knee_mm: Option<f64>,
-    /// See `uniform_slope_change`.
+    /// Slope after the knee relative to the slope before it.
     pub bottom_slope_change: Option<f64>,
 }
 
@@ -221,16 +225,18 @@ mod tests {
         assert_eq!(uniform.len(), DEPTH_MM + 1);
         assert!(r2(uniform, 60).unwrap() > 0.99, "figure 4.2");
         assert!(r2(uniform, 120).unwrap() > 0.97);
-        // A deep hard layer is felt at once, not when the node comes to its depth; the nearer one more.
+        // A deep hard layer is felt at once, not only when the node reaches its depth; a nearer
+        // layer is felt more.
         let first = [middle, bottom].map(|curve| slope_ratio(curve, uniform)[0]);
         assert!(
             first[0] > 1.3 && first[1] > 1.1 && first[0] > first[1],
             "{first:?}"
         );
-        // The uniform body bends about as much as the layered ones do: its knee is the method's own.
+        // The curve of the uniform body bends about as much as the layered ones, so its knee comes
+        // from the method.
         let row = curves.row(DEPTH_MM);
         assert!(row.uniform_slope_change.unwrap() > 1.5);
-        // As in a first trial of the method: knees at 50 to 70 mm in either layered body.
+        // As in a first trial of the method, both layered bodies have knees at 50 to 70 mm.
         for knee in [row.middle_knee_mm, row.bottom_knee_mm] {
             assert!((50.0..70.0).contains(&knee.unwrap()), "{row:?}");
         }

@@ -1,4 +1,4 @@
-//! Straight lines and knees through force curves, by least squares.
+//! Least-squares fits of straight lines and knees to force curves.
 
 use serde::Serialize;
 
@@ -16,11 +16,11 @@ pub struct Line {
 /// Two straight lines that meet at a knee.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Knee {
-    /// Where they meet, in the unit of `x`.
+    /// Position of the knee, in the unit of `x`.
     pub at: f64,
-    /// Slope before.
+    /// Slope before the knee.
     pub slope_before: f64,
-    /// Slope after over slope before: 1 is no knee.
+    /// Slope after the knee relative to the slope before it; 1 means no knee.
     pub slope_change: f64,
     /// Share of the residual of one line that the second one removes, 0 to 1.
     pub gain: f64,
@@ -46,8 +46,8 @@ pub fn line(points: &[[f64; 2]]) -> Option<Line> {
 
 /// The best continuous pair of lines, `y = a + b x + c max(0, x − knee)`.
 ///
-/// The knee is looked for from a tenth to nine tenths of the range, in steps of a 400th: nearer to the ends a segment has
-/// too few points to mean anything.
+/// The knee is searched from a tenth to nine tenths of the range, in steps of a 400th. Nearer to
+/// the ends, a segment has too few points.
 pub fn knee(points: &[[f64; 2]]) -> Option<Knee> {
     const N_TRIALS: usize = 400;
     let single = line(points)?;
@@ -81,7 +81,7 @@ pub fn knee(points: &[[f64; 2]]) -> Option<Knee> {
     best.map(|(_, knee)| knee)
 }
 
-/// The coefficients `[a, b, c]` for a given knee, and the sum of squares left.
+/// The coefficients `[a, b, c]` for a given knee, and the remaining sum of squares.
 fn bent(points: &[[f64; 2]], at: f64) -> Option<([f64; 3], f64)> {
     let basis = |x: f64| nalgebra::Vector3::new(1.0, x - at, (x - at).max(0.0));
     let mut normal = nalgebra::Matrix3::zeros();
@@ -116,7 +116,8 @@ mod tests {
 
     #[test]
     fn r2_is_that_of_the_textbook() {
-        // y = x² at 0..4: slope 4, R² = 0.9183 (Anscombe-like check by hand: Sxy² / (Sxx Syy) = 40² / (10 · 174)).
+        // y = x² at 0..4: slope 4, R² = 0.9183 (Anscombe-like check by hand: Sxy² / (Sxx Syy) = 40²
+        // / (10 · 174)).
         let points = [[0.0, 0.0], [1.0, 1.0], [2.0, 4.0], [3.0, 9.0], [4.0, 16.0]];
         let found = line(&points).unwrap();
         assert!((found.slope - 4.0).abs() < 1e-12);

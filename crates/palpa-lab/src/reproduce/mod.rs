@@ -1,7 +1,9 @@
-//! The evaluation of the reference method (seed thesis, chapter 4) side by side with ours.
+//! The evaluation of the reference method (seed thesis, chapter 4) side by side with Palpa's
+//! results.
 //!
-//! What the text leaves open (lateral spacing, material of in-level bars, depth range) is swept instead of chosen to look
-//! right; `docs/reproduce.md` tells what comes out.
+//! The text leaves some details open: lateral spacing, material of in-level bars, depth range. All
+//! readings are computed, instead of choosing the one that looks right. `docs/reproduce.md` reports
+//! the results.
 
 pub mod claims;
 pub mod continuum;
@@ -17,12 +19,12 @@ use palpa_springs::{
 };
 use serde::{Deserialize, Serialize};
 
-/// The soft and the hard spring of the thesis, 1 and 90 dyn/cm, in N/m.
+/// The soft spring of the thesis, N/m: 1 dyn/cm.
 pub const SOFT: f64 = 1.0e-3;
-/// See [`SOFT`].
+/// The hard spring of the thesis, N/m: 90 dyn/cm.
 pub const HARD: f64 = 90.0e-3;
 
-/// Depth between two levels, in metres.
+/// Depth between two levels, m.
 pub const LEVEL_SPACING: f64 = 0.040;
 
 /// The three bodies of figures 4.2 to 4.4, each with 4 levels.
@@ -38,7 +40,7 @@ pub enum Body {
 }
 
 impl Body {
-    /// All of them, in the order of the figures.
+    /// All bodies, in the order of the figures.
     pub const ALL: [Self; 3] = [Self::Uniform, Self::Middle, Self::Bottom];
 
     /// Spring stiffness in the three intervals from the skin down, in N/m.
@@ -50,7 +52,7 @@ impl Body {
         }
     }
 
-    /// Its name in pictures.
+    /// Name in plots.
     pub fn title(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",
@@ -59,7 +61,7 @@ impl Body {
         }
     }
 
-    /// Where the thesis sees the slope change, in mm.
+    /// Depth at which the thesis sees the slope change, mm; `None` for the uniform body.
     pub fn thesis_knee_mm(self) -> Option<f64> {
         match self {
             Self::Uniform => None,
@@ -76,7 +78,7 @@ pub struct Shape {
     pub columns: [usize; 2],
     /// Nodes per column.
     pub n_levels: usize,
-    /// Between neighbouring columns, in metres.
+    /// Distance between neighbouring columns, m.
     pub lateral_spacing: f64,
 }
 
@@ -89,7 +91,7 @@ impl Shape {
     /// The model of this shape, with the stiffness (N/m) of each interval from the skin down.
     ///
     /// # Errors
-    /// If the stiffnesses are not one for each interval.
+    /// If the number of stiffnesses is not the number of intervals.
     pub fn model(
         &self,
         stiffnesses: &[f64],

@@ -1,4 +1,4 @@
-//! The evaluation in one picture.
+//! Plot of the evaluation.
 
 use super::continuum::{Continuum, PressedDisc};
 use super::curves::Curves;
@@ -6,10 +6,10 @@ use super::report::{Figures, Report};
 use super::{Body, LEVEL_SPACING, Shape};
 use palpa_plot::{Axis, Band, Chart, Guide, PALETTE, Picture, Series, panels};
 
-/// Colours of the three bodies, everywhere.
+/// Palette indices of the three bodies, in all charts.
 const COLORS: [usize; 3] = [0, 1, 2];
 
-/// Draws what the report holds; `small` are the curves of the 3 × 3 patch.
+/// Draws the report; `small` are the curves of the 3 × 3 patch.
 pub fn draw(report: &Report, main: Option<&Curves>, small: Option<&Curves>) -> Picture {
     let mut charts = Vec::new();
     charts.extend(main.map(force_chart));
@@ -149,7 +149,7 @@ fn continuum_force_chart(continuum: &Continuum, disc: &PressedDisc) -> Chart {
 }
 
 fn continuum_ratio_chart(continuum: &Continuum, disc: &PressedDisc) -> Chart {
-    /// Far above all that is told apart: what is stiffer leaves the chart.
+    /// Upper end of the chart, far above the ratios that matter; larger ratios leave the chart.
     const STIFFEST: f64 = 2.0;
     let mut chart = Chart::new(
         Axis::linear("push [mm]").with_zero(),

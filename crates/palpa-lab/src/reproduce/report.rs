@@ -1,4 +1,4 @@
-//! The whole evaluation as one record: what `--json` prints and `reproduce.json` holds.
+//! The whole evaluation as one record; `--json` prints it and `reproduce.json` holds it.
 
 use serde::Serialize;
 
@@ -8,24 +8,25 @@ use super::curves::{Curves, SLICE_MM, SweepRow, knee_of, r2, slope_ratio};
 use super::speed::{self, SpeedRow};
 use super::{Body, fit::Knee};
 
-/// The evaluation. After an interruption it holds what was done until then.
+/// The evaluation. After an interruption it holds the parts completed until then.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// Whether all of it was done; not after an interruption.
+    /// Whether the evaluation is complete; false after an interruption.
     pub is_complete: bool,
     /// Figures 4.2 to 4.4.
     pub figures: Option<Figures>,
-    /// Parts of a step.
+    /// Convergence with the number of parts of a step.
     pub convergence: Vec<Convergence>,
     /// Explicit Euler alone.
     pub euler: Vec<EulerRow>,
-    /// Steps of the combined method until the base feels 90 % of a push: uniform, hard middle, hard bottom.
+    /// Steps of the combined method until the base feels 90 % of a push: uniform, hard middle, hard
+    /// bottom.
     pub combined_steps_to_cross: Option<[Option<usize>; 3]>,
     /// The same bodies as a continuum.
     pub continuum: Option<Continuum>,
     /// Table 4.2.
     pub table: Vec<SpeedRow>,
-    /// How the table is measured.
+    /// Description of how the table is measured.
     pub table_method: &'static str,
 }
 
@@ -64,30 +65,31 @@ pub struct UniformFigure {
     pub r2_60: Option<f64>,
     /// R² of a line from 0 to 120 mm.
     pub r2_120: Option<f64>,
-    /// Where two lines fit best. The body has no layers: this knee is the method's own.
+    /// Knee of the best fit by two lines. The body has no layers, so this knee comes from the
+    /// method.
     pub knee_mm: Option<f64>,
-    /// Slope after over slope before.
+    /// Slope after the knee relative to the slope before it.
     pub slope_change: Option<f64>,
-    /// Force on the tool, `[mm, N]`.
+    /// Depth and force on the tool, `[mm, N]`.
     pub curve: Vec<[f64; 2]>,
 }
 
 /// Figures 4.3 and 4.4, one hard interval.
 #[derive(Debug, Clone, Serialize)]
 pub struct LayeredFigure {
-    /// Where two lines fit best.
+    /// Knee of the best fit by two lines.
     pub knee_mm: Option<f64>,
-    /// Where the thesis sees the knee.
+    /// Knee according to the thesis.
     pub thesis_knee_mm: Option<f64>,
-    /// Slope after over slope before.
+    /// Slope after the knee relative to the slope before it.
     pub slope_change: Option<f64>,
-    /// The same over that of the uniform body: 1 is no effect of layers.
+    /// `slope_change` relative to that of the uniform body; 1 means no effect of layers.
     pub slope_change_to_uniform: Option<f64>,
-    /// Slope over that of the uniform body, in slices of 10 mm from the skin.
+    /// Slope relative to the uniform body, in slices of 10 mm from the skin.
     pub slope_ratio: Vec<f64>,
-    /// The middle of each slice.
+    /// Depth of the middle of each slice.
     pub slope_ratio_depth_mm: Vec<f64>,
-    /// Force on the tool, `[mm, N]`.
+    /// Depth and force on the tool, `[mm, N]`.
     pub curve: Vec<[f64; 2]>,
 }
 

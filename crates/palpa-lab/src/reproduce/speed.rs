@@ -9,15 +9,15 @@ use serde::Serialize;
 
 use super::{SOFT, Shape};
 
-/// How the figures are measured, for the report.
+/// Description for the report of how the rates are measured.
 pub const HOW: &str = "median thread-CPU time of one whole step on one core: assemble from the current positions, \
     factor, solve (n = 1), spring correction, forces; a push of 1 mm, 20 down and 20 up, again and again; naive is the \
     same step with a Gauss-Jordan inverse of the dense 3N x 3N matrix; thesis is its table 4.2 (Core2Duo E8400, 2009)";
 
-/// Above this many nodes one dense inverse takes minutes.
+/// Largest number of nodes for the dense inverse; above it, one inverse takes minutes.
 const NAIVE_LIMIT: usize = 343;
 
-/// The shapes of the table, with the rate in the thesis where it has one: columns, columns, levels.
+/// The shapes of the table (columns, columns, levels), with the rate in the thesis if it gives one.
 const SHAPES: [([usize; 3], Option<f64>); 10] = [
     ([3, 3, 3], Some(64.0)),
     ([3, 3, 4], Some(32.0)),
@@ -38,11 +38,11 @@ pub struct SpeedRow {
     pub nodes: usize,
     /// Nodes per column.
     pub levels: usize,
-    /// Ours, sparse Cholesky.
+    /// Steps per second with sparse Cholesky.
     pub steps_per_s: f64,
-    /// The dense inverse, here and now; none where it would take too long.
+    /// Steps per second with the dense inverse on this machine; `None` if it would take too long.
     pub naive_steps_per_s: Option<f64>,
-    /// The thesis's figure.
+    /// Steps per second in the thesis.
     pub thesis_steps_per_s: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ pub fn shapes(max_nodes: usize) -> Vec<(Shape, Option<f64>)> {
         .collect()
 }
 
-/// Measures one line of the table, for about `budget` and the same again for the naive inverse.
+/// Measures one line of the table: for about `budget`, and as long again for the dense inverse.
 ///
 /// # Errors
 /// If the model cannot be built.
@@ -91,7 +91,7 @@ pub fn measure(
 /// # Errors
 /// If the model cannot be built.
 pub fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f64, SpringError> {
-    // A batch is much longer than reading the clock takes.
+    // A batch is much longer than the time to read the clock.
     const BATCH: Duration = Duration::from_micros(200);
     const LEAST_BATCHES: usize = 3;
 
@@ -115,7 +115,7 @@ pub fn steps_per_s(shape: &Shape, solver: Solver, budget: Duration) -> Result<f6
             &params,
         )
     };
-    // The first step allocates and touches its memory.
+    // The first step allocates and touches its memory, so it is not measured.
     one();
     let began = ThreadTime::now();
     one();

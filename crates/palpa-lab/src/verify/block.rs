@@ -1,4 +1,4 @@
-//! Blocks and a cylinder at large strain (B1 to B5), against other codes.
+//! Blocks and a cylinder at large strain (B1 to B5), compared with other codes.
 
 use palpa_fem::law::NeoHookean;
 use palpa_fem::lump::{Lump, LumpShape};
@@ -15,16 +15,16 @@ use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
 /// Radius of the bonded disc and of the sphere, m.
 pub(crate) const RADIUS: f64 = 0.01;
-/// Radius within which the mesh under the sphere is not graded, m.
+/// Radius within which the mesh under the sphere has equal edges, m.
 const SPHERE_RING: f64 = 0.8 * RADIUS;
 /// Thickness of the block, m.
 const THICKNESS: f64 = 0.04;
 
 /// A mesh that is fine under the tool.
-pub(crate) struct Mesh {
-    /// Length of edges under the tool, m.
+pub(crate) struct BlockMesh {
+    /// Edge length under the tool, m.
     pub(crate) spacing: f64,
-    /// By how much edges lengthen per metre beyond it.
+    /// Growth of the edge length away from the tool, per metre of distance.
     pub(crate) growth: f64,
     /// First height (m) and growth of each layer's levels.
     pub(crate) levels: Vec<(f64, f64)>,
@@ -35,7 +35,7 @@ fn material(young: f64, nu: f64) -> Material {
     Material::new(format!("{:.0} kPa", young / 1e3), law)
 }
 
-/// Skin, fat and muscle.
+/// Layers of skin, fat and muscle with Poisson's ratio `nu`: thickness, m, and material.
 pub(crate) fn layered(nu: f64) -> Vec<(f64, Material)> {
     vec![
         (0.002, material(100e3, nu)),
@@ -48,7 +48,7 @@ fn homogeneous() -> Vec<(f64, Material)> {
     vec![(THICKNESS, material(30e3, 0.45))]
 }
 
-pub(crate) fn block(mesh: &Mesh, ring: f64) -> GradedBlock {
+pub(crate) fn block(mesh: &BlockMesh, ring: f64) -> GradedBlock {
     GradedBlock {
         outline: generate::Outline::Square,
         half_width: 0.05,
@@ -61,7 +61,7 @@ pub(crate) fn block(mesh: &Mesh, ring: f64) -> GradedBlock {
     }
 }
 
-fn body(block: &GradedBlock, mesh: &Mesh, layers: &[(f64, Material)]) -> LayeredBody {
+fn body(block: &GradedBlock, mesh: &BlockMesh, layers: &[(f64, Material)]) -> LayeredBody {
     let graded: Vec<GradedLayer> = layers
         .iter()
         .zip(&mesh.levels)
@@ -77,7 +77,8 @@ fn body(block: &GradedBlock, mesh: &Mesh, layers: &[(f64, Material)]) -> Layered
 /// The longest step of a bonded disc, m.
 const STEP: f64 = 1e-3;
 
-/// Presses a bonded disc through the depths, in steps of `longest` at most; gives the force at each.
+/// Presses a bonded disc through the depths, in steps of at most `longest`, m. Returns the force at
+/// each depth, N.
 fn disc_forces(
     pressed: &mut Pressed,
     patch: &[u32],
@@ -101,10 +102,11 @@ fn disc_forces(
     Ok(forces)
 }
 
-/// Presses a bonded disc, the ring of the block, through the depths in steps of `longest_step` at most; gives the force at each, and the nodes that can move.
+/// Presses a bonded disc, the ring of the block, through the depths in steps of at most
+/// `longest_step`, m. Returns the force at each depth, N, and the number of nodes that can move.
 pub(crate) fn press_disc(
     block: &GradedBlock,
-    mesh: &Mesh,
+    mesh: &BlockMesh,
     layers: &[(f64, Material)],
     depths: &[f64],
     longest_step: f64,
@@ -117,7 +119,7 @@ pub(crate) fn press_disc(
     Ok((forces, pressed.nodes()))
 }
 
-/// Depths to `deepest` and the forces there, of a table of a bonded disc.
+/// Depths, m, up to `deepest` and forces, N, from a reference table of a bonded disc.
 pub(crate) fn known_disc_forces(
     options: &Options,
     name: &str,
@@ -135,18 +137,23 @@ pub(crate) fn known_disc_forces(
         .collect())
 }
 
-/// One table of a bonded disc: forces on several meshes, rows from the finest, and the surface's profile.
-struct Disc<'a> {
+/// One reference table of a bonded disc: compares forces on several meshes (rows from the finest)
+/// and the profile of the surface.
+struct DiscPress<'a> {
     case: &'static str,
     label: String,
     table: &'a str,
     profile: &'a str,
     deepest: f64,
     layers: Vec<(f64, Material)>,
-    meshes: Vec<Mesh>,
+    meshes: Vec<BlockMesh>,
 }
 
-fn disc(options: &Options, disc: &Disc<'_>, findings: &mut Findings) -> Result<(), VerifyError> {
+fn disc(
+    options: &Options,
+    disc: &DiscPress<'_>,
+    findings: &mut Findings,
+) -> Result<(), VerifyError> {
     let wanted = known_disc_forces(options, disc.table, disc.deepest)?;
     let depths: Vec<f64> = wanted.iter().map(|w| w.0).collect();
     for (m, mesh) in disc.meshes.iter().enumerate() {
@@ -176,10 +183,11 @@ fn disc(options: &Options, disc: &Disc<'_>, findings: &mut Findings) -> Result<(
     profiles(options, disc, &depths, findings)
 }
 
-/// The skin's profile on an eighth of the block, fine at the disc's rim: there the skin falls off steeply.
+/// The skin's profile on an eighth of the block. The mesh is fine at the disc's rim, where the skin
+/// falls off steeply.
 fn profiles(
     options: &Options,
-    disc: &Disc<'_>,
+    disc: &DiscPress<'_>,
     depths: &[f64],
     findings: &mut Findings,
 ) -> Result<(), VerifyError> {
@@ -218,7 +226,8 @@ fn profiles(
     Ok(())
 }
 
-/// Largest error of the skin's vertical displacement along y = 0 at a depth that the table has, over the depth.
+/// Largest error of the skin's vertical displacement along y = 0 at a depth of the table, relative
+/// to the depth.
 fn profile_error(pressed: &Pressed, profile: &Table, depth: f64) -> Option<(f64, f64)> {
     let mut largest: Option<f64> = None;
     for row in 0..profile.len() {
@@ -236,14 +245,14 @@ fn profile_error(pressed: &Pressed, profile: &Table, depth: f64) -> Option<(f64,
 
 pub(crate) fn b1(options: &Options) -> Result<Findings, VerifyError> {
     let mut findings = Findings::default();
-    let mesh = |spacing: f64, growth: f64, first: f64, level_growth: f64| Mesh {
+    let mesh = |spacing: f64, growth: f64, first: f64, level_growth: f64| BlockMesh {
         spacing,
         growth,
         levels: vec![(first, level_growth)],
     };
     disc(
         options,
-        &Disc {
+        &DiscPress {
             case: "B1",
             label: String::new(),
             table: "B1_homogeneous_block.csv",
@@ -262,19 +271,19 @@ pub(crate) fn b1(options: &Options) -> Result<Findings, VerifyError> {
 }
 
 /// Meshes for skin, fat and muscle, from coarse to fine.
-fn layered_meshes() -> Vec<Mesh> {
+fn layered_meshes() -> Vec<BlockMesh> {
     vec![
-        Mesh {
+        BlockMesh {
             spacing: 10e-3 / 3.0,
             growth: 0.5,
             levels: vec![(2e-3, 0.0), (2e-3, 0.2), (5e-3, 0.7)],
         },
-        Mesh {
+        BlockMesh {
             spacing: 10e-3 / 5.0,
             growth: 0.4,
             levels: vec![(1e-3, 0.0), (1.4e-3, 0.2), (3e-3, 0.5)],
         },
-        Mesh {
+        BlockMesh {
             spacing: 10e-3 / 8.0,
             growth: 0.3,
             levels: vec![(0.67e-3, 0.0), (1e-3, 0.1), (2e-3, 0.4)],
@@ -287,7 +296,7 @@ pub(crate) fn b2(options: &Options) -> Result<Findings, VerifyError> {
     for (nu, name, deepest) in [(0.45, "nu045", 0.014), (0.49, "nu049", 0.012)] {
         disc(
             options,
-            &Disc {
+            &DiscPress {
                 case: "B2",
                 label: format!("nu {nu}: "),
                 table: &format!("B2_layered_block_{name}.csv"),
@@ -371,13 +380,13 @@ pub(crate) fn b4(options: &Options) -> Result<Findings, VerifyError> {
         "B4_hom_surface_profile.csv",
         &["depth_m", "X_m", "uz_m"],
     )?;
-    let meshes: Vec<Mesh> = [
+    let meshes: Vec<BlockMesh> = [
         (2.0e-3, 0.5, 2e-3, 0.5),
         (1.25e-3, 0.4, 1.25e-3, 0.35),
         (0.8e-3, 0.3, 0.8e-3, 0.25),
     ]
     .into_iter()
-    .map(|(spacing, growth, first, level_growth)| Mesh {
+    .map(|(spacing, growth, first, level_growth)| BlockMesh {
         spacing,
         growth,
         levels: vec![(first, level_growth)],
@@ -426,11 +435,11 @@ pub(crate) fn b4(options: &Options) -> Result<Findings, VerifyError> {
     Ok(findings)
 }
 
-/// Presses the frictionless sphere over (x, y) of the homogeneous block through the depths; gives the force at each, and the
-/// nodes that can move.
+/// Presses the frictionless sphere over (x, y) of the homogeneous block through the depths. Returns
+/// the force at each depth, N, and the number of nodes that can move.
 pub(crate) fn press_sphere(
     block: &GradedBlock,
-    mesh: &Mesh,
+    mesh: &BlockMesh,
     at: [f64; 2],
     depths: &[f64],
     mut at_depth: impl FnMut(&Pressed, usize),
@@ -448,7 +457,8 @@ pub(crate) fn press_sphere(
     Ok((forces, pressed.nodes()))
 }
 
-/// Depths and forces of the sphere: those of the block where it was run, else of the cylinder of equal thickness.
+/// Reference depths, m, and forces, N, of the sphere: from the block if it was computed, else from
+/// the cylinder of equal thickness.
 pub(crate) fn known_sphere_forces(options: &Options) -> Result<Vec<(f64, f64)>, VerifyError> {
     const COLUMNS: [&str; 3] = [
         "depth_m",
@@ -489,7 +499,7 @@ pub(crate) fn b5(options: &Options) -> Result<Findings, VerifyError> {
         };
         let n = (THICKNESS / spacing).round() as usize;
         let levels = LevelStack {
-            // Finer toward both plates.
+            // The levels are finer towards both plates.
             depths: (0..=n)
                 .map(|l| {
                     let t = l as f64 / n as f64;

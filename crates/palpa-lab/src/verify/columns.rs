@@ -1,4 +1,5 @@
-//! Columns with exact one-dimensional solutions (B5): confined, layers in series; unconfined between smooth plates.
+//! Columns with exact one-dimensional solutions (B5): confined; layers in series; unconfined
+//! between smooth plates.
 
 use palpa_fem::law::NeoHookean;
 use palpa_fem::{Law, Load, Mat3, Material, Materials, Supports};
@@ -63,7 +64,7 @@ fn body(layers: &[(f64, Law)], diagonal: Diagonal) -> LayeredBody {
     mapped_grid(&grid, |u, v| Vec3::new(u, v, 0.0) * SIDE, &levels)
 }
 
-/// The four sides (and, where asked, the base) as planes in which nodes slide.
+/// Supports: the nodes slide in the planes of `faces` and, if `base_slides`, of the base.
 fn sliding(body: &LayeredBody, faces: &[usize], base_slides: bool) -> Supports {
     let mut supports = Supports::default();
     for face in faces.iter().map(|&i| &body.cut_faces[i]) {
@@ -92,7 +93,7 @@ fn confined_pressure(law: &Law, stretch: f64) -> f64 {
     -law.stress(&f)[(2, 2)]
 }
 
-/// Root of an increasing function, by halving.
+/// Root of an increasing function, by bisection.
 fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..200 {
         let middle = f64::midpoint(low, high);
@@ -105,7 +106,7 @@ fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Pressure under which layers in series are compressed by `compression` (m) in all.
+/// Pressure that compresses layers in series by `compression` (m) in total.
 fn series_pressure(layers: &[(f64, Law)], compression: f64) -> f64 {
     let compressed = |pressure: f64| -> f64 {
         layers
@@ -156,7 +157,7 @@ fn confined(
     Ok(())
 }
 
-/// Axial nominal stress at a stretch of an unconfined column, whose sides find their own width.
+/// Axial nominal stress at a stretch of an unconfined column with free width.
 fn uniaxial_stress(law: &Law, stretch: f64) -> f64 {
     let at = |side: f64| Mat3::from_diagonal(&Vec3::new(side, side, stretch));
     let side = root(0.3, 3.0, |side| law.stress(&at(side))[(0, 0)]);
@@ -166,7 +167,7 @@ fn uniaxial_stress(law: &Law, stretch: f64) -> f64 {
 fn unconfined(findings: &mut Findings, nu: f64, diagonal: Diagonal) -> Result<(), VerifyError> {
     let law = law(30e3, nu);
     let body = body(&[(HEIGHT, law)], diagonal);
-    // Two sides are planes of symmetry; the others are free.
+    // Two sides are planes of symmetry; the other two are free.
     let supports = sliding(&body, &[0, 2], true);
     for (name, stretches) in [
         ("compression", [0.9, 0.8, 0.7, 0.6]),

@@ -1,13 +1,13 @@
-//! A cone on a half-space, its tip sharp or rounded, against Sneddon's solution.
+//! A cone on a half-space, with a sharp or rounded tip, compared with Sneddon's solution.
 //!
-//! A smooth rigid tool with the profile f(r) that touches a half-space within the radius a is sunk in
-//! by δ and carries the force F (I. N. Sneddon, Int. J. Engng Sci. 3 (1965) 47–57):
+//! A smooth rigid tool with the profile f(r) touches a half-space within the radius a. It is
+//! pressed in by δ and carries the force F (I. N. Sneddon, Int. J. Engng Sci. 3 (1965) 47–57):
 //!
 //! ```text
 //! δ = a ∫₀ᵃ f′(r) / √(a² − r²) dr,   F = 2 E/(1 − ν²) ∫₀ᵃ r² f′(r) / √(a² − r²) dr
 //! ```
-//! Here f′ is `m r/b` on the tip, which ends at the radius b, and the slope `m` on the flank. With b = 0
-//! these are `δ = π/2 m a` and `F = 2/π E/(1 − ν²) δ²/m`.
+//! Here f′ is `m r/b` on the tip, which ends at the radius b, and the slope `m` on the flank. With
+//! b = 0 these are `δ = π/2 m a` and `F = 2/π E/(1 − ν²) δ²/m`.
 
 use palpa_fem::shape::{Cone, Tool};
 
@@ -18,11 +18,11 @@ use crate::verify::tolerance::SMALL_STRAIN;
 use crate::verify::{Findings, Options, Row, VerifyError};
 
 const CASE: &str = "cone";
-/// Half of the opening angle, rad. The solution is for small slopes, so the cone is as blunt as they go.
+/// Half of the opening angle, rad. The solution holds for small slopes, so the cone is very blunt.
 const HALF_ANGLE: f64 = 1.55;
-/// Radius of the shaft, m: its rim is far from what touches.
+/// Radius of the shaft, m: its rim is far from the contact.
 const SHAFT: f64 = 1.0;
-/// Radius at which the tip ends, over that of the contact.
+/// Radius at which the tip ends, relative to the contact radius.
 const TIPS: [f64; 2] = [1e-3, 0.5];
 
 pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
@@ -54,14 +54,15 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
 struct Sneddon {
     slope: f64,
     tip: f64,
-    /// How deep the tip is. m
+    /// Depth of the tip, m.
     depth: f64,
-    /// Force at `E/(1 − ν²)` = 1 Pa. N
+    /// Force at `E/(1 − ν²)` = 1 Pa, N.
     force: f64,
 }
 
 impl Sneddon {
-    /// For a slope of the flank, the radius at which the tip ends, and that of the contact, m.
+    /// The solution for a slope of the flank, the radius `tip` at which the tip ends, m, and the
+    /// radius `contact` of the contact, m.
     fn new(slope: f64, tip: f64, contact: f64) -> Self {
         let (b, a) = (tip, contact);
         let s = (a * a - b * b).sqrt();
@@ -76,7 +77,7 @@ impl Sneddon {
         }
     }
 
-    /// Height of the tool over its tip. m
+    /// Height of the tool over its tip at the radius `r`, m.
     fn height(&self, r: f64) -> f64 {
         if r < self.tip {
             0.5 * self.slope * r * r / self.tip

@@ -1,4 +1,5 @@
-//! The laws of contact, on a sphere and a punch pressed into a block and dragged along it.
+//! The contact conditions, for a sphere and a punch that are pressed into a block and dragged along
+//! it.
 
 use palpa_fem::law::NeoHookean;
 use palpa_fem::shape::{FlatPunch, Pose, Shape, Sphere, Tool};
@@ -65,7 +66,7 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
             nodes,
         );
     }
-    // Dragged along: vertices slide, stick and let go.
+    // Drag: vertices slide, stick and lose contact.
     for (name, shape) in [("sphere", sphere), ("rounded punch", punch)] {
         let (report, nodes) = pressed(&body, shape, 0.4, 4, 3e-3)?;
         let what = format!("{name}, friction 0.4, dragged 3 mm");
@@ -74,7 +75,8 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
     Ok(findings)
 }
 
-/// Presses in equal steps, then drags along x; gives the last report.
+/// Presses in equal steps, then drags along x. Returns the last report and the number of nodes that
+/// can move.
 fn pressed(
     body: &LayeredBody,
     shape: Shape,

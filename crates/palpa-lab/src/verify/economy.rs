@@ -1,48 +1,51 @@
-//! How few nodes are enough on blocks that are graded toward the tool (B2 and B4).
+//! Smallest number of nodes that is enough on blocks graded towards the tool (B2 and B4).
 //!
-//! On one mesh the error can be small by luck: coarse intervals are too stiff, wide triangles far from the tool too soft, and
-//! the one hides the other. A figure here is therefore the worst over all depths and over several meshes that are alike
-//! (other levels, irregular triangles, the sphere between the vertices), and the finer rungs of a ladder must keep the bound
-//! of the coarser.
+//! On a single mesh the error can be small by luck: coarse intervals are too stiff, wide triangles
+//! far from the tool are too soft, and the two errors cancel. Each figure is therefore the largest
+//! error over all depths and over several similar meshes (other levels, irregular triangles, the
+//! sphere between the vertices). The finer rungs of a ladder must keep the bound of the coarser
+//! ones.
 
 use palpa_mesh::generate::GradedBlock;
 
 use crate::verify::block::{
-    Mesh, RADIUS, block, known_disc_forces, known_sphere_forces, layered, press_disc, press_sphere,
+    BlockMesh, RADIUS, block, known_disc_forces, known_sphere_forces, layered, press_disc,
+    press_sphere,
 };
 use crate::verify::tolerance::{ECONOMY, ECONOMY_FINE, ECONOMY_IRREGULAR};
 use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
 const CASE: &str = "economy";
-/// Steps of the disc, m: forces are those of steps half as long to all digits shown.
+/// Step of the disc, m. Steps of half this length give the same forces in all digits shown.
 const STEP: f64 = 2e-3;
-/// Radius within which edges under the sphere do not lengthen, m: it touches within 4.4 mm at 2 mm, 7.5 mm at 6 mm.
+/// Radius within which edges under the sphere have equal length, m. The contact radius is 4.4 mm at
+/// 2 mm depth and 7.5 mm at 6 mm.
 const RING: f64 = 4e-3;
-/// From this depth on the sphere touches enough vertices to be judged, m.
+/// Smallest depth at which the sphere touches enough vertices for a comparison, m.
 const SPHERE_FROM: f64 = 2e-3;
-/// The sphere is brought there from this depth on, m.
+/// Depth of the first step of the sphere, on the way to [`SPHERE_FROM`], m.
 const SPHERE_START: f64 = 1e-3;
 
 /// First height (m) and growth of the levels of each layer.
 type Stack = &'static [(f64, f64)];
 
-/// Meshes that are alike, and how near they come.
+/// A rung of the ladder: similar meshes and their tolerances.
 struct Rung {
     spacing: f64,
     growth: f64,
     inner_growth: f64,
     variants: &'static [Variant],
-    /// Of the variants that are regular, and of those that are not.
+    /// Tolerances of the regular and of the irregular variants.
     tolerances: [f64; 2],
 }
 
-/// What tells a mesh from others of its rung.
+/// The features that differ between the meshes of a rung.
 #[derive(Clone, Copy)]
 struct Variant {
     levels: Stack,
-    /// Of an irregular mesh.
+    /// Seed of an irregular mesh; `None` for a regular one.
     seed: Option<u64>,
-    /// Where the tool is, in spacings from a vertex.
+    /// Offset of the tool from a vertex, in spacings.
     at: [f64; 2],
 }
 
@@ -61,7 +64,8 @@ const fn irregular(levels: Stack, seed: u64) -> Variant {
     }
 }
 
-/// The sphere off the vertices: neither over an edge's middle nor over a triangle's.
+/// The variant with the sphere off the vertices, and not over the middle of an edge or of a
+/// triangle.
 const fn beside(variant: Variant) -> Variant {
     Variant {
         at: [0.5, 0.3],
@@ -76,7 +80,7 @@ const LAYERED: [Stack; 3] = [
     &[(2e-3, 0.0), (0.65e-3, 0.25), (2.5e-3, 0.6)],
 ];
 
-/// Under the disc the rim asks for short edges, the middle does not.
+/// Meshes under the disc: the rim needs short edges, the middle does not.
 static DISC: [Rung; 3] = [
     Rung {
         spacing: RADIUS / 5.0,
@@ -143,14 +147,14 @@ static SPHERE: [Rung; 3] = [
     },
 ];
 
-/// What is pressed, and the depths and forces that are known of it.
-struct Problem {
+/// A pressed block with its known depths, m, and forces, N.
+struct EconomyProblem {
     name: String,
     tool: PressedBy,
     known: Vec<(f64, f64)>,
 }
 
-/// What a block is pressed by.
+/// The tool that presses a block.
 enum PressedBy {
     /// The bonded disc; Poisson's ratio of the layers.
     Disc(f64),
@@ -164,14 +168,15 @@ struct Worst {
     computed: f64,
     error: f64,
     n_meshes: usize,
-    /// Of the largest of the meshes.
+    /// Number of nodes of the largest of the meshes.
     nodes: usize,
 }
 
-impl Problem {
-    /// Depths, forces, and the nodes of a mesh.
+impl EconomyProblem {
+    /// Presses one mesh. Returns the force at each known depth, N, and the number of nodes that can
+    /// move.
     fn press(&self, rung: &Rung, variant: &Variant) -> Result<(Vec<f64>, usize), VerifyError> {
-        let mesh = Mesh {
+        let mesh = BlockMesh {
             spacing: rung.spacing,
             growth: rung.growth,
             levels: variant.levels.to_vec(),
@@ -195,7 +200,8 @@ impl Problem {
         }
     }
 
-    /// The largest error over the depths that count and the variants of a rung that are regular, or are not.
+    /// The largest error over the compared depths and over the regular or irregular variants of a
+    /// rung; `None` if there is no such variant.
     fn worst(&self, rung: &Rung, is_regular: bool) -> Result<Option<Worst>, VerifyError> {
         let mut worst: Option<Worst> = None;
         let variants = rung.variants.iter();
@@ -260,7 +266,7 @@ impl Problem {
 pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
     let mut findings = Findings::default();
     for (nu, name, deepest) in [(0.45, "nu045", 0.014), (0.49, "nu049", 0.012)] {
-        let problem = Problem {
+        let problem = EconomyProblem {
             name: format!("disc, nu {nu}"),
             tool: PressedBy::Disc(nu),
             known: known_disc_forces(options, &format!("B2_layered_block_{name}.csv"), deepest)?,
@@ -269,7 +275,7 @@ pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
     }
     let mut known = known_sphere_forces(options)?;
     known.retain(|(depth, _)| *depth >= SPHERE_START - 1e-9);
-    let problem = Problem {
+    let problem = EconomyProblem {
         name: "sphere".to_owned(),
         tool: PressedBy::Sphere,
         known,
@@ -300,7 +306,7 @@ mod tests {
 
     #[test]
     fn the_worst_is_over_all_depths_and_all_meshes_of_a_kind() {
-        let problem = Problem {
+        let problem = EconomyProblem {
             name: "disc".to_owned(),
             tool: PressedBy::Disc(0.45),
             known: vec![(1e-3, 0.5), (2e-3, 2.0)],
@@ -320,7 +326,7 @@ mod tests {
         assert_eq!((regular.n_meshes, irregular.n_meshes), (2, 1));
         assert_eq!(regular.error.to_bits(), largest(&errors[..2]).to_bits());
         assert_eq!(irregular.error.to_bits(), largest(&errors[2..]).to_bits());
-        // The second stack has an interval less.
+        // The second stack has one interval less.
         assert!(regular.nodes > problem.press(&RUNG, &RUNG.variants[1]).unwrap().1);
         let ratio = regular.computed / regular.reference - 1.0;
         assert_eq!(ratio.to_bits(), regular.error.to_bits());
@@ -335,7 +341,7 @@ mod tests {
             inner_growth: 0.0,
             tolerances: [ECONOMY; 2],
         };
-        let problem = Problem {
+        let problem = EconomyProblem {
             name: "sphere".to_owned(),
             tool: PressedBy::Sphere,
             known: vec![(SPHERE_START, 100.0), (SPHERE_FROM, 0.5)],

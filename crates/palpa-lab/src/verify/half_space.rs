@@ -1,8 +1,9 @@
-//! A half-space (A1): a body of linear material that is hundreds to thousands of times as wide and deep as what presses it.
+//! A half-space (A1): a body of linear material, hundreds to thousands of times as wide and deep as
+//! the tool.
 //!
-//! Nothing here has a length of its own, so a stiffness is in proportion to E a, a force on a sphere to E √R δ^1.5, a
-//! displacement under a point force to P/(E r): for each Poisson's ratio the factors are solved for once, and every row of
-//! the tables is compared with them.
+//! The problem has no length scale. A stiffness is proportional to E a, a force on a sphere to E √R
+//! δ^1.5, and a displacement under a point force to P/(E r). So the factors are computed once for
+//! each Poisson's ratio, and every row of the tables is compared with them.
 
 use crate::verify::sector::Finest;
 use crate::verify::small_strain::{self, Layer, Measured, STUDIED, Stack};
@@ -11,18 +12,21 @@ use crate::verify::tolerance::SMALL_STRAIN;
 use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
 const CASE: &str = "A1";
-/// Width and depth of the body over the radius of the disc. At 1,000 a punch still feels its end by 0.1 %. A sphere is
-/// pressed so little that the rounding of strains far away would be felt first, and gets a smaller one.
+/// Width and depth of the body, relative to the radius of the disc. At 1,000 the finite size still
+/// changes the result of a punch by 0.1 %. A sphere is pressed so little that rounding of the
+/// strains far away would matter first, so its body is smaller.
 const WIDTH: f64 = 3000.0;
 const WIDTH_FOR_SPHERE: f64 = 500.0;
-/// Depth of a sphere over the radius of the disc: it hardly slides, as nearly incompressible material moves straight down.
+/// Depth of a sphere, relative to the radius of the disc. The skin hardly slides along it, because
+/// nearly incompressible material moves straight down.
 const SHALLOW: f64 = 1e-2;
-/// Nearly incompressible, in place of ½; by the formulas stiffnesses differ by 0.01 %.
+/// Poisson's ratio used in place of ½; by the formulas this changes stiffnesses by 0.01 %.
 const NEARLY_HALF: f64 = 0.4999;
-/// Contact radii of spheres over the disc's radius: rings of vertices change at different places of the contact's edge.
+/// Contact radii of spheres, relative to the disc's radius. Several are used because the edge of
+/// the contact lies at different places between rings of vertices.
 const TOUCHED: [f64; 5] = [0.75, 0.8, 0.85, 0.9, 0.95];
-/// Distances at which displacements are compared, over the radius of the disc that is under pressure; that it is no point
-/// adds 0.8 % to the displacement at the nearest.
+/// Distances at which displacements are compared, relative to the radius of the disc under
+/// pressure. The finite size of the disc adds 0.8 % to the displacement at the nearest distance.
 const DISTANCES: [f64; 5] = [4.0, 4.5, 5.0, 5.5, 6.0];
 
 /// Radius of the disc, m.
@@ -67,7 +71,7 @@ pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
         let stack = unit(solved, 1.0, Finest::Inside);
         let mut factors = Vec::new();
         for touched in TOUCHED {
-            // On a sphere of 1 m: a² = R δ.
+            // For a sphere with R = 1 m, a² = R δ.
             let depth = (touched * RADIUS).powi(2);
             let force = stack.paraboloid(1.0, depth, SHALLOW)?;
             factors.push(Measured {
@@ -163,7 +167,7 @@ fn point_force(options: &Options, findings: &mut Findings) -> Result<(), VerifyE
     let (pressed, _) = stack.under_pressure()?;
     for (row, distance) in (0..table.len()).zip(DISTANCES.into_iter().cycle()) {
         let [young, _, force, r, down, outward] = columns.map(|column| table.number(row, column));
-        // u E r/P at the ring of vertices next to the distance.
+        // The factors are u E r/P at the ring of vertices nearest to the distance.
         let (at, factors) = stack.ring_displacement(&pressed, distance * RADIUS);
         let [u_r, u_z] = factors.map(|u| u * at * force / (young * r));
         for (direction, reference, u) in [("down", down, u_z), ("outward", outward, u_r)] {

@@ -1,4 +1,4 @@
-//! A layer on a rigid base (A2) and stacks of layers (A3), by formula.
+//! A layer on a rigid base (A2) and stacks of layers (A3), compared with formulas.
 
 #![expect(
     clippy::float_cmp,
@@ -11,27 +11,28 @@ use crate::verify::table::Table;
 use crate::verify::tolerance::SMALL_STRAIN;
 use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
-/// Depth of a sphere over the radius of the disc; at 0.01 sliding would change forces by 2 %.
+/// Depth of a sphere, relative to the radius of the disc. At 0.01, sliding would change the forces
+/// by 2 %.
 const SHALLOW: f64 = 1e-3;
 
-/// Width of a body that stands for one without end: so many times its thickness and the radius of what presses it.
-/// Twice as wide, stiffnesses differ by less than 0.1 %.
+/// Width of a body that stands for an infinite one, m: a multiple of its thickness and of the
+/// radius of the tool. Twice this width changes stiffnesses by less than 0.1 %.
 fn width(layers: &[Layer], radius: f64) -> f64 {
     let thickness: f64 = layers.iter().map(|l| l.thickness).sum();
     6.0 * thickness + 4.0 * radius
 }
 
-/// Layers for a punch or a pressure on a disc of radius `a`.
+/// A stack for a punch or a pressure on a disc of radius `a`, m.
 fn for_disc(a: f64, size: f64, layers: &[Layer]) -> Stack {
     Stack::new(a, size, Finest::Rim, width(layers, a), layers)
 }
 
-/// Layers for a sphere that touches them to the radius `a`.
+/// A stack for a sphere with the contact radius `a`, m.
 fn for_sphere(a: f64, size: f64, layers: &[Layer]) -> Stack {
     Stack::new(a / TOUCHED, size, Finest::Inside, width(layers, a), layers)
 }
 
-/// Thickness of the layer that has no other, m.
+/// Thickness of the single layer, m; its table gives only the ratio a/h.
 const THICKNESS: f64 = 0.004;
 
 /// One layer: flat punch and sphere (A2).
@@ -48,11 +49,11 @@ pub(crate) fn one(options: &Options) -> Result<Findings, VerifyError> {
     let mut findings = Findings::default();
     for row in 0..table.len() {
         let [nu, ratio, flat, sphere, chi] = columns.map(|column| table.number(row, column));
-        // The law has no volume to keep where it cannot change at all.
+        // The law cannot be used for exactly incompressible material.
         if nu > 0.4999 {
             continue;
         }
-        // With a shear modulus of 1 Pa, 4 G a/(1 − ν) is the unit of stiffness.
+        // The shear modulus is 1 Pa, and the unit of stiffness is 4 G a/(1 − ν).
         let a = ratio * THICKNESS;
         let layer = Layer {
             thickness: THICKNESS,
@@ -144,7 +145,7 @@ fn spheres(
     Ok(())
 }
 
-/// The stacks by name: thickness in mm, Young's modulus in kPa; and Poisson's ratio.
+/// The stacks: name, thickness (mm) and Young's modulus (kPa) of each layer, and Poisson's ratio.
 const STACKS: [(&str, &[[f64; 2]], f64); 7] = [
     ("stiff_over_soft_2_38", &[[2.0, 100.0], [38.0, 10.0]], 0.45),
     ("stiff_over_soft_5_15", &[[5.0, 100.0], [15.0, 10.0]], 0.45),
@@ -162,7 +163,7 @@ const STACKS: [(&str, &[[f64; 2]], f64); 7] = [
     ),
     ("homogeneous_40_045", &[[40.0, 30.0]], 0.45),
 ];
-/// The stack whose errors are studied.
+/// The stack used for the study of errors against mesh size.
 const STUDIED_STACK: &str = "skin_fat_muscle_045";
 
 fn layers(name: &str) -> Option<Vec<Layer>> {

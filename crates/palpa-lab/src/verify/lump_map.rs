@@ -1,4 +1,4 @@
-//! A hard ball in a soft block under a small pressure that moves across it (A4).
+//! A hard ball in a soft block, with a small pressure that moves across the block (A4).
 
 #![expect(
     clippy::float_cmp,
@@ -18,24 +18,26 @@ use crate::verify::tolerance::{LUMP, LUMP_LEAST};
 use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
 const CASE: &str = "A4";
-/// Edges to a ball's radius, and length of edges under pressures, m.
+/// Edges per radius of a ball.
 const PER_RADIUS: f64 = 4.0;
+/// Edge length under pressures, m.
 const LOAD_EDGE: f64 = 1.75e-3;
-/// Sizes of the meshes on which errors are studied, over the one on which results are quoted.
+/// Edge lengths of the meshes in the error study, relative to the mesh of the quoted results.
 const STUDIED: [f64; 4] = [2.0, 1.5, 1.0, 0.75];
-/// The ball with which they are, at all offsets.
+/// The ball of the error study, used at all offsets.
 const STUDIED_BALL: Ball = Ball {
     depth: 0.014,
     radius: 0.008,
 };
 const HALF_WIDTH: f64 = 0.05;
 const THICKNESS: f64 = 0.04;
-/// By how much edges lengthen per metre from where they are fine.
+/// Growth of the edge length per metre of distance from a fine region.
 const GROWTH: f64 = 0.5;
-/// Farthest offset at which a ball still adds as much as is compared, m.
+/// Largest offset at which a ball still adds enough stiffness to be compared, m.
 const FARTHEST: f64 = 0.016;
 
-/// Edges of `h` from `from` to `to`, and lengthening by [`GROWTH`] per metre away from there. m
+/// A fine region, m: edges have the length `h` between `from` and `to`, and lengthen by [`GROWTH`]
+/// per metre outside.
 #[derive(Clone, Copy)]
 struct Fine {
     from: f64,
@@ -43,14 +45,14 @@ struct Fine {
     h: f64,
 }
 
-/// Points from `from` to `to`, as fine as the finest asks for.
+/// Points from `from` to `to`; the finest request holds everywhere.
 fn graded(from: f64, to: f64, fine: &[Fine]) -> Vec<f64> {
     let edge = |x: f64| {
         fine.iter()
             .map(|f| f.h + GROWTH * (f.from - x).max(x - f.to).max(0.0))
             .fold(f64::INFINITY, f64::min)
     };
-    // Edges per length, summed finely.
+    // Integrate the number of edges with a fine step.
     let n_steps = 4000;
     let step = (to - from) / f64::from(n_steps);
     let mut count = vec![0.0];
@@ -71,12 +73,13 @@ fn graded(from: f64, to: f64, fine: &[Fine]) -> Vec<f64> {
             from + (i as f64 + share) * step
         })
         .collect();
-    // But for rounding they are.
+    // Set exactly, because rounding moves the end points slightly.
     (points[0], points[n]) = (from, to);
     points
 }
 
-/// Half of the block, y ≥ 0, fine where pressures and a ball are; `size` 1 is what results are quoted for.
+/// Half of the block, y ≥ 0, fine under the pressures and round the ball. `size` scales the edge
+/// length; 1 is the mesh of the quoted results.
 fn body(ball: &Ball, size: f64) -> LayeredBody {
     let Ball {
         depth: z,
@@ -114,9 +117,10 @@ fn body(ball: &Ball, size: f64) -> LayeredBody {
     )
 }
 
-/// Forces of 1 N (on the whole block) under the pressure 2/(πa²) (1 − ρ²/a²) round (x, 0).
+/// Nodal forces with a sum of 1 N (on the whole block) for the pressure 2/(πa²) (1 − ρ²/a²) round
+/// (x, 0).
 fn pressure(body: &LayeredBody, x: f64, a: f64) -> Vec<Vec3> {
-    /// Small triangles along each side of a triangle.
+    /// Number of small triangles along each side of a triangle, for the integration.
     const N: usize = 12;
     let mut forces = vec![Vec3::zeros(); body.n_nodes()];
     for triangle in &body.skin.triangles {
@@ -147,7 +151,7 @@ fn pressure(body: &LayeredBody, x: f64, a: f64) -> Vec<Vec3> {
     forces.iter().map(|f| f / total).collect()
 }
 
-/// Force over the displacement below it, weighted by the pressure, N/m.
+/// Force divided by the pressure-weighted displacement below it, N/m.
 fn stiffness(pressed: &mut Pressed, forces: &[Vec3]) -> Result<f64, VerifyError> {
     let load = Load {
         forces,
@@ -162,7 +166,7 @@ fn stiffness(pressed: &mut Pressed, forces: &[Vec3]) -> Result<f64, VerifyError>
     Ok(1.0 / (2.0 * work))
 }
 
-/// Depth of a ball's middle and its radius, m.
+/// A ball: depth of its middle and radius, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ball {
     depth: f64,
@@ -177,7 +181,7 @@ struct Moduli {
     nu: f64,
 }
 
-/// The block's half on its base and plane of symmetry, with the ball and without.
+/// The half block on its base and plane of symmetry, with the ball and without.
 struct Blocks {
     ball: Ball,
     body: LayeredBody,
@@ -218,7 +222,8 @@ impl Blocks {
         })
     }
 
-    /// How many times stiffer the ball makes the block under a pressure over the radius `a` round (x, 0).
+    /// Stiffness of the block with the ball relative to without it, under a pressure over the
+    /// radius `a`, m, round (x, 0).
     fn ratio(&mut self, x: f64, a: f64) -> Result<f64, VerifyError> {
         let forces = pressure(&self.body, x, a);
         Ok(stiffness(&mut self.with, &forces)? / stiffness(&mut self.without, &forces)?)
@@ -245,7 +250,7 @@ pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
                 columns.map(|column| table.number(row, column));
             let ball = Ball { depth, radius };
             let is_studied = ball == STUDIED_BALL;
-            // What a ball adds that adds less is not compared.
+            // Smaller contributions of a ball are not compared.
             if reference - 1.0 < LUMP_LEAST || (size != 1.0 && !is_studied) {
                 continue;
             }

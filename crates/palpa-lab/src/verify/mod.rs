@@ -1,7 +1,8 @@
-//! Verification of the continuum model: problems whose answers are known, and how near we come.
+//! Verification of the continuum model: problems with known answers, and the errors of the model.
 //!
-//! Cases by formula need nothing but this crate; the others compare with tables in a reference folder (see
-//! [`Options::reference`]). Every figure is a [`Row`], its tolerance from one table ([`tolerance`]).
+//! Cases by formula need nothing but this crate; the others compare with tables in a reference
+//! folder (see [`Options::reference`]). Every figure is a [`Row`]; its tolerance comes from one
+//! table ([`tolerance`]).
 //!
 //! ```
 //! use palpa_lab::verify::{Options, cases};
@@ -40,15 +41,15 @@ use serde::Serialize;
 pub struct Row {
     /// Name of the case.
     pub case: &'static str,
-    /// What is compared, with its unit.
+    /// The compared quantity, with its unit.
     pub quantity: String,
     /// The known answer.
     pub reference: f64,
-    /// Ours.
+    /// The computed value.
     pub computed: f64,
-    /// `computed/reference − 1`, or what the quantity says it is relative to.
+    /// `computed/reference − 1`, or an error relative to the value that `quantity` names.
     pub rel_error: f64,
-    /// The largest error, in size, that passes.
+    /// The largest absolute value of the error that passes.
     pub tolerance: f64,
     /// Nodes that can move.
     pub nodes: usize,
@@ -57,7 +58,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Compares two values by their ratio.
+    /// A row that compares two values by their ratio.
     pub fn ratio(
         case: &'static str,
         quantity: impl Into<String>,
@@ -77,7 +78,7 @@ impl Row {
         )
     }
 
-    /// Compares two values (reference, computed) by an error that is given.
+    /// A row that compares two values (reference, computed) by a given error.
     pub fn with_error(
         case: &'static str,
         quantity: impl Into<String>,
@@ -105,9 +106,9 @@ impl Row {
 pub struct StudyPoint {
     /// Name of the case.
     pub case: &'static str,
-    /// Which of its curves.
+    /// Name of the curve within the case.
     pub series: String,
-    /// Size of the mesh, m or relative to the coarsest.
+    /// Mesh size, m or relative to the coarsest mesh.
     pub h: f64,
     /// Nodes that can move.
     pub nodes: usize,
@@ -115,7 +116,7 @@ pub struct StudyPoint {
     pub error: f64,
 }
 
-/// What a case found.
+/// Results of a case.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Findings {
     /// Figures beside their references.
@@ -124,7 +125,7 @@ pub struct Findings {
     pub study: Vec<StudyPoint>,
 }
 
-/// How cases are run.
+/// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// The folder with the reference tables, for the cases that need it.
@@ -134,13 +135,13 @@ pub struct Options {
 /// A problem with a known answer.
 #[derive(Debug)]
 pub struct Case {
-    /// Its name.
+    /// Name of the case.
     pub name: &'static str,
-    /// What is verified, in a line.
+    /// What the case verifies, in one line.
     pub title: &'static str,
-    /// Where the answer is from.
+    /// Source of the known answer.
     pub source: &'static str,
-    /// Whether it needs the reference folder.
+    /// Whether the case needs the reference folder.
     pub needs_reference: bool,
     run: fn(&Options) -> Result<Findings, VerifyError>,
 }
@@ -149,7 +150,7 @@ impl Case {
     /// Runs the case.
     ///
     /// # Errors
-    /// When a reference table is missing or not as expected, or a solve does not converge.
+    /// If a reference table is missing or not as expected, or if a solve does not converge.
     pub fn run(&self, options: &Options) -> Result<Findings, VerifyError> {
         (self.run)(options)
     }
@@ -159,15 +160,15 @@ impl Case {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
-    /// It compares with tables and none are given.
-    #[error("this case compares with reference tables; say where they are: --reference DIR")]
+    /// The case compares with tables, but no reference folder is given.
+    #[error("this case needs the reference tables; name their folder with --reference DIR")]
     NoReference,
     /// A table cannot be read.
     #[error("cannot read \"{path}\": {reason}; give the folder that holds the reference tables")]
     Table {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// A solve did not converge.
@@ -175,7 +176,7 @@ pub enum VerifyError {
     NotConverged {
         /// Which solve.
         what: String,
-        /// How it ended.
+        /// How the solve ended.
         outcome: String,
     },
     /// A model could not be built.
@@ -183,7 +184,7 @@ pub enum VerifyError {
     Model(#[from] palpa_fem::FemError),
 }
 
-/// All cases, by formula first.
+/// All cases; those by formula come first.
 pub fn cases() -> &'static [Case] {
     CASES
 }

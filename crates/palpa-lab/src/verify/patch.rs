@@ -1,5 +1,6 @@
-//! Patch test: on a mesh of distorted prisms, boundary nodes moved by a uniform deformation must give that deformation
-//! and its stress inside. And a body that is turned as a whole feels nothing.
+//! Patch test: on a mesh of distorted prisms, boundary nodes moved by a uniform deformation must
+//! give that deformation and its stress inside. A rigid rotation of the whole body must cause no
+//! energy and no forces.
 
 use palpa_fem::law::{Linear, NeoHookean};
 use palpa_fem::{
@@ -125,7 +126,8 @@ fn uniform(
         tolerance: 1e-13,
         ..SolveParams::default()
     };
-    // Rounding may keep the residual above so small a tolerance: the answer decides.
+    // Rounding may keep the residual above so small a tolerance, so the test checks the solution
+    // instead.
     equilibrate(&model, &mut state, &mut ws, &load, &params);
     let size = gradient.norm() * 0.04;
     let displacement = (0..body.n_nodes())
@@ -153,7 +155,8 @@ fn exact_stress(law: &Law, gradient: &Mat3) -> Mat3 {
     law.stress(&(Mat3::identity() + gradient))
 }
 
-/// Largest error of a prism's first Piola–Kirchhoff stress (in small strain, of its one stress), relative.
+/// Largest relative error of a prism's first Piola–Kirchhoff stress; at small strain, of its
+/// stress.
 fn stress_error(
     model: &Model,
     state: &State,
@@ -177,7 +180,7 @@ fn stress_error(
         .fold(0.0, f64::max)
 }
 
-/// The patch of the reference folder: its own 16 wedges, its own stresses.
+/// The patch of the reference folder, with its own 16 wedges and stresses.
 pub(crate) fn of_reference(options: &Options) -> Result<Findings, VerifyError> {
     const CASE: &str = "V patch";
     let folder = options
@@ -245,7 +248,7 @@ pub(crate) fn of_reference(options: &Options) -> Result<Findings, VerifyError> {
 #[derive(serde::Deserialize)]
 struct Patch {
     nodes: Vec<[f64; 3]>,
-    /// Lower triangle, then upper.
+    /// Nodes of each wedge: lower triangle, then upper.
     wedges: Vec<[usize; 6]>,
     grad_u_small: [[f64; 3]; 3],
     #[serde(rename = "E")]
@@ -281,7 +284,7 @@ impl Patch {
             interval_layer: vec![0, 0],
             layer_names: vec!["tissue".to_owned()],
             cut_faces: vec![CutFace {
-                // All but the node in the middle.
+                // All nodes except the one in the middle.
                 vertices: vec![0, 1, 2, 5, 8, 7, 6, 3],
                 normal: Vec3::x(),
                 point: at(0, 0),
@@ -291,7 +294,7 @@ impl Patch {
     }
 }
 
-/// Turned by 70° about an oblique axis and moved: no energy, no force.
+/// Turns the body by 70° about an oblique axis and moves it; there must be no energy and no force.
 fn rigid(
     findings: &mut Findings,
     body: &LayeredBody,
@@ -317,7 +320,7 @@ fn rigid(
     };
     equilibrate(&model, &mut state, &mut ws, &load, &SolveParams::default());
     let force = ws.reactions().iter().map(Vec3::norm).fold(0.0, f64::max);
-    // Against a force that tissue of this size has at a strain of one.
+    // The scale is the force of tissue of this size at a strain of one.
     let scale = YOUNG * 0.04 * 0.04;
     findings.rows.push(Row::with_error(
         CASE,

@@ -1,4 +1,4 @@
-//! Errors against the size of the mesh, a panel for each case.
+//! Plot of the errors against mesh size, one panel for each case.
 
 use std::fmt::Write as _;
 
@@ -8,13 +8,14 @@ use super::tolerance::share;
 use crate::reproduce::fit::line;
 use palpa_plot::{Axis, Chart, Guide, PALETTE, Picture, Series, panels};
 
-/// Up to this many curves are told apart by name; of more, what counts is shown: the worst and the mean.
+/// Largest number of curves shown by name; with more curves, the worst and the mean are shown.
 const MOST_NAMED: usize = 4;
-/// Errors further below the lowest curve with a name than this share of it are not looked at.
+/// Lower end of the axis, as a share of the lowest error of the named curves; smaller errors are
+/// not shown.
 const LEAST_SHARE: f64 = 0.3;
-/// Over less than this ratio of mesh sizes an order would be chance.
+/// Smallest ratio of mesh sizes for which an order of convergence is computed.
 const LEAST_RANGE: f64 = 2.0;
-/// How much of the ink a curve without a name has.
+/// Opacity of a curve without a name.
 const FAINT: f64 = 0.3;
 
 /// One curve of a study: errors on meshes, from coarse to fine.
@@ -24,7 +25,7 @@ struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Sizes of the meshes, numbers of nodes, and errors without their sign.
+    /// Mesh sizes, numbers of nodes, and absolute errors.
     fn placed(&self) -> Vec<Placed> {
         (self.points.iter())
             .map(|p| Placed {
@@ -36,7 +37,7 @@ impl Curve<'_> {
     }
 }
 
-/// An error without its sign, on a mesh.
+/// An absolute error on a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Placed {
     h: f64,
@@ -44,8 +45,9 @@ struct Placed {
     error: f64,
 }
 
-/// The power of the mesh's size that an error falls with, by least squares over all meshes. One that does not fall from each
-/// mesh to the next has none: it passes zero on the way, or has come down to the accuracy of the reference.
+/// Order of convergence in mesh size, by least squares over all meshes. `None` if the error does
+/// not fall from each mesh to the next: then it passes through zero or has reached the accuracy of
+/// the reference.
 fn order(points: &[Placed]) -> Option<f64> {
     if points.first()?.h < LEAST_RANGE * points.last()?.h {
         return None;
@@ -66,7 +68,8 @@ fn with_order(name: &str, points: &[Placed]) -> String {
     )
 }
 
-/// The largest error of the curves on each mesh and the root of their mean square, if they are on the same meshes.
+/// The largest error of the curves on each mesh and their root mean square; `None` if the curves
+/// use different meshes.
 fn summary(curves: &[Curve<'_>]) -> Option<[Vec<Placed>; 2]> {
     let placed: Vec<Vec<Placed>> = curves.iter().map(Curve::placed).collect();
     let first = placed.first()?;
@@ -165,7 +168,7 @@ fn panel(case: &str, found: &Findings) -> Chart {
     chart
 }
 
-/// The name of the case, and what all its curves have in common.
+/// Title of a panel: the name of the case, and the common part of the names of its curves.
 fn title(case: &str, common: &str, n_curves: usize, n_named: usize) -> String {
     let common = common.trim_end_matches([' ', ':', ',']);
     let mut title = case.to_owned();
@@ -182,7 +185,7 @@ fn in_percent(points: &[Placed]) -> Vec<[f64; 2]> {
     points.iter().map(|p| [p.nodes, p.error * 1e2]).collect()
 }
 
-/// What the names of all curves start with, up to the end of a phrase.
+/// Common start of the names of all curves, up to the end of a phrase.
 fn common_start<'a>(curves: &[Curve<'a>]) -> &'a str {
     let Some(first) = curves.first().filter(|_| curves.len() > 1) else {
         return "";
@@ -211,7 +214,8 @@ fn curves<'a>(case: &str, found: &'a Findings) -> Vec<Curve<'a>> {
     curves
 }
 
-/// The tolerances of the figures that the curves end in; those of the case if none of them is a figure.
+/// The tolerances of the figures at the ends of the curves; those of the whole case if no curve
+/// ends in a figure.
 fn tolerances(case: &str, found: &Findings, curves: &[Curve<'_>]) -> Vec<f64> {
     let is_end = |error: f64| {
         let ends = curves.iter().filter_map(|c| c.points.last());
@@ -277,7 +281,7 @@ mod tests {
         assert_eq!(order(&curves("lame", &found)[0].placed()), None);
     }
 
-    /// Curves at five depths, the errors of each so many times the first's.
+    /// Curves at five depths; the errors of each are those of the first times its factor.
     fn many(factors: [f64; 5]) -> Findings {
         let mut found = Findings::default();
         for (i, factor) in factors.into_iter().enumerate() {
@@ -296,7 +300,7 @@ mod tests {
         let mut found = many([1.0, -1.0, 1.0, -2.0, 1.0]);
         let [worst, mean] = summary(&curves("lame", &found)).unwrap();
         assert!((worst[1].error - 0.04).abs() < 1e-12, "{worst:?}");
-        // (4 · 1 + 4)/5 of the square.
+        // The mean square is (4 · 1 + 4)/5 of the square.
         assert!((mean[1].error - 0.02 * 1.6_f64.sqrt()).abs() < 1e-12);
         let svg = draw(&found).svg().to_owned();
         for text in [
@@ -306,7 +310,7 @@ mod tests {
         ] {
             assert!(svg.contains(text), "{svg}");
         }
-        // On other meshes there is nothing to compare; the curves keep their names.
+        // Curves on different meshes have no summary; they keep their names.
         found.study.pop();
         assert!(summary(&curves("lame", &found)).is_none());
         assert!(draw(&found).svg().contains("4 mm: order"));

@@ -9,8 +9,8 @@ use crate::verify::press::Pressed;
 use crate::verify::tolerance::NEARLY_INCOMPRESSIBLE;
 use crate::verify::{Findings, Options, Row, StudyPoint, VerifyError};
 
-/// Upper right corner of Cook's membrane: our own Q2-Q1 meshes of 8 to 64 elements per side tend to 7.77; 7.769 is the value
-/// usually quoted.
+/// Displacement of the upper right corner of Cook's membrane. Our own Q2-Q1 meshes of 8 to 64
+/// elements per side tend to 7.77; 7.769 is the value usually quoted.
 const COOK: f64 = 7.769;
 const COOK_YOUNG: f64 = 250.0;
 const COOK_TRACTION: f64 = 6.25;
@@ -39,7 +39,7 @@ fn slide_in(supports: &mut Supports, body: &LayeredBody, face: usize, normal: Ve
     }
 }
 
-/// Nodal forces of a traction on a cut face: `traction` of an edge's ends.
+/// Nodal forces of a traction on a cut face; `traction` gets the two ends of an edge.
 fn face_forces(
     body: &LayeredBody,
     face: usize,
@@ -85,7 +85,7 @@ fn solve(
     Ok(pressed)
 }
 
-/// A quarter of a tube, 12 to 35 mm, under 1 kPa from inside.
+/// A quarter of a tube with radii 12 and 35 mm, under 1 kPa from inside.
 pub(crate) fn lame(_: &Options) -> Result<Findings, VerifyError> {
     const CASE: &str = "lame";
     let (young, a, b, p) = (30e3, 0.012, 0.035, 1e3);
@@ -219,7 +219,8 @@ fn cook_in_plane(n: usize) -> (LayeredBody, Supports, Vec3) {
     (body, supports, Vec3::y())
 }
 
-/// The upper side of the membrane is the skin, one cell wide, and the levels go down through it.
+/// A mesh of the membrane whose upper side is the skin, one cell wide; the levels go down through
+/// it.
 fn cook_across(n: usize) -> (LayeredBody, Supports, Vec3) {
     let grid = Grid {
         n_cells: [n, 1],

@@ -1,4 +1,4 @@
-//! What the cases share: bodies pressed by a disc that is bonded, or by a tool.
+//! Shared by the cases: bodies pressed by a bonded disc or by a tool.
 
 use palpa_fem::shape::{Pose, Tool};
 use palpa_fem::{
@@ -9,7 +9,7 @@ use palpa_mesh::{LayeredBody, Vec3};
 
 use crate::verify::VerifyError;
 
-/// Share of the pair's mean deviator in all cases: what a scene has by default.
+/// Share of the pair's mean deviator in all cases: the default of a scene.
 pub(crate) const ALPHA: f64 = 0.8;
 
 /// A body that is being pressed.
@@ -39,7 +39,7 @@ impl Pressed {
         })
     }
 
-    /// On a fixed base, of one material for each layer.
+    /// A body on a fixed base, with one material for each layer.
     pub(crate) fn layered(
         body: &LayeredBody,
         materials: Vec<Material>,
@@ -55,7 +55,7 @@ impl Pressed {
         self.model.n_free_nodes()
     }
 
-    /// Solves for a load; a step that does not converge is an error.
+    /// Solves for a load. If it does not converge, returns an error that names `what`.
     pub(crate) fn step(&mut self, load: &Load<'_>, what: &str) -> Result<StepReport, VerifyError> {
         let before = Load {
             tools: &self.tools,
@@ -81,7 +81,7 @@ impl Pressed {
         Ok(report)
     }
 
-    /// Moves the skin over `vertices` down by `depth`, bonded; gives the force that resists, N.
+    /// Moves the bonded skin vertices down by `depth`, m. Returns the resisting force, N.
     pub(crate) fn hold_down(&mut self, vertices: &[u32], depth: f64) -> Result<f64, VerifyError> {
         let held: Vec<(usize, Vec3)> = vertices
             .iter()
@@ -95,7 +95,7 @@ impl Pressed {
         Ok(report.held_force.z)
     }
 
-    /// Moves a tool down to `depth` below the plane z = 0, over (x, y).
+    /// Moves a tool at (x, y) down to `depth`, m, below the plane z = 0.
     pub(crate) fn press(
         &mut self,
         tool: Tool,
@@ -113,7 +113,8 @@ impl Pressed {
         self.step(&load, &format!("tool at {:.3} mm", depth * 1e3))
     }
 
-    /// Displacement of the skin at reference points, linear in its triangle; `None` off the skin.
+    /// Displacement of the skin at the reference point (x, y), m, linear in its triangle; `None`
+    /// off the skin.
     pub(crate) fn skin_displacement(&self, x: f64, y: f64) -> Option<Vec3> {
         let body = self.model.body();
         for triangle in &body.skin.triangles {

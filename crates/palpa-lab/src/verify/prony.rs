@@ -1,4 +1,5 @@
-//! Relaxation (A5): the force of a body pressed over time, over that of the same body without viscosity.
+//! Relaxation (A5): the force of a pressed body over time, relative to the same body without
+//! viscosity.
 
 use palpa_fem::law::{Linear, Moduli, NeoHookean, Prony, PronyTerm};
 use palpa_fem::{Law, Load, Material};
@@ -10,7 +11,8 @@ use crate::verify::tolerance::PRONY;
 use crate::verify::{Findings, Options, Row, VerifyError};
 
 const CASE: &str = "prony";
-/// Depth of the press, m: small, so that force is in proportion to depth also where strain is finite.
+/// Depth of the press, m: small, so that the force is proportional to the depth at finite strain
+/// too.
 const DEPTH: f64 = 2e-5;
 
 pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
@@ -43,7 +45,7 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
 
 fn viscous(law: Law, g: f64, tau: f64) -> Material {
     let term = PronyTerm { g, tau };
-    // The volume relaxes too, so that Poisson's ratio is constant, as in the formula.
+    // The bulk modulus relaxes too, so that Poisson's ratio is constant, as in the formula.
     let prony = Prony::new(vec![term], Moduli::Instantaneous, true).expect("valid series");
     Material {
         prony: Some(prony),
@@ -51,7 +53,7 @@ fn viscous(law: Law, g: f64, tau: f64) -> Material {
     }
 }
 
-/// Force on the disc at the end of a step of a given duration.
+/// Force on the disc at the end of a step of a given duration, N.
 fn hold(
     pressed: &mut Pressed,
     patch: &[u32],

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use palpa_fem::Supports;
 use palpa_mesh::{CutFace, LayeredBody, Surface, Vec3};
 
-/// What a sector is cut from.
+/// The body that a sector is cut from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outline {
     /// A disc: a sixth of it.
@@ -22,7 +22,7 @@ pub(crate) enum Outline {
 }
 
 impl Outline {
-    /// Sectors in a turn.
+    /// Number of sectors in a full turn.
     pub(crate) fn n_sectors(self) -> f64 {
         match self {
             Self::Round => 6.0,
@@ -35,19 +35,19 @@ impl Outline {
     }
 }
 
-/// Where the disc is finest.
+/// The region of the disc with the finest edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finest {
     /// At its rim, where a punch has its edge.
     Rim,
-    /// All over, for contact that ends somewhere in it.
+    /// The whole disc, for a contact whose edge lies inside it.
     Inside,
-    /// All over and for some radii around, for displacements there.
+    /// The disc and some radii around it, for displacements there.
     Around,
 }
 
 impl Finest {
-    /// Over so many radii of the disc edges begin to lengthen from where they are finest.
+    /// Distance over which edges begin to lengthen outside the finest region, in radii of the disc.
     fn reach(self) -> f64 {
         match self {
             Self::Rim => 0.5,
@@ -68,8 +68,9 @@ pub(crate) struct Sector {
 }
 
 impl Sector {
-    /// With an inner disc of radius `ring` whose rim has edges of about a `n`th of that, and layers of the given
-    /// thicknesses, m. `width` is the radius of the whole body, or half the side of the square.
+    /// A sector with an inner disc of radius `ring`, m, and layers of the given thicknesses, m.
+    /// Edges at the rim of the disc are about `ring/n` long. `width` is the radius of the whole
+    /// body or half the side of the square, m.
     pub(crate) fn new(
         outline: Outline,
         ring: f64,
@@ -84,7 +85,8 @@ impl Sector {
             triangles: Vec::new(),
         };
         let angle = outline.angle();
-        // Six edges to a turn for each of the radius, so that rings of equal steps are a lattice of equilateral triangles.
+        // A full ring has six edges per edge length of its radius, so that rings with equal steps
+        // form a lattice of equilateral triangles.
         let edges = |r: f64, h: f64| (6.0 / outline.n_sectors() * r / h).round() as usize;
         let on_rim = edges(ring, h);
         let step = angle / on_rim as f64;
@@ -158,8 +160,8 @@ impl Sector {
     }
 }
 
-/// Edges that lengthen with the distance x from the load as `h (1 + x/x₀)^(4/3)`: as its field decays, that spends vertices
-/// where they save most error.
+/// Edges that lengthen with the distance x from the load as `h (1 + x/x₀)^(4/3)`. As the field of
+/// the load decays, this puts vertices where they reduce the error most.
 struct Grading {
     h: f64,
     reach: f64,
@@ -170,7 +172,7 @@ impl Grading {
         self.h * (1.0 + x / self.reach).powf(4.0 / 3.0)
     }
 
-    /// Edges from 0 to x.
+    /// Number of edges from 0 to x.
     fn count(&self, x: f64) -> f64 {
         3.0 * self.reach / self.h * (1.0 - (1.0 + x / self.reach).powf(-1.0 / 3.0))
     }
@@ -180,14 +182,14 @@ impl Grading {
         self.reach * ((1.0 - count * self.h / (3.0 * self.reach)).powi(-3) - 1.0)
     }
 
-    /// Divides an interval into at least so many edges; both ends included.
+    /// Divides an interval into at least `least` edges. Returns the points, both ends included.
     fn divide(&self, from: f64, to: f64, least: usize) -> Vec<f64> {
         let (a, b) = (self.count(from), self.count(to));
         let n = ((b - a).round() as usize).max(least);
         let mut at: Vec<f64> = (0..=n)
             .map(|i| self.position(a + (b - a) * i as f64 / n as f64))
             .collect();
-        // But for rounding they are.
+        // Set exactly, because rounding moves the end points slightly.
         (at[0], at[n]) = (from, to);
         at
     }
@@ -200,7 +202,8 @@ struct Ring {
     n: usize,
 }
 
-/// Adds an arc of `n` edges and a radius for every angle, and the triangles between it and the one inside.
+/// Adds an arc of `n` edges and a radius for every angle, and the triangles between it and the one
+/// inside.
 fn add_ring(
     skin: &mut Surface,
     inner: Ring,
@@ -220,7 +223,8 @@ fn add_ring(
     let (mut i, mut j) = (0, 0);
     while i < inner.n || j < n {
         let [a, b] = [inner.first + i, outer.first + j].map(|v| v as u32);
-        // The next edge is that whose end comes first, the outer one if they are level.
+        // Of the next inner and outer edge, the one that ends first is used; the outer one if both
+        // end at the same angle.
         if i == inner.n || (j < n && (j + 1) * inner.n <= (i + 1) * n) {
             skin.triangles.push([a, b, b + 1]);
             j += 1;
@@ -232,7 +236,7 @@ fn add_ring(
     outer
 }
 
-/// The straight sides.
+/// The two straight sides, as cut faces.
 fn sides(skin: &Surface, angle: f64) -> Vec<CutFace> {
     [0.0, angle]
         .map(|angle: f64| {

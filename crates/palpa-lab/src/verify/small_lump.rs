@@ -1,4 +1,4 @@
-//! A lump smaller than a prism: with the mesh as coarse as it is, and refined round the lump.
+//! A lump smaller than a prism: on the coarse mesh, compared with a mesh refined round the lump.
 
 use palpa_fem::law::NeoHookean;
 use palpa_fem::lump::{Lump, LumpShape};
@@ -15,21 +15,23 @@ use crate::verify::tolerance::SMALL_LUMP;
 use crate::verify::{Findings, Options, Row, VerifyError};
 
 const CASE: &str = "small lump";
-/// Radius of the bonded disc, and of the lump, m.
+/// Radius of the bonded disc, m.
 const DISC: f64 = 0.021;
+/// Radius of the lump, m.
 const LUMP: f64 = 0.003;
-/// Length of the coarse mesh's edges within the disc, m: a lump fits under one triangle.
+/// Edge length of the coarse mesh within the disc, m: a lump fits under one triangle.
 const EDGE: f64 = 0.0105;
 /// Levels of the coarse mesh, m.
 const LEVELS: [f64; 5] = [0.0, 0.006, 0.012, 0.024, 0.04];
 /// Depths of the lump's middle, m, under the centroid of a triangle at the middle of the disc.
 const DEPTHS: [f64; 2] = [0.009, 0.012];
-/// Stiffness of the surroundings and of the lump, Pa.
+/// Young's modulus of the surroundings and of the lump, Pa.
 const YOUNG: [f64; 2] = [10e3, 300e3];
-/// How deep the disc is pressed, m.
+/// Depth to which the disc is pressed, m.
 const PRESS: f64 = 1e-3;
 
-/// Force with the lump over that without, on one mesh, and its nodes.
+/// Force with the lump relative to the force without it, on one mesh; and the number of nodes that
+/// can move.
 fn ratio(body: &LayeredBody, patch: &[u32], middle: &Vec3) -> Result<(f64, usize), VerifyError> {
     let law = |young| NeoHookean::from_young(young, 0.45).expect("valid constants");
     let force = |has_lump: bool| -> Result<(f64, usize), VerifyError> {
@@ -105,7 +107,8 @@ pub(crate) fn run(_: &Options) -> Result<Findings, VerifyError> {
     Ok(findings)
 }
 
-/// Skin vertices of a refined body that lie within the coarse ring: on the same held polygon.
+/// Skin vertices of a refined body inside the ring of the coarse body, so that the same polygon is
+/// held.
 fn inside(body: &LayeredBody, coarse: &LayeredBody, block: &GradedBlock) -> Vec<u32> {
     let held = block.patch_vertices(coarse);
     let triangles = coarse

@@ -1,4 +1,5 @@
-//! Layers of linear material under punches, pressures and spheres at small strain: what A1 to A3 share.
+//! Layers of linear material under punches, pressures and spheres at small strain; shared by A1 to
+//! A3.
 
 use palpa_fem::law::Linear;
 use palpa_fem::shape::{Sphere, Tool};
@@ -9,20 +10,24 @@ use crate::verify::VerifyError;
 use crate::verify::press::Pressed;
 use crate::verify::sector::{Finest, Outline, Sector};
 
-/// Balance of forces, as a share of those that hold the body. Rounding over a wide body is worse than over a small one.
+/// Tolerance of the force balance, relative to the forces that hold the body. A wide body has
+/// larger rounding errors than a small one.
 const TOLERANCE: f64 = 1e-4;
 
-/// Share of the disc's radius that a sphere should touch: vertices are fine where its contact ends, which matters.
+/// Contact radius that a sphere should have, relative to the disc's radius: the mesh must be fine
+/// at the edge of the contact.
 pub(crate) const TOUCHED: f64 = 0.9;
-/// Edges to the disc's radius on which results are quoted, and with which they are studied: under punches and pressures,
-/// where the rim counts, and under spheres.
+/// Edges per radius of the disc for quoted results, under punches and pressures, where the rim
+/// matters.
 const RIM: usize = 16;
+/// Edges per radius of the disc under spheres.
 const INSIDE: usize = 10;
+/// Edges per radius of the disc where displacements around it are measured.
 const AROUND: usize = 8;
-/// Sizes of the meshes on which errors are studied, over the one on which results are quoted.
+/// Edge lengths of the meshes in the error study, relative to the mesh of the quoted results.
 pub(crate) const STUDIED: [f64; 4] = [2.0, 1.5, 1.0, 0.75];
 
-/// All that is measured is that of a sixth.
+/// Number of sectors in the whole body; a force on the sector is multiplied by it.
 const N_SECTORS: f64 = 6.0;
 
 /// A layer: thickness (m), Young's modulus (Pa) and Poisson's ratio.
@@ -40,7 +45,7 @@ impl Layer {
     }
 }
 
-/// What a press measures, and on how many nodes that can move.
+/// A measured value, and the number of nodes that can move.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measured {
     pub(crate) value: f64,
@@ -54,7 +59,8 @@ pub(crate) struct Stack {
 }
 
 impl Stack {
-    /// With a disc of radius `ring` m; edges are `size` times as long as where results are quoted.
+    /// A stack with a disc of radius `ring`, m. Edges are `size` times as long as on the mesh of
+    /// the quoted results.
     pub(crate) fn new(ring: f64, size: f64, finest: Finest, width: f64, layers: &[Layer]) -> Self {
         let thicknesses: Vec<f64> = layers.iter().map(|l| l.thickness).collect();
         let n = match finest {
@@ -77,7 +83,7 @@ impl Stack {
         Ok(pressed)
     }
 
-    /// Stiffness against a flat punch on the disc under which tissue slides freely, N/m.
+    /// Stiffness against a frictionless flat punch on the disc, N/m.
     pub(crate) fn punch(&self) -> Result<Measured, VerifyError> {
         let Sector { body, ring, .. } = &self.sector;
         let mut pressed = self.pressed()?;
@@ -96,7 +102,7 @@ impl Stack {
         })
     }
 
-    /// Stiffness against a disc that is bonded, N/m.
+    /// Stiffness against a bonded disc, N/m.
     pub(crate) fn bonded(&self) -> Result<Measured, VerifyError> {
         let Sector { patch, ring, .. } = &self.sector;
         let mut pressed = self.pressed()?;
@@ -107,7 +113,8 @@ impl Stack {
         })
     }
 
-    /// The ring of vertices next to `radius`: its radius, and its mean displacement along the radius and downwards, m.
+    /// The ring of vertices nearest to `radius`: its radius, m, and its mean radial and downward
+    /// displacement, m.
     pub(crate) fn ring_displacement(&self, pressed: &Pressed, radius: f64) -> (f64, [f64; 2]) {
         let body = &self.sector.body;
         let nearest = body
@@ -129,7 +136,8 @@ impl Stack {
         (nearest, sum.map(|u| u / n))
     }
 
-    /// The stack under 1 N that is spread evenly over the disc, and its mean indentation, m.
+    /// Solves the stack under 1 N spread evenly over the disc. Returns it with the mean
+    /// indentation, m.
     pub(crate) fn under_pressure(&self) -> Result<(Pressed, f64), VerifyError> {
         let Sector { body, patch, .. } = &self.sector;
         let mut pressed = self.pressed()?;
@@ -160,16 +168,18 @@ impl Stack {
         Ok((pressed, N_SECTORS * work))
     }
 
-    /// Force on a paraboloid r²/2R whose tip is `depth` below the plane, N. It should touch nearly all of the disc, see
-    /// [`TOUCHED`]. It is solved for a depth of `shallow` radii of the disc: so little that vertices hardly slide along the
-    /// sphere. Linear material has no scale of its own, and the force is carried over to the depth that is asked for.
+    /// Force on a paraboloid r²/2R whose tip is `depth` below the plane, N. It should touch nearly
+    /// all of the disc, see [`TOUCHED`]. The problem is solved for a depth of `shallow` radii of
+    /// the disc, so small that vertices hardly slide along the sphere. Linear material has no
+    /// length scale, so the force can be scaled to the requested depth.
     pub(crate) fn paraboloid(
         &self,
         radius: f64,
         depth: f64,
         shallow: f64,
     ) -> Result<Measured, VerifyError> {
-        // So shallow a sphere is a paraboloid that touches the same place; the force is smaller by the scale.
+        // At this depth the sphere is a paraboloid with the same contact, and the force is smaller
+        // by `scale`.
         let shallow = shallow * self.sector.ring;
         let scale = shallow / depth;
         let radius = radius / scale;
@@ -181,8 +191,8 @@ impl Stack {
         })
     }
 
-    /// Force on a smooth tool whose tip is `depth` below the plane, N. It should touch nearly all of the disc, see
-    /// [`TOUCHED`]. `height` is that of the tool over its tip, m.
+    /// Force on a smooth tool whose tip is `depth` below the plane, N. It should touch nearly all
+    /// of the disc, see [`TOUCHED`]. `height` is the height of the tool over its tip, m.
     pub(crate) fn indented(
         &self,
         tool: Tool,
@@ -192,7 +202,8 @@ impl Stack {
         let Sector { body, ring, .. } = &self.sector;
         let mut pressed = self.pressed()?;
         pressed.params.gap_tolerance = 1e-6 * depth;
-        // A guess of what touches, so that the search for it is short: all of the disc, and nothing outside.
+        // Initial guess for the contact, to shorten the search: the whole disc, and nothing
+        // outside.
         for (v, p) in body.skin.points.iter().enumerate() {
             let r = p.norm();
             let apart = if r <= *ring { -1e-3 } else { 1e-3 };

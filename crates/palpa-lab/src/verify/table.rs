@@ -52,7 +52,7 @@ impl Table {
         self.rows.len()
     }
 
-    /// The text in a column that was asked for when reading.
+    /// The text in a column that was requested when reading.
     pub(crate) fn text(&self, row: usize, column: &str) -> &str {
         let at = self.header.iter().position(|h| h == column);
         at.and_then(|at| self.rows[row].get(at))

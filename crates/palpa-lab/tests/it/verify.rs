@@ -3,7 +3,7 @@
 use palpa_lab::verify::{Case, Options, VerifyError, cases, tolerance};
 
 /// Cases that take long without optimisation; `make test-slow` runs all.
-const SLOW: [&str; 2] = ["contact", "small lump"];
+const SLOW: [&str; 3] = ["cone", "contact", "small lump"];
 
 #[test]
 fn cases_by_formula_pass() {
@@ -28,7 +28,8 @@ fn cases_by_formula_pass() {
     assert_eq!(n_cases, 5);
 }
 
-/// On each curve the error on the finest mesh is the smallest, and much smaller than on the coarsest.
+/// On each curve the error on the finest mesh is the smallest, and much smaller than on the
+/// coarsest.
 #[test]
 fn errors_fall_as_the_mesh_becomes_finer() {
     let case = cases().iter().find(|case| case.name == "lame").unwrap();

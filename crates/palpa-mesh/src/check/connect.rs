@@ -1,4 +1,4 @@
-//! Checks of how triangles hang together: edges, boundaries, parts, winding.
+//! Checks of the connectivity: edges, boundaries, parts, winding.
 
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
@@ -10,47 +10,51 @@ use crate::repair::{DEFAULT_WELD_TOLERANCE, duplicates, used_bounds};
 use crate::topology::{Side, UnionFind, by_edge, components, has_sides, sides};
 use crate::{Surface, Vec3};
 
-/// A boundary loop in one plane encloses a cut face, if that is more than this share of the area of its part; less is a hole.
+/// A boundary loop in one plane counts as a cut face if it spans more than this share of the area
+/// of its part. A smaller one counts as a hole.
 const SMALLEST_CUT: f64 = 0.01;
-/// A loop that does not lie in one plane is the rim of a sheet, if it spans more than this share of the area.
+/// A loop that is not in one plane counts as the rim of a sheet if it spans more than this share of
+/// the area. A smaller one counts as a hole.
 const SMALLEST_RIM: f64 = 0.05;
-/// How far the vertices of a flat loop may lie off its plane, as a share of its length.
+/// Largest distance of a flat loop's vertices from its plane, as a share of its length.
 const FLATNESS: f64 = 2e-3;
 
-/// A part of a surface that hangs together over edges.
+/// A part of a surface: triangles connected over edges.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Part {
-    /// Triangles in it.
+    /// Number of triangles in the part.
     pub n_triangles: usize,
-    /// Whether every edge has two triangles or more.
+    /// Whether every edge has at least two triangles.
     pub is_closed: bool,
-    /// Its area. m²
+    /// Area of the part. m²
     pub area: f64,
-    /// The volume it encloses, with its boundary loops capped; negative where it faces inward. m³
+    /// Volume enclosed by the part with its boundary loops capped; negative if the part faces
+    /// inward. m³
     pub volume: f64,
-    /// Its first triangle.
+    /// The first triangle of the part.
     pub triangle: u32,
 }
 
-/// Boundary edges that hang together.
+/// Connected boundary edges.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoundaryLoop {
-    /// Edges in it.
+    /// Number of edges in the loop.
     pub n_edges: usize,
-    /// Its length. m
+    /// Length of the loop. m
     pub length: f64,
-    /// The area it spans, as seen along the normal of its plane. m²
+    /// Area that the loop spans, seen along the normal of its plane. m²
     pub area: f64,
-    /// Whether it lies in one plane.
+    /// Whether the loop lies in one plane.
     pub is_flat: bool,
-    /// The mean of its vertices. m
+    /// Mean of the loop's vertices. m
     pub centre: [f64; 3],
-    /// Whether it looks like a hole rather than a cut face or the rim of a sheet.
+    /// Whether the loop looks like a hole rather than a cut face or the rim of a sheet.
     pub is_hole: bool,
 }
 
 pub(super) fn check(surface: &Surface, report: &mut SurfaceReport, findings: &mut Findings) {
-    // Doubles have a finding of their own; with them, each of their edges would seem crowded.
+    // Double triangles have a finding of their own. If they took part here, each of their edges
+    // would count as non-manifold.
     let mut is_double = vec![false; surface.triangles.len()];
     for (_, t) in duplicates(surface) {
         is_double[t as usize] = true;
@@ -61,7 +65,7 @@ pub(super) fn check(surface: &Surface, report: &mut SurfaceReport, findings: &mu
     );
     check_edges(surface, &sides, report, findings);
     check_vertices(surface, &sides, findings);
-    // Volumes mean something only where the winding is one.
+    // Volumes are meaningful only if the winding is consistent.
     let wound = check_winding(surface, &sides, findings);
     let parts = components(surface, &sides);
     let area_of_part = check_parts(&wound, &sides, &parts, report, findings);
@@ -121,9 +125,10 @@ fn check_edges(
     }
 }
 
-/// Vertices at which fans of triangles meet that share no edge there.
+/// Finds vertices where fans of triangles meet that share no edge at the vertex.
 fn check_vertices(surface: &Surface, sides: &[Side], findings: &mut Findings) {
-    // Corner k of triangle t is number 3t + k; corners at a vertex are joined where their triangles share an edge there.
+    // Corner k of triangle t has the number 3t + k. Corners at a vertex are joined if their
+    // triangles share an edge there.
     let corner = |side: &Side, v: u32| {
         let k = surface.triangles[side.triangle as usize]
             .iter()
@@ -171,7 +176,8 @@ fn check_vertices(surface: &Surface, sides: &[Side], findings: &mut Findings) {
     );
 }
 
-/// Reports triangles wound against their neighbours and parts that face inward; returns the surface with one winding per part.
+/// Reports triangles with a winding against their neighbours, and parts that face inward. Returns
+/// the surface with one winding per part.
 fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> Surface {
     let mut wound = surface.clone();
     let (mut odd, mut inverted, mut one_sided, mut unclear) = (vec![], vec![], vec![], vec![]);
@@ -197,7 +203,8 @@ fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> 
             }
         }
     }
-    // Single triangles between crowded edges are flat, too; that says nothing about the surface.
+    // Single triangles between non-manifold edges are flat, too, but that says nothing about the
+    // surface.
     if 2.0 * unclear_area < area {
         unclear.clear();
     }
@@ -246,7 +253,7 @@ fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> 
     wound
 }
 
-/// Describes the parts; returns for each its area.
+/// Describes the parts; returns the area of each.
 fn check_parts(
     wound: &Surface,
     sides: &[Side],
@@ -351,7 +358,7 @@ fn check_boundary(
     report.loops = loops.into_iter().take(N_LISTED).map(|(l, _)| l).collect();
 }
 
-/// Whether a chain of boundary edges comes back to where it starts. The rim of a fin does not.
+/// Whether a chain of boundary edges returns to its start. The rim of a fin does not.
 fn is_closed(chain: &[Side]) -> bool {
     let mut ends: Vec<u32> = chain.iter().flat_map(|side| side.edge).collect();
     ends.sort_unstable();
@@ -388,7 +395,8 @@ fn describe_loop(surface: &Surface, chain: &[Side], part_area: f64) -> BoundaryL
     }
 }
 
-/// Boundary vertices on the inside of a boundary edge: the surface looks closed there and is not.
+/// Finds boundary vertices that lie inside a boundary edge: there the surface looks closed but is
+/// not.
 fn check_t_junctions(surface: &Surface, boundary: &[Side], findings: &mut Findings) {
     let tolerance = DEFAULT_WELD_TOLERANCE * used_bounds(surface).map_or(0.0, diagonal);
     let is_finite = |v: u32| surface.points[v as usize].iter().all(|x| x.is_finite());
@@ -433,7 +441,8 @@ fn check_t_junctions(surface: &Surface, boundary: &[Side], findings: &mut Findin
     );
 }
 
-/// Edges whose boxes a vertex may lie in before the search gives up. A clean boundary has two.
+/// Largest number of edges whose boxes may contain a vertex before the search gives up. A clean
+/// boundary has two.
 const MAX_LINES_PER_VERTEX: usize = 1000;
 
 fn is_inside_segment(p: &Vec3, a: &Vec3, b: &Vec3, tolerance: f64) -> bool {

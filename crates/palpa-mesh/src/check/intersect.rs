@@ -1,7 +1,7 @@
 //! Triangles of one surface that cross or touch each other.
 //!
-//! Decided by exact predicates, so that neither a near miss nor a graze is called wrongly. Candidates come from a tree of
-//! bounding boxes.
+//! Exact predicates decide, so that a near miss or a graze is never judged wrongly. Candidates come
+//! from a tree of bounding boxes.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -11,25 +11,28 @@ use super::{Finding, FindingKind, Findings, N_LISTED, Severity, Spot};
 use crate::repair::flaw;
 use crate::{Surface, Vec3};
 
-/// Pairs with overlapping boxes that are tested. A clean surface has about 12 per triangle, so this is room for more than a
-/// million triangles; a surface folded into many layers stops here.
+/// Largest number of pairs with overlapping boxes that are tested. A clean surface has about 12
+/// pairs per triangle, so this is enough for more than a million triangles. For a surface folded
+/// into many layers, the search stops here.
 const MAX_TESTS: usize = 20_000_000;
-/// Pairs that are kept.
+/// Largest number of pairs that are kept.
 const MAX_PAIRS: usize = 10_000;
 
-/// What a search for self-intersections found.
+/// The result of a search for self-intersections.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Intersections {
-    /// Pairs of triangles, the smaller index first, ascending.
+    /// Pairs of triangles, with the smaller index first, ascending.
     pub pairs: Vec<[u32; 2]>,
-    /// Whether the search went to its end; otherwise there may be more.
+    /// Whether the search was completed; if not, there may be more pairs.
     pub is_complete: bool,
 }
 
-/// Finds pairs of triangles that have more in common than the vertices and the edge that they share.
+/// Finds pairs of triangles that have more in common than their shared vertices and their shared
+/// edge.
 ///
-/// Triangles that touch in a point count, and so do those that lie on each other in one plane. Left out are doubles (the same
-/// three vertices), triangles without area, and those with a corner that is not finite.
+/// Triangles that touch in a point count, and so do triangles that overlap in one plane. The search
+/// leaves out doubles (the same three vertices), triangles without area, and triangles with a
+/// corner that is not finite.
 pub fn self_intersections(surface: &Surface) -> Intersections {
     search(surface, MAX_TESTS, MAX_PAIRS)
 }
@@ -95,7 +98,7 @@ fn search(surface: &Surface, max_tests: usize, max_pairs: usize) -> Intersection
     found
 }
 
-/// Whether two triangles have more in common than the vertices that they share.
+/// Whether two triangles have more in common than their shared vertices.
 fn do_intersect(surface: &Surface, one: u32, other: u32) -> bool {
     let (s, t) = (
         surface.triangles[one as usize],
@@ -106,7 +109,8 @@ fn do_intersect(surface: &Surface, one: u32, other: u32) -> bool {
         surface.corners(one as usize),
         surface.corners(other as usize),
     );
-    // Shared vertices lie in both planes; asking the predicate would take its slow way to the same zero.
+    // Shared vertices lie in both planes. The predicate would give the same zero, but by its slow
+    // way.
     let mut own = (0..3).filter(|&k| !s.contains(&t[k]));
     if own.all(|k| side(&p[0], &p[1], &p[2], &q[k]) == 0) {
         return shared.len() < 3 && do_overlap_in_plane(&p, &q);
@@ -116,13 +120,14 @@ fn do_intersect(surface: &Surface, one: u32, other: u32) -> bool {
             let next = (k + 1) % 3;
             crosses(&p[k], &p[next], &q) || crosses(&q[k], &q[next], &p)
         }),
-        // At a shared vertex all sides through it touch; what is left is the side opposite in either triangle.
+        // At a shared vertex, all sides through it touch. Only the opposite side of each triangle
+        // must be tested.
         [k] => {
             let m = (0..3).find(|&m| t[m] == s[k]).unwrap_or(0);
             crosses(&p[(k + 1) % 3], &p[(k + 2) % 3], &q)
                 || crosses(&q[(m + 1) % 3], &q[(m + 2) % 3], &p)
         }
-        // Two planes through a shared edge have nothing else in common.
+        // Two planes through a shared edge have no other points in common.
         _ => false,
     }
 }
@@ -135,7 +140,7 @@ fn coord(p: &Vec3) -> Coord3D<f64> {
     }
 }
 
-/// The side of the plane through `a`, `b`, `c` on which `d` lies, as a sign.
+/// Which side of the plane through `a`, `b`, `c` the point `d` lies on, as a sign.
 fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> i8 {
     sign(orient3d(coord(a), coord(b), coord(c), coord(d)))
 }
@@ -144,8 +149,9 @@ fn sign(x: f64) -> i8 {
     i8::from(x > 0.0) - i8::from(x < 0.0)
 }
 
-/// Whether the segment from `a` to `b` meets a triangle, ends and rim included, unless it lies in its plane. (There, the
-/// other sides of the two triangles tell.)
+/// Whether the segment from `a` to `b` meets a triangle; the segment's ends and the triangle's rim
+/// count. A segment in the plane of the triangle does not count: the other sides of the two
+/// triangles decide then.
 fn crosses(a: &Vec3, b: &Vec3, [u, v, w]: &[Vec3; 3]) -> bool {
     let (at_a, at_b) = (side(u, v, w, a), side(u, v, w, b));
     if at_a * at_b > 0 || (at_a == 0 && at_b == 0) {
@@ -155,9 +161,10 @@ fn crosses(a: &Vec3, b: &Vec3, [u, v, w]: &[Vec3; 3]) -> bool {
     around.iter().all(|&s| s >= 0) || around.iter().all(|&s| s <= 0)
 }
 
-/// Whether two triangles in one plane have area in common: no side of either has the other wholly beyond it.
+/// Whether two triangles in one plane overlap in an area: no side of either separates them.
 fn do_overlap_in_plane(p: &[Vec3; 3], q: &[Vec3; 3]) -> bool {
-    // Along the axis of the largest normal component both keep their area; dropping a coordinate rounds nothing.
+    // Both triangles keep their area when they are projected along the axis of the largest normal
+    // component. Dropping a coordinate causes no rounding.
     let normal = (p[1] - p[0]).cross(&(p[2] - p[0]));
     let axis = normal.iamax();
     let flat = |x: &Vec3| Coord {
@@ -265,7 +272,7 @@ mod tests {
         let n = 30_u32;
         let mut points = vec![];
         for i in 0..n {
-            // A pencil of triangles round one axis, all crossing in it.
+            // Triangles round one axis, all crossing in it.
             let (y, x) = f64::from(i).sin_cos();
             points.extend(
                 [[-x, -y, 0.0], [x, y, 0.0], [0.0, 0.0, 1.0 + f64::from(i)]].map(Vec3::from),

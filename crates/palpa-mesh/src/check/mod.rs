@@ -1,4 +1,4 @@
-//! What is wrong with a surface, where, and what can be done about it.
+//! Checks of a surface: the defects, their places, and what can be done about them.
 
 mod connect;
 mod intersect;
@@ -12,23 +12,24 @@ use crate::{Surface, SurfaceFile, Vec3};
 pub use connect::{BoundaryLoop, Part};
 pub use intersect::{Intersections, self_intersections};
 
-/// Places that are listed of each finding, and parts and loops of each report; the counts are of all.
+/// Number of places listed for each finding, and of parts and loops listed in each report. The
+/// counts cover all of them.
 pub const N_LISTED: usize = 10;
 
-/// What a check of a surface has come to.
+/// The result of a check of a surface.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SurfaceReport {
-    /// The gravest of the findings.
+    /// The verdict, which follows from the most severe finding.
     pub verdict: Verdict,
-    /// Vertices.
+    /// Number of vertices.
     pub n_vertices: usize,
-    /// Triangles.
+    /// Number of triangles.
     pub n_triangles: usize,
-    /// Edges, each counted once.
+    /// Number of edges, each counted once.
     pub n_edges: usize,
-    /// Edges with one triangle.
+    /// Number of edges with one triangle.
     pub n_boundary_edges: usize,
-    /// Edges with three triangles or more.
+    /// Number of edges with three or more triangles.
     pub n_nonmanifold_edges: usize,
     /// Smallest coordinates of the finite points. m
     pub lower: [f64; 3],
@@ -36,15 +37,15 @@ pub struct SurfaceReport {
     pub upper: [f64; 3],
     /// Total area. m²
     pub area: f64,
-    /// Parts that hang together over edges.
+    /// Number of parts. A part is a set of triangles connected over edges.
     pub n_parts: usize,
-    /// The first [`N_LISTED`] of the parts, the largest area first.
+    /// The first [`N_LISTED`] parts, largest area first.
     pub parts: Vec<Part>,
-    /// Loops of boundary edges.
+    /// Number of loops of boundary edges.
     pub n_loops: usize,
-    /// The first [`N_LISTED`] of the loops, the longest first.
+    /// The first [`N_LISTED`] loops, longest first.
     pub loops: Vec<BoundaryLoop>,
-    /// What was found, the gravest first.
+    /// The findings, most severe first.
     pub findings: Vec<Finding>,
 }
 
@@ -52,15 +53,15 @@ pub struct SurfaceReport {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// As it is.
+    /// It can be used as it is.
     Good,
-    /// After [`repair`].
+    /// It can be used after [`repair`].
     Repairable,
-    /// Only after somebody has changed it by hand.
+    /// It can be used only after a change by hand.
     Bad,
 }
 
-/// How grave a finding is.
+/// How severe a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
@@ -72,22 +73,22 @@ pub enum Severity {
     Unrepairable,
 }
 
-/// One kind of thing that was found, wherever it occurs.
+/// One kind of finding, with all places where it occurs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What it is.
+    /// The kind of finding.
     pub kind: FindingKind,
-    /// How grave it is.
+    /// How severe it is.
     pub severity: Severity,
     /// How often it occurs.
     pub count: usize,
-    /// Whether counting stopped there, so that there may be more.
+    /// Whether counting stopped at `count`, so that there may be more.
     pub is_at_least: bool,
     /// The first [`N_LISTED`] places where it occurs.
     pub spots: Vec<Spot>,
-    /// What was found, in words.
+    /// Description of the finding, for people.
     pub message: String,
-    /// What to do.
+    /// Advice on what to do.
     pub advice: String,
 }
 
@@ -98,9 +99,9 @@ pub struct Finding {
 pub enum FindingKind {
     /// There are no triangles.
     Empty,
-    /// A triangle names a vertex that is not there.
+    /// A triangle uses a vertex index that does not exist.
     OutOfRange,
-    /// A coordinate is NaN, infinite or beyond all measure.
+    /// A coordinate is NaN, infinite or far too large.
     NotFinite,
     /// A triangle has a repeated vertex or no area.
     Degenerate,
@@ -118,40 +119,41 @@ pub enum FindingKind {
     Winding,
     /// A part faces inward as a whole.
     Inverted,
-    /// A part has but one side.
+    /// A part has only one side.
     OneSided,
     /// A small or crooked loop of boundary edges.
     Hole,
-    /// A vertex lies on an edge that it is no end of.
+    /// A vertex lies on an edge, but is not one of its ends.
     TJunction,
     /// Triangles cross or touch.
     SelfIntersection,
     /// A vertex belongs to no triangle.
     UnusedVertex,
-    /// Boundary loops as a cut limb or an open sheet has them.
+    /// Boundary loops such as those of a cut limb or an open sheet.
     OpenBoundary,
     /// There are several parts.
     SeveralParts,
     /// Triangles with very small angles.
     Sliver,
-    /// The size is not that of a part of a body in metres.
+    /// The size does not fit a body part in metres.
     Scale,
     /// The surface lies far from the origin.
     FarFromOrigin,
-    /// It is not clear which side of an open part is out.
+    /// It is not clear which side of an open part is the outside.
     UnclearSide,
 }
 
-/// Where something was found.
+/// The place of a finding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spot {
-    /// The vertices that name the place: one vertex, or the two ends of an edge.
+    /// The vertices that identify the place: one vertex, or the two ends of an edge.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub vertices: Vec<u32>,
-    /// The triangles that name the place.
+    /// The triangles that identify the place.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub triangles: Vec<u32>,
-    /// A point there (the centre of the first triangle, the middle of the edge). m
+    /// A point at the place (the vertex, the middle of the edge, or the centre of the first
+    /// triangle). m
     pub point: [f64; 3],
 }
 
@@ -183,12 +185,12 @@ impl Spot {
     }
 }
 
-/// What the checks add to, each only where there is something to add.
+/// The findings so far. The checks add to them.
 #[derive(Debug, Default)]
 struct Findings(Vec<Finding>);
 
 impl Findings {
-    /// Adds a finding for some things, unless there are none of them.
+    /// Adds a finding about some items, unless there are none.
     fn add<T>(
         &mut self,
         (kind, severity): (FindingKind, Severity),
@@ -230,10 +232,11 @@ impl Findings {
     }
 }
 
-/// Finds what is wrong with a surface. Coordinates are taken as metres; nothing is changed.
+/// Finds the defects of a surface. Coordinates count as metres. The surface is not changed.
 ///
-/// Topology is judged by vertex indices: weld first ([`crate::read_surface`] does). Time is about that of sorting, and bounded
-/// for surfaces that lie in many layers over each other: there the search for self-intersections stops and says so.
+/// Topology is judged by vertex indices, so weld first ([`crate::read_surface`] does). The check
+/// takes about as long as sorting. For surfaces with many layers over each other, the time is
+/// limited: the search for self-intersections stops early and says so.
 pub fn check_surface(surface: &Surface) -> SurfaceReport {
     let mut findings = Findings::default();
     let mut report = SurfaceReport {
@@ -252,7 +255,7 @@ pub fn check_surface(surface: &Surface) -> SurfaceReport {
         loops: vec![],
         findings: vec![],
     };
-    // What comes after takes indices for granted.
+    // The other checks require valid indices.
     if shape::check_indices(surface, &mut findings) {
         shape::check(surface, &mut report, &mut findings);
         connect::check(surface, &mut report, &mut findings);
@@ -270,26 +273,28 @@ pub fn check_surface(surface: &Surface) -> SurfaceReport {
     report
 }
 
-/// A check, and where it found something that [`repair`] removes, the repaired copy and its own check.
+/// A check of a surface. If [`repair`] can remove a defect, it also holds the repaired copy and the
+/// check of that copy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Examination {
-    /// [`Verdict::Repairable`] if, and only if, the repaired copy is good and the surface itself is not.
+    /// The verdict. It is [`Verdict::Repairable`] if, and only if, the repaired copy is good and
+    /// the surface itself is not.
     pub verdict: Verdict,
-    /// What was found.
+    /// The report on the surface itself.
     pub report: SurfaceReport,
-    /// What the repair came to, if there was anything for it to do.
+    /// The repaired copy and its reports; `None` if there was nothing to repair.
     pub repaired: Option<Repaired>,
 }
 
-/// A repaired copy and what is known about it.
+/// A repaired copy of a surface, with reports on it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Repaired {
-    /// The copy.
+    /// The repaired copy.
     #[serde(skip)]
     pub surface: Surface,
-    /// What the repair did.
+    /// The changes that the repair made.
     pub repair: RepairReport,
-    /// What is still wrong with the copy.
+    /// The check of the copy: the remaining defects.
     pub report: SurfaceReport,
 }
 
@@ -313,7 +318,8 @@ pub fn examine(surface: &Surface, options: &RepairOptions) -> Examination {
             report,
         }
     });
-    // Repair may remove more than it set out to: edges are crowded where triangles are doubled. And it may fall short.
+    // Repair may remove more than the finding it was meant for: edges are non-manifold where
+    // triangles are doubled. It may also fail to remove a defect.
     let is_mended = |r: &Repaired| r.report.verdict == Verdict::Good;
     let verdict = match report.verdict {
         Verdict::Good => Verdict::Good,
@@ -328,8 +334,8 @@ pub fn examine(surface: &Surface, options: &RepairOptions) -> Examination {
 }
 
 impl SurfaceFile {
-    /// [`examine`]s the surface of the file, scaled to metres by `metres_per_unit`; what the reader had to leave out or to guess
-    /// counts for the verdict.
+    /// [`examine`]s the surface of the file, scaled to metres by `metres_per_unit`. Notes from the
+    /// reader about left-out or guessed content also affect the verdict.
     pub fn examine(&self, metres_per_unit: f64, options: &RepairOptions) -> Examination {
         let mut examination = examine(&self.surface.scaled(metres_per_unit), options);
         let of_notes = self.notes.iter().map(|note| match note.severity() {
@@ -342,12 +348,12 @@ impl SurfaceFile {
     }
 }
 
-/// `n` things, with the words that follow for one and for more.
+/// The number `n` with its noun, singular or plural.
 fn counted(n: usize, one: &str, more: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { more })
 }
 
-/// A length for people, in the unit that fits it.
+/// A length for messages, in a suitable unit.
 fn length(metres: f64) -> String {
     match metres {
         x if x >= 1.0 => format!("{x:.3} m"),

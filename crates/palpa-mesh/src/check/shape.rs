@@ -1,20 +1,23 @@
-//! Checks of vertices and triangles one by one, and of the size of the whole.
+//! Checks of single vertices and triangles, and of the size of the surface.
 
 use super::{FindingKind, Findings, Severity, Spot, SurfaceReport, counted, diagonal, length};
 use crate::Surface;
 use crate::repair::{DEFAULT_WELD_TOLERANCE, duplicates, flaw, used_bounds};
 use crate::weld::weld_within;
 
-/// Coordinates beyond this are a slip, whatever the unit: a million kilometres, if in metres.
+/// Larger coordinates are an error, whatever the unit: in metres this is a million kilometres.
 const LARGEST_COORDINATE: f64 = 1e9;
-/// A triangle with a height below this share of its longest side is a sliver (an angle of about half a degree).
+/// A triangle is a sliver if its height is below this share of its longest side (an angle of about
+/// half a degree).
 const SLIVER_HEIGHT: f64 = 0.01;
-/// The diagonal that a part of a body may have in metres: from a finger's tip to more than a man's length.
+/// Plausible diagonals of a body part, in metres: from a fingertip to more than the height of a
+/// man.
 const BODY_SIZES: std::ops::RangeInclusive<f64> = 0.005..=3.0;
-/// A surface further from the origin than this many diagonals loses two digits and more in single precision.
+/// If a surface is further from the origin than this many diagonals, it loses two or more digits in
+/// single precision.
 const FAR: f64 = 100.0;
 
-/// Whether all triangles have their vertices, and there are triangles at all.
+/// Whether there are triangles and all their vertices exist.
 pub(super) fn check_indices(surface: &Surface, findings: &mut Findings) -> bool {
     let n = surface.points.len();
     let wild: Vec<u32> = (0..surface.triangles.len() as u32)

@@ -1,23 +1,26 @@
-//! A forearm by formula: skin from girths, ulna and radius from centre lines and half-widths.
+//! A forearm by formula: the skin from girths, ulna and radius from centre lines and half-widths.
 //!
 //! ```text
 //! +x  from the elbow to the wrist (0 at the upper cut)     z   dorsal
 //! +y  to the thumb's side                                  │ (U) (R)      U ulna, R radius
 //! +z  to the back of the hand's side                       └──── y
 //! ```
-//! Where the numbers come from is said at each table. None is a measurement of one person; the shape is for trying
-//! things out without a download, and forces from it are as good as its assumed tissues.
+//! Each table names the source of its numbers. None of them is a measurement of one person. The
+//! shape is for experiments without a download; forces from it are only as good as its assumed
+//! tissues.
 
 use std::f64::consts::TAU;
 
 use super::tube::{Ends, resolution, tube};
 use crate::{Surface, Vec3};
 
-/// Length between the cuts. Assumed: a man's forearm of about 0.25 m less the ends at the joints.
+/// Length between the cuts. Assumed: a man's forearm of about 0.25 m without the ends at the
+/// joints.
 const LENGTH: f64 = 0.22;
 
-/// Girth along the arm, `[x, girth]` in m. The largest is 270 mm (general anthropometry, NASA-STD-3000 and ANSUR, quoted
-/// from memory: adults 270, s.d. 20); the wrist's 165 mm and the course between are assumed.
+/// Girth along the arm, `[x, girth]` in m. The largest is 270 mm (general anthropometry,
+/// NASA-STD-3000 and ANSUR, quoted from memory: adults 270, s.d. 20). The wrist's 165 mm and the
+/// values between are assumed.
 const GIRTH: [[f64; 2]; 6] = [
     [0.0, 0.262],
     [0.035, 0.270],
@@ -27,14 +30,16 @@ const GIRTH: [[f64; 2]; 6] = [
     [0.22, 0.165],
 ];
 
-/// Width over height of the section, `[x, ratio]`. Assumed: nearly round at the elbow, flat at the wrist.
+/// Ratio of width to height of the section, `[x, ratio]`. Assumed: nearly round at the elbow, flat
+/// at the wrist.
 const FLATNESS: [[f64; 2]; 3] = [[0.0, 1.05], [0.12, 1.12], [0.22, 1.38]];
 
 /// A bone: rows `[x, y, z, half-width along y, half-width along z]` in m.
 type Bone = [[f64; 5]; 6];
 
-/// Ulna. Shaft radius 7–8 mm (textbook, from memory); places, the olecranon's and the head's widths are assumed. It
-/// lies towards the little finger and close under the skin at its edge.
+/// Ulna. Shaft radius 7–8 mm (textbook, from memory). Positions and the widths of the olecranon and
+/// the head are assumed. The ulna lies on the side of the little finger, close under the skin at
+/// the edge of the arm.
 const ULNA: Bone = [
     [-0.010, -0.012, 0.015, 0.0105, 0.0115],
     [0.030, -0.014, 0.016, 0.0090, 0.0095],
@@ -44,7 +49,8 @@ const ULNA: Bone = [
     [0.230, -0.0175, 0.0055, 0.0075, 0.0075],
 ];
 
-/// Radius. Shaft radius 7–8 mm (textbook, from memory); places, the head's and the wrist end's widths are assumed.
+/// Radius. Shaft radius 7–8 mm (textbook, from memory). Positions and the widths of the head and
+/// the wrist end are assumed.
 const RADIUS: Bone = [
     [-0.005, 0.0145, 0.0090, 0.0105, 0.0105],
     [0.020, 0.0155, 0.0090, 0.0080, 0.0080],
@@ -54,8 +60,8 @@ const RADIUS: Bone = [
     [0.230, 0.0110, 0.0020, 0.0140, 0.0095],
 ];
 
-/// Skin (open at both cuts), ulna and radius of an average adult's forearm, times `scale`; skin edges about `spacing`
-/// metres long.
+/// Skin (open at both cuts), ulna and radius of an average adult's forearm, scaled by `scale`.
+/// Edges of the skin are about `spacing` metres long.
 ///
 /// # Panics
 /// Unless `spacing` and `scale` are positive.
@@ -72,11 +78,12 @@ pub fn forearm(spacing: f64, scale: f64) -> (Surface, [Surface; 2]) {
     (skin, [&ULNA, &RADIUS].map(|b| bone(b, scale)))
 }
 
-/// A point of the skin: an ellipse of the girth and flatness at `x`.
+/// A point of the skin: on an ellipse with the girth and flatness at `x`.
 fn skin_point(x: f64, angle: f64) -> Vec3 {
     let flatness = spline(&FLATNESS, x, 1).sqrt();
     let (width, height) = (flatness, 1.0 / flatness);
-    // The perimeter of the ellipse of these half-axes, by Ramanujan's second formula (relative error below 1e-9 here).
+    // The perimeter of the ellipse of these half-axes, by Ramanujan's second formula (relative
+    // error below 1e-9 here).
     let h = ((width - height) / (width + height)).powi(2);
     let perimeter =
         0.5 * TAU * (width + height) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
@@ -99,8 +106,8 @@ fn bone(rows: &Bone, scale: f64) -> Surface {
     })
 }
 
-/// Smooth interpolation of a column in a table of rows that begin with x: cubic Hermite with the slopes of the
-/// neighbours (Catmull–Rom for uneven rows); constant beyond the ends.
+/// Smooth interpolation of a column in a table whose rows begin with x. It is cubic Hermite with
+/// slopes from the neighbouring rows (Catmull–Rom for uneven rows), and constant beyond the ends.
 fn spline<const N: usize>(rows: &[[f64; N]], x: f64, column: usize) -> f64 {
     let last = rows.len() - 1;
     let i = rows.partition_point(|row| row[0] <= x).clamp(1, last) - 1;

@@ -1,4 +1,4 @@
-//! A block that is fine where it is pressed and coarse far away: the body on which accuracy is studied.
+//! A block that is fine under the tool and coarse far away: the body for studies of accuracy.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,13 +8,14 @@ use super::levels::LevelStack;
 use super::random::Random;
 use crate::{CutFace, LayeredBody, Surface, Vec3};
 
-/// Height of an equilateral triangle over its side: how far apart rings lie.
+/// Ratio of the height to the side of an equilateral triangle: the distance between rings.
 const ROW: f64 = 0.866_025_403_784_438_6;
 /// Irregular meshes move their vertices by up to this share of the spacing, in x and in y.
 const JITTER: f64 = 0.25;
-/// No vertex lies closer to a straight side than this share of the spacing there.
+/// Least distance of inner vertices from a straight side, as a share of the spacing there.
 const MARGIN: f64 = 0.6;
-/// Rounds in which the free vertices outside the ring move to the middle of their neighbours.
+/// Number of rounds in which the free vertices outside the ring move towards the mean of their
+/// neighbours.
 const SMOOTHING: usize = 4;
 
 /// The outline of a [`GradedBlock`].
@@ -22,35 +23,36 @@ const SMOOTHING: usize = 4;
 pub enum Outline {
     /// A square with sides along x and y: four flat cut faces, in the order −x, +x, −y, +y.
     Square,
-    /// A regular polygon with the area of the circle: one cut face all round, not flat.
+    /// A regular polygon with the area of the circle: a single cut face all round, not flat.
     Disc,
 }
 
 /// A flat block, seen from above. Lengths in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GradedBlock {
-    /// Its outline.
+    /// Outline of the block.
     pub outline: Outline,
     /// Half the side of the square, or the radius of the disc.
     pub half_width: f64,
-    /// Where its middle, always a vertex, lies in x and y.
+    /// Position of the middle in x and y. The middle is always a vertex.
     pub centre: [f64; 2],
-    /// A circle on which a ring of vertices lies, such as the edge of a punch. They stand at the corners of a polygon with
-    /// the *area* of the circle: its corners lie a little outside, the middles of its sides inside.
+    /// Radius of a circle with a ring of vertices on it, such as the edge of a punch. The vertices
+    /// form a regular polygon with the *area* of the circle: its corners lie a little outside the
+    /// circle, the middles of its sides inside.
     pub ring_radius: Option<f64>,
-    /// Length of edges on the ring and within it (without a ring: in the middle).
+    /// Edge length on the ring and inside it (without a ring: in the middle).
     pub spacing: f64,
-    /// By how much edges lengthen per metre from the ring to the middle, 0 to 1: where a punch's edge counts, its
-    /// middle need not be as fine.
+    /// Increase of the edge length per metre from the ring towards the middle, 0 to 1. If only the
+    /// edge of a punch matters, its middle can be coarser.
     pub inner_growth: f64,
-    /// By how much edges lengthen per metre beyond the ring.
+    /// Increase of the edge length per metre outside the ring.
     pub growth: f64,
-    /// Makes the mesh irregular, from this seed: rings turned and vertices moved by chance.
+    /// Seed for an irregular mesh: rings are turned and vertices moved at random.
     pub jitter: Option<u64>,
 }
 
 impl GradedBlock {
-    /// The same block with edges half as long everywhere, as for a study of convergence.
+    /// The same block with all edges half as long, for example for a convergence study.
     #[must_use]
     pub fn halved(&self) -> Self {
         Self {
@@ -61,7 +63,7 @@ impl GradedBlock {
         }
     }
 
-    /// The vertices on the ring and within it, ascending; only the middle without a ring.
+    /// The vertices on the ring and inside it, ascending. Without a ring, only the middle.
     pub fn patch_vertices(&self, body: &LayeredBody) -> Vec<u32> {
         let radius = self
             .ring_radius
@@ -75,7 +77,7 @@ impl GradedBlock {
             .collect()
     }
 
-    /// How many edges of the ring's lie along its radius; the spacing itself stands for a ring that is not given.
+    /// Number of edges along the radius of the ring; 1 without a ring.
     fn n_on_radius(&self) -> usize {
         self.ring_radius
             .map_or(1, |a| (a / self.spacing).round().max(1.0) as usize)
@@ -85,7 +87,7 @@ impl GradedBlock {
         6 * self.n_on_radius()
     }
 
-    /// Radii of the rings inside the ring, outwards, and their numbers of vertices.
+    /// Radii of the rings inside the ring, from the middle outwards, and their numbers of vertices.
     fn inner_rings(&self) -> Vec<(f64, usize)> {
         let (a, h, g) = (self.inner_radius(), self.spacing_at(0.0), self.inner_growth);
         if g == 0.0 {
@@ -93,7 +95,8 @@ impl GradedBlock {
                 .map(|i| (i as f64 * h, 6 * i))
                 .collect();
         }
-        // Distance from the ring after k rows whose heights grow with it: h/g (e^(g k) − 1).
+        // Distance from the ring after k rows whose heights grow with that distance: h/g (e^(g k) −
+        // 1).
         let rows = (g * a / h).ln_1p() / g;
         let n_rows = rows.round().max(1.0) as usize;
         (1..n_rows)
@@ -107,18 +110,18 @@ impl GradedBlock {
             .collect()
     }
 
-    /// Radius from which edges lengthen.
+    /// Radius at which edges begin to lengthen outwards.
     fn inner_radius(&self) -> f64 {
         self.ring_radius.unwrap_or(self.spacing)
     }
 
-    /// Wanted length of edges at a distance from the middle.
+    /// Wanted edge length at a distance from the middle.
     fn spacing_at(&self, r: f64) -> f64 {
         let at_ring = self.inner_radius() / self.n_on_radius() as f64;
         at_ring + self.growth * (r - self.inner_radius()).max(0.0)
     }
 
-    /// Rows of triangles between the ring and radius `r`.
+    /// Number of rows of triangles between the ring and radius `r`.
     fn rows_to(&self, r: f64) -> f64 {
         let (h, beyond) = (self.spacing_at(0.0), r - self.inner_radius());
         if self.growth > 0.0 {
@@ -128,7 +131,7 @@ impl GradedBlock {
         }
     }
 
-    /// The inverse of `rows_to`.
+    /// Radius after that many rows beyond the ring: the inverse of `rows_to`.
     fn radius_of(&self, rows: f64) -> f64 {
         let h = self.spacing_at(0.0);
         self.inner_radius()
@@ -164,13 +167,14 @@ impl GradedBlock {
     }
 }
 
-/// The block with its skin in the plane z = 0, looking to +z, and straight columns to −z.
+/// The block, with its skin in the plane z = 0 facing +z and straight columns towards −z.
 ///
-/// Within the ring, if its edges do not lengthen, ring i of m has 6 i vertices, so that triangles are nearly equilateral;
-/// outside rings lie ever further apart, joined by Delaunay's triangulation. No edge crosses the ring.
+/// If edges inside the ring have constant length, ring i of m has 6 i vertices, so that triangles
+/// are nearly equilateral. Outside, the distance between rings grows, and Delaunay triangulation
+/// joins them. No edge crosses the ring.
 ///
 /// # Panics
-/// If lengths or levels do not make a body (this is for shapes written in code).
+/// If lengths or levels do not make a body. (This function is for shapes written in code.)
 pub fn graded_block(block: &GradedBlock, levels: &LevelStack) -> LayeredBody {
     block.check();
     let mut plan = Plan::default();
@@ -199,19 +203,20 @@ pub fn graded_block(block: &GradedBlock, levels: &LevelStack) -> LayeredBody {
     levels.below(skin, cut_faces)
 }
 
-/// Ratio of the circumradius of a regular polygon to the radius of the circle of its area.
+/// Ratio of the circumradius of a regular polygon with `n` corners to the radius of a circle of the
+/// same area.
 fn equal_area(n: usize) -> f64 {
     let angle = TAU / n as f64;
     (angle / angle.sin()).sqrt()
 }
 
-/// The plane mesh in the making, about the origin.
+/// The plane mesh under construction, centred on the origin.
 #[derive(Debug, Default)]
 struct Plan {
     points: Vec<[f64; 2]>,
-    /// Which points smoothing may move.
+    /// Whether smoothing may move a point. `[n_points]`
     is_free: Vec<bool>,
-    /// Edges that must be there.
+    /// Edges that the triangulation must contain.
     fixed_edges: Vec<[usize; 2]>,
 }
 
@@ -221,7 +226,8 @@ impl Plan {
         self.is_free.push(is_free);
     }
 
-    /// `n` points at the radius, from `turn` on; the index of the first.
+    /// Adds `n` points at the radius, beginning at the angle `turn`. Returns the index of the
+    /// first.
     fn ring(&mut self, n: usize, radius: f64, turn: f64, is_free: bool) -> usize {
         let first = self.points.len();
         for k in 0..n {
@@ -242,14 +248,15 @@ impl Plan {
         }
     }
 
-    /// The middle and the rings up to the ring of the block.
+    /// Adds the middle and all rings up to the ring of the block.
     fn add_inner(&mut self, block: &GradedBlock, mut random: Option<&mut Random>) {
         self.push([0.0, 0.0], false);
         let h = block.spacing_at(0.0);
         for (k, (radius, n)) in block.inner_rings().into_iter().enumerate() {
             let turn = match random.as_mut() {
                 Some(random) => random.both_ways(),
-                // Rings of 6 i vertices fit as they are; others are turned by half a step, as outside.
+                // Rings of 6 i vertices fit without turning. Otherwise every second ring is turned
+                // by half a step, as outside.
                 None if block.inner_growth > 0.0 && k % 2 == 1 => 0.5 * TAU / n as f64,
                 None => 0.0,
             };
@@ -264,7 +271,8 @@ impl Plan {
         self.fix_loop(first, n);
     }
 
-    /// A free ring outside the ring of the block. Every second one is turned by half a step.
+    /// Adds a ring outside the ring of the block; smoothing may move it. Every second one is turned
+    /// by half a step.
     fn add_outer_ring(
         &mut self,
         block: &GradedBlock,
@@ -284,7 +292,7 @@ impl Plan {
         self.jitter_from(first, spacing, random);
     }
 
-    /// Rings up to the rim; returns the rim.
+    /// Adds the rings up to the rim, and the rim; returns the vertices of the rim.
     fn add_outer_disc(&mut self, block: &GradedBlock, mut random: Option<&mut Random>) -> Vec<u32> {
         let rows = block.rows_to(block.half_width);
         let n_rows = rows.round().max(1.0) as usize;
@@ -305,14 +313,15 @@ impl Plan {
         (first..first + n).map(|v| v as u32).collect()
     }
 
-    /// Rings cut off at the sides, and the sides; returns the rim from the corner (−, −) on, counter-clockwise.
+    /// Adds the rings, cut off at the sides, and the sides. Returns the rim counter-clockwise, from
+    /// the corner (−, −).
     fn add_outer_square(
         &mut self,
         block: &GradedBlock,
         mut random: Option<&mut Random>,
     ) -> Vec<u32> {
         let w = block.half_width;
-        // The last row is the side itself, straight below the middle.
+        // The last row is the side itself, measured straight from the middle to the side.
         let to_side = block.rows_to(w);
         let n_rows = to_side.round().max(1.0);
         let mut k = 1;
@@ -349,7 +358,8 @@ impl Plan {
         (first..first + n).map(|v| v as u32).collect()
     }
 
-    /// Delaunay's triangulation that keeps the fixed edges; counter-clockwise triangles in a fixed order.
+    /// The Delaunay triangulation that contains the fixed edges. Triangles are counter-clockwise
+    /// and in a fixed order.
     fn triangulate(&self) -> Vec<[u32; 3]> {
         let points = self
             .points
@@ -377,7 +387,8 @@ impl Plan {
         triangles
     }
 
-    /// Moves the free points towards the middle of their neighbours: rings that a side cut off leave gaps.
+    /// Moves the free points towards the mean of their neighbours, because rings cut off by a side
+    /// leave gaps.
     fn smooth(&mut self, triangles: &[[u32; 3]], block: &GradedBlock) {
         let mut sums = vec![[0.0_f64; 3]; self.points.len()];
         for t in triangles {
@@ -390,7 +401,7 @@ impl Plan {
         }
         for (v, [x, y, n]) in sums.into_iter().enumerate() {
             let p = &mut self.points[v];
-            // Only near the sides: elsewhere the rings are where they should be.
+            // Only near the sides; elsewhere the rings are in their right places.
             let reach = 1.5 * block.spacing_at(p[0].hypot(p[1]));
             let is_near_side = p.iter().any(|c| c.abs() > block.half_width - reach);
             if self.is_free[v] && is_near_side {
@@ -400,10 +411,11 @@ impl Plan {
     }
 }
 
-/// Positions of the vertices on a side, from its first corner on, without its last.
+/// Coordinates of the vertices along a side, from its first corner, without its last.
 fn side_points(block: &GradedBlock) -> Vec<f64> {
     let w = block.half_width;
-    // Edges per length, summed finely along half the side; the middle is always a vertex.
+    // Number of edges up to each point, integrated in small steps along half the side. The middle
+    // of the side is always a vertex.
     let n_steps = 2000;
     let step = w / n_steps as f64;
     let mut count = vec![0.0];

@@ -1,4 +1,5 @@
-//! Levels for bodies made by formula: their depths and layers, graded towards the top of each layer.
+//! Levels of bodies made by formula: depths and layers, with finer intervals at the top of each
+//! layer.
 
 use crate::{CutFace, LayeredBody, Surface, Vec3};
 
@@ -7,13 +8,13 @@ use crate::{CutFace, LayeredBody, Surface, Vec3};
 pub struct GradedLayer {
     /// Thickness. m
     pub thickness: f64,
-    /// Wanted height of its uppermost interval. m
+    /// Wanted height of the layer's uppermost interval. m
     pub first_height: f64,
-    /// Share by which each interval is higher than the one above it (0: all equal).
+    /// Relative increase of the height from each interval to the next one below (0: all equal).
     pub growth: f64,
 }
 
-/// Where the levels lie in every column, from the skin down.
+/// Depths of the levels, the same in every column, from the skin down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelStack {
     /// Depth of each level below the skin, ascending from 0. m, `[n_levels]`
@@ -23,14 +24,14 @@ pub struct LevelStack {
 }
 
 impl LevelStack {
-    /// Levels whose heights grow downwards in each layer as wanted.
+    /// Levels whose intervals grow downwards in each layer, as wanted.
     ///
-    /// Every border between layers is a level. In a layer the number of intervals is the one whose heights have to be
-    /// stretched or shrunk least to fill it.
+    /// Every border between layers is a level. The number of intervals in a layer is chosen so that
+    /// their heights need the least stretching or shrinking to fill the layer.
     ///
     /// # Panics
-    /// Unless thicknesses and heights are positive and finite, growth is not negative, and a layer needs at most
-    /// 1,000 intervals.
+    /// Unless thicknesses and heights are positive and finite, growth is not negative, and a layer
+    /// needs at most 1,000 intervals.
     pub fn graded(layers: &[GradedLayer]) -> Self {
         let mut stack = Self {
             depths: vec![0.0],
@@ -46,13 +47,14 @@ impl LevelStack {
                 stack.interval_layer.push(layer);
             }
             top += graded.thickness;
-            // The sum of the heights is the thickness but for rounding; the border is meant exactly.
+            // The sum of the heights equals the thickness only up to rounding. The border must be
+            // exact.
             *stack.depths.last_mut().expect("it starts with the skin") = top;
         }
         stack
     }
 
-    /// Every interval cut in two at mid-height, as for a study of convergence.
+    /// The same levels with every interval cut in half, for example for a convergence study.
     #[must_use]
     pub fn halved(&self) -> Self {
         let mut depths = vec![self.depths[0]];
@@ -65,10 +67,12 @@ impl LevelStack {
         }
     }
 
-    /// The body with a straight column towards −z below every point of `skin`. Layers are named `layer 1`, …
+    /// The body with a straight column towards −z below every point of `skin`. Layers are named
+    /// `layer 1`, `layer 2`, …
     ///
     /// # Panics
-    /// If depths do not ascend from 0, or there is not one layer per interval, ascending.
+    /// If depths do not ascend from 0, or if `interval_layer` does not hold one layer per interval,
+    /// ascending.
     pub(super) fn below(&self, skin: Surface, cut_faces: Vec<CutFace>) -> LayeredBody {
         let depths = &self.depths;
         assert!(
@@ -96,7 +100,7 @@ impl LevelStack {
     }
 }
 
-/// Heights of the intervals of one layer, which sum up to its thickness.
+/// Heights of the intervals of one layer; their sum is its thickness.
 fn heights(layer: &GradedLayer) -> Vec<f64> {
     let GradedLayer {
         thickness,
@@ -114,7 +118,7 @@ fn heights(layer: &GradedLayer) -> Vec<f64> {
     let mut sum = first_height;
     while sum < thickness {
         let next = wanted[wanted.len() - 1] * (1.0 + growth);
-        // With or without the next one: whichever is stretched less.
+        // Without or with the next interval: whichever needs less stretching.
         if (sum + next) * sum > thickness * thickness {
             break;
         }

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use super::tube::{Ends, resolution, tube};
 use crate::{Surface, Vec3};
 
-/// The skin (open at both ends) and the bone of a cylinder along x, from 0 to `length`. Lengths in metres.
+/// The skin (open at both ends) and the bone of a cylinder along x, from 0 to `length`. Lengths in
+/// metres.
 ///
 /// # Panics
 /// Unless `0 < bone_radius < radius`, and `length` and `spacing` are positive.
@@ -31,7 +32,8 @@ pub fn cylinder(length: f64, radius: f64, bone_radius: f64, spacing: f64) -> (Su
     (skin, bone)
 }
 
-/// The flat skin of a block, in the plane z = 0 about the origin, looking to +z. `size` is along x and y, in metres.
+/// The flat skin of a block, in the plane z = 0, centred on the origin and facing +z. `size` is
+/// along x and y, in metres.
 ///
 /// # Panics
 /// Unless the sizes and `spacing` are positive.
@@ -58,7 +60,7 @@ pub fn block_skin(size: [f64; 2], spacing: f64) -> Surface {
                 vertex(i + 1, j + 1),
                 vertex(i, j + 1),
             );
-            // Diagonals alternate, so that the block has no grain.
+            // Diagonals alternate, so that the mesh has no preferred direction.
             if (i + j) % 2 == 0 {
                 skin.triangles.extend([[a, b, c], [a, c, d]]);
             } else {

@@ -1,41 +1,43 @@
-//! A grid of triangles carried by a formula: Cook's trapezoid, a quarter of a ring, a plain block.
+//! A grid of triangles mapped into space by a formula: Cook's trapezoid, a quarter of a ring, a
+//! plain block.
 
 use super::levels::LevelStack;
 use super::random::Random;
 use crate::{CutFace, LayeredBody, Surface, Vec3};
 
-/// Which diagonal cuts a cell of a grid into two triangles.
+/// Which diagonal cuts each cell of a grid into two triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Diagonal {
-    /// From the corner of smallest (u, v) to that of largest.
+    /// From the corner with the smallest (u, v) to the corner with the largest.
     Right,
-    /// The other one.
+    /// The other diagonal.
     Left,
-    /// In turn, as on a chessboard.
+    /// Alternating, as on a chessboard.
     Alternate,
-    /// By chance, from this seed.
+    /// Random, from this seed.
     Random(u64),
 }
 
 /// A grid over the unit square.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
-    /// Cells along u and v.
+    /// Number of cells along u and v.
     pub n_cells: [usize; 2],
-    /// How cells are cut.
+    /// The diagonals of the cells.
     pub diagonal: Diagonal,
-    /// Moves the inner vertices by chance, from this seed, by up to a quarter of a cell in u and v.
+    /// Moves the inner vertices at random, from this seed, by up to a quarter of a cell in u and v.
     pub jitter: Option<u64>,
 }
 
-/// The body whose skin is the grid carried by `map` from (u, v) in the unit square into space, with straight columns
-/// to −z.
+/// The body whose skin is the grid. `map` takes (u, v) in the unit square to a point in space.
+/// Columns are straight, towards −z.
 ///
-/// Of m × n cells, vertex (i, j) is `j (m + 1) + i`, at u = i / m, v = j / n. Cut faces are the sides in the order u = 0, u = 1,
-/// v = 0, v = 1; those that the map leaves straight are flat. A corner belongs to two.
+/// In a grid of m × n cells, vertex (i, j) has the index `j (m + 1) + i` and lies at u = i / m, v =
+/// j / n. Cut faces are the sides in the order u = 0, u = 1, v = 0, v = 1. A side that the map
+/// leaves straight is a flat cut face. A corner belongs to two faces.
 ///
 /// # Panics
-/// Without cells, if the levels are none, or if the map turns a triangle over (seen from +z).
+/// If there are no cells or no levels, or if the map turns a triangle over (seen from +z).
 pub fn mapped_grid(
     grid: &Grid,
     map: impl Fn(f64, f64) -> Vec3,
@@ -94,7 +96,8 @@ pub fn mapped_grid(
     levels.below(skin, cut_faces)
 }
 
-/// The face below a run of rim vertices; `turn` is 1 where the body lies to the left of the run, as seen from +z.
+/// The face below a run of rim vertices. `turn` is 1 if the body lies to the left of the run, as
+/// seen from +z.
 fn side(skin: &Surface, vertices: Vec<u32>, turn: f64) -> CutFace {
     let points: Vec<Vec3> = vertices.iter().map(|&v| skin.points[v as usize]).collect();
     let along = points[points.len() - 1] - points[0];

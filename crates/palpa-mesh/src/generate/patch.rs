@@ -1,9 +1,10 @@
-//! A flat square-celled patch with straight columns: the shape of the reference method's evaluation.
+//! A flat patch of square cells with straight columns: the shape in the evaluation of the reference
+//! method.
 
 use crate::body::CutFace;
 use crate::{LayeredBody, Surface, Vec3};
 
-/// A flat patch of `nx × ny` skin vertices in the plane z = 0, its columns pointing to −z.
+/// A flat patch of `nx × ny` skin vertices in the plane z = 0, with columns towards −z.
 ///
 /// ```text
 ///   j
@@ -14,12 +15,14 @@ use crate::{LayeredBody, Surface, Vec3};
 ///   0   0---1---2
 ///       0   1   2  i
 /// ```
-/// `spacing` is the side of a cell and `level_depths` the depth of each level below the skin, both in metres
-/// (`[n_levels]`, ascending from 0); `interval_layer` as in [`LayeredBody`]. The four sides are flat cut faces, in the
-/// order −x, +x, −y, +y; a corner column belongs to two of them. Layers are named `layer 1`, `layer 2`, …
+/// `spacing` is the side of a cell, and `level_depths` are the depths of the levels below the skin,
+/// both in metres (`[n_levels]`, ascending from 0). `interval_layer` is as in [`LayeredBody`]. The
+/// four sides are flat cut faces, in the order −x, +x, −y, +y; a corner column belongs to two of
+/// them. Layers are named `layer 1`, `layer 2`, …
 ///
 /// # Panics
-/// If there is no cell, or lengths and layers do not make a body (this is for shapes written in code).
+/// If there is no cell, or if lengths and layers do not make a body. (This function is for shapes
+/// written in code.)
 pub fn patch(
     nx: usize,
     ny: usize,
@@ -78,10 +81,10 @@ pub fn patch(
     }
 }
 
-/// The vertex of an `nx × ny` [`patch`] nearest to its centre.
+/// Index of the vertex nearest to the centre of an `nx × ny` [`patch`].
 ///
-/// An even count has no vertex in the middle; then it is the one before it, towards vertex 0: vertex 5, at (1, 1), in a
-/// 4 × 4 patch.
+/// With an even count, no vertex lies in the middle. The function then takes the vertex before the
+/// middle, towards vertex 0: in a 4 × 4 patch this is vertex 5, at (1, 1).
 pub fn centre_vertex(nx: usize, ny: usize) -> usize {
     (ny - 1) / 2 * nx + (nx - 1) / 2
 }

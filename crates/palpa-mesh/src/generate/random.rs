@@ -1,4 +1,4 @@
-//! Chance that is the same on every machine, for irregular meshes.
+//! Random numbers for irregular meshes, the same on every machine.
 
 /// The generator `SplitMix64` (Steele, Lea & Flood 2014).
 #[derive(Debug)]
@@ -17,12 +17,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Evenly between −1 and 1.
+    /// A uniform number between −1 and 1.
     pub(super) fn both_ways(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// Heads or tails.
+    /// A random boolean; both values are equally likely.
     pub(super) fn coin(&mut self) -> bool {
         self.bits() >> 63 == 1
     }

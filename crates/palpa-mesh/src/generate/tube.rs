@@ -7,19 +7,21 @@ use crate::{Surface, Vec3};
 /// Whether the ends of a tube are left open (a skin that is cut there) or closed (a bone).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ends {
-    /// Two rims.
+    /// Two open rims.
     Open,
-    /// A flat fan at each end.
+    /// Closed by a flat fan at each end.
     Closed,
 }
 
-/// A tube of `n_rings` rings of `n_around` vertices each; ring `i` has the points `section(i / (n_rings − 1), angle)`.
+/// A tube of `n_rings` rings with `n_around` vertices each. Ring `i` has the points
+/// `section(i / (n_rings − 1), angle)`.
 ///
-/// Angles run from 0 to 2π counter-clockwise as seen from the far end; every second ring is turned by half a step, so
-/// that triangles are nearly equilateral where the spacings allow it. The surface is oriented outward.
+/// Angles run from 0 to 2π, counter-clockwise as seen from the far end. Every second ring is turned
+/// by half a step, so that triangles are nearly equilateral if the spacings allow it. The surface
+/// is oriented outward.
 ///
 /// # Panics
-/// With less than 2 rings or 3 vertices around.
+/// With fewer than 2 rings, or fewer than 3 vertices around.
 pub fn tube(
     n_rings: usize,
     n_around: usize,
@@ -73,7 +75,8 @@ pub fn tube(
     surface
 }
 
-/// Rings and vertices around for a tube of the given length and girth whose edges are about `spacing` long.
+/// Number of rings, and of vertices around, for a tube of the given length and girth with edges of
+/// about `spacing`.
 pub(super) fn resolution(length: f64, girth: f64, spacing: f64) -> (usize, usize) {
     // In a row of equilateral triangles the rings lie √3/2 of a side apart.
     let n_rings = (length / (spacing * 0.75_f64.sqrt())).round().max(1.0) as usize + 1;

@@ -3,19 +3,20 @@
 use super::core::RigidCore;
 use crate::{CutFace, Surface, SurfaceIndex, Vec3};
 
-/// Where a column has turned fully from the skin's normal to the core's field, as a share of its room.
+/// Length over which a column turns from the skin's normal to the core's field, as a share of its
+/// room.
 const TURN_SHARE: f64 = 0.4;
 /// Longest step along a column, as a share of its room.
 const STEP_SHARE: f64 = 1.0 / 16.0;
 /// A column ends when it is this close to the core, as a share of its room.
 const END_SHARE: f64 = 2e-3;
-/// A column that has gone this many times its room without meeting the core ends there.
+/// A column that is longer than this many times its room and has not met the core ends there.
 const MAX_DETOUR: f64 = 3.0;
 const MAX_STEPS: usize = 200;
-/// With less room than this there is none, and a column has just a direction. m
+/// Less room than this counts as none: the column then only has a direction. m
 const NO_ROOM: f64 = 1e-5;
 
-/// A line inward from a skin vertex, as points at growing arc length.
+/// A line inward from a skin vertex, given by points with growing arc length.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     points: Vec<Vec3>,
@@ -42,7 +43,7 @@ impl Column {
         self.arc[self.arc.len() - 1]
     }
 
-    /// The point at arc length `s`; beyond the end, straight on.
+    /// The point at arc length `s`. Beyond the end, the column continues straight on.
     pub(super) fn at(&self, s: f64) -> Vec3 {
         let n = self.arc.len();
         if n == 1 {
@@ -57,7 +58,8 @@ impl Column {
     }
 }
 
-/// What keeps columns of a flat cut face in it: for each vertex the normals that its column must not follow.
+/// Keeps the columns of a flat cut face in that face. For each vertex it holds the normals that its
+/// column must not follow.
 #[derive(Debug)]
 pub(super) struct Confinement {
     normals: Vec<Vec<Vec3>>,
@@ -74,7 +76,7 @@ impl Confinement {
         Self { normals }
     }
 
-    /// `direction` without its part across the cut faces of vertex `v`.
+    /// `direction` without its components along the normals of vertex `v`'s cut faces.
     pub(super) fn project(&self, v: usize, direction: Vec3) -> Vec3 {
         let mut taken: Vec<Vec3> = Vec::new();
         for normal in &self.normals[v] {
@@ -86,7 +88,7 @@ impl Confinement {
         taken.iter().fold(direction, |d, t| d - t * t.dot(&d))
     }
 
-    /// The same, as a unit vector where anything is left.
+    /// The result of [`project`](Self::project) as a unit vector, unless nothing is left.
     pub(super) fn confine(&self, v: usize, direction: Vec3) -> Vec3 {
         if self.normals[v].is_empty() {
             return direction;
@@ -97,7 +99,7 @@ impl Confinement {
     }
 }
 
-/// Vertices around each vertex.
+/// The neighbours of each vertex.
 pub(super) fn one_rings(skin: &Surface) -> Vec<Vec<u32>> {
     let mut rings = vec![Vec::new(); skin.points.len()];
     for [a, b] in skin.edges() {
@@ -107,8 +109,9 @@ pub(super) fn one_rings(skin: &Surface) -> Vec<Vec<u32>> {
     rings
 }
 
-/// Unit directions inward: the normals of the skin, smoothed over a length comparable with the depth, and turned back
-/// where smoothing would leave a triangle of the vertex behind.
+/// Unit directions inward: the normals of the skin, smoothed over a length comparable with the
+/// depth. A direction is turned back if smoothing would make it leave a triangle of its vertex on
+/// the outer side.
 pub(super) fn inward_directions(
     skin: &Surface,
     rings: &[Vec<u32>],
@@ -137,7 +140,8 @@ pub(super) fn inward_directions(
     directions
 }
 
-/// Turns directions that leave a triangle of their vertex behind (or nearly) towards the inside of that triangle.
+/// Finds directions that leave a triangle of their vertex on the outer side (or nearly so), and
+/// turns them towards the inside of that triangle.
 fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinement) {
     const MIN_COS: f64 = 0.3;
     let mut faces: Vec<Vec<Vec3>> = vec![Vec::new(); directions.len()];
@@ -149,8 +153,9 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
         }
     }
     for (v, direction) in directions.iter_mut().enumerate() {
-        // Perceptron steps: each adds a little of the face that is least in sight. It ends when all are, or gives up
-        // (a spike has no such direction; then the prisms are invalid and the growth says where).
+        // Perceptron steps: each adds a little of the normal of the worst triangle. The loop ends
+        // when the direction is inside all triangles, or gives up. A spike has no such direction;
+        // its prisms are then invalid, and the growth reports where.
         for _ in 0..100 {
             let Some(worst) = faces[v]
                 .iter()
@@ -167,8 +172,8 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
     }
 }
 
-/// Straight columns along `directions`, of length `depth`, but no longer than half of what lies between the skin and its
-/// far side.
+/// Straight columns along `directions`, of length `depth`, but at most about half (0.45) of the
+/// distance between the skin and its far side.
 pub(super) fn straight_columns(
     skin: &Surface,
     directions: &[Vec3],
@@ -194,13 +199,15 @@ pub(super) fn straight_columns(
         .collect()
 }
 
-/// Lowers values until none exceeds a neighbour's by more than the length of the edge between them: a ray that leaves
-/// a limb through its open end has met no far side, its neighbours have.
+/// Lowers values until none exceeds a neighbour's by more than the length of the edge between them.
+/// A ray that leaves a limb through its open end finds no far side, but the rays of its neighbours
+/// do.
 fn limit_slope(skin: &Surface, values: &mut [f64]) {
     let edges = skin.edges();
     loop {
         let mut is_changed = false;
-        // Both ways through the edges: a value travels far in one sweep whatever their order.
+        // Both ways through the edges, so that a value travels far in one sweep whatever the order
+        // of the edges.
         for &[a, b] in edges.iter().chain(edges.iter().rev()) {
             let (a, b) = (a as usize, b as usize);
             let length = (skin.points[a] - skin.points[b]).norm();
@@ -217,7 +224,8 @@ fn limit_slope(skin: &Surface, values: &mut [f64]) {
     }
 }
 
-/// A column from the vertex `v` of the skin down to the core: it leaves along `direction` and turns into the core's field.
+/// A column from the skin vertex `v` down to the core. It starts along `direction` and turns into
+/// the core's field.
 pub(super) fn column_to_core(
     v: usize,
     start: Vec3,
@@ -228,7 +236,8 @@ pub(super) fn column_to_core(
     let mut column = Column::starting_at(start);
     let room = core.distance(start);
     if room < NO_ROOM {
-        // The skin touches the core: straight on, for the layers' floors.
+        // The skin touches the core. The column goes straight on, for the minimum thicknesses of
+        // the layers.
         column.push(start + direction * NO_ROOM);
         return column;
     }
@@ -248,7 +257,8 @@ pub(super) fn column_to_core(
         let step = (0.9 * gap).min(STEP_SHARE * room);
         let midpoint = x + heading(x, s) * (0.5 * step);
         let next = heading(midpoint, s + 0.5 * step);
-        // Past a minimum of the field (beside a bone that ends just before a cut face) the line would swing to and fro.
+        // Beyond a minimum of the field (beside a bone that ends just before a cut face), the line
+        // would swing to and fro.
         if s > 0.5 * room && next.dot(&last) < 0.0 {
             break;
         }

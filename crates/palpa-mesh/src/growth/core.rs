@@ -1,18 +1,21 @@
-//! The rigid core that columns grow down to: bones, the membrane between two bones, and a smooth field that leads there.
+//! The rigid core that columns grow down to: bones, the membrane between two bones, and a smooth
+//! field towards them.
 //!
-//! A limb's skin is a tube, its bones may be two. So that the tube can be shrunk onto them without tearing, bones that
-//! lie side by side are joined by a *membrane*: a thin strip between their centre lines (which is where the
-//! interosseous membrane of forearm and leg is). Columns follow the steepest ascent of a potential
+//! The skin of a limb is a tube, and there may be two bones in it. To let the tube shrink onto them
+//! without tearing, bones that lie side by side are joined by a *membrane*: a thin strip between
+//! their centre lines. (Forearm and leg have an interosseous membrane there.) Columns follow the
+//! steepest ascent of a potential
 //!
 //! ```text
 //! ψ(x) = Σ_j A_j / (|x − y_j|² + ε²)
 //! ```
-//! over the points `y_j` of bones and membrane with their areas `A_j`. It is smooth, rises towards the core, and rounds off
-//! the creases of the true distance, at which neighbouring lines of steepest descent would part or meet. Lines of a
-//! smooth gradient never cross. (The potential of charges, exponent 1 in place of 2, is harmonic, but drags the columns
-//! of the flanks too far round; exponent 4, close to the true distance, crowds them on the nearer bone.) Sources are
-//! mirrored at the flat cut faces, so that there the field has no component through the face and the columns of a
-//! limb's end stay in it.
+//! where `y_j` are the points of bones and membrane, and `A_j` their areas. The potential is smooth
+//! and rises towards the core. It rounds off the creases of the true distance, where neighbouring
+//! lines of steepest descent would part or meet: lines of a smooth gradient never cross. (The
+//! potential of charges, with exponent 1 instead of 2, is harmonic, but it pulls the columns of the
+//! flanks too far round. Exponent 4, close to the true distance, crowds them on the nearer bone.)
+//! Sources are mirrored at the flat cut faces. There the field then has no component through the
+//! face, so that the columns at a limb's end stay in it.
 
 use std::collections::BTreeMap;
 
@@ -21,25 +24,29 @@ use crate::{CutFace, Surface, SurfaceIndex, Vec3};
 
 /// Half the thickness of the membrane between two bones, as a share of the smaller bone's radius.
 ///
-/// This and the weight were chosen on forearm and calf: of 21,600 prisms of a forearm the first placing turns over 100 at
-/// (0.3, 1, exponent 4 of the field), 35 at exponent 2, 12 at (0.6, 4, exponent 2).
+/// This value and the weight were chosen by tests on forearm and calf. On a forearm of 21,600
+/// prisms, the first placing turns over more than 100 prisms at (0.3, 1) with exponent 4 of the
+/// field, 35 with exponent 2, and 12 at (0.6, 4) with exponent 2.
 const MEMBRANE_HALF_THICKNESS: f64 = 0.6;
-/// How much stronger than bone the membrane draws columns, so that they do not all part to the two bones.
+/// Weight of the membrane relative to bone. The stronger pull keeps columns from all going to the
+/// two bones.
 const MEMBRANE_WEIGHT: f64 = 4.0;
-/// Width over which the crease between bone and membrane is rounded, as a share of the half thickness. On the far side of
-/// a bone, whose centre the membrane ends in, the two distances differ by (1 − 0.6) radii: less than that, and the
-/// rounding takes no room there, where the skin is nearest.
+/// Width over which the crease between bone and membrane is rounded, as a share of the half
+/// thickness. The membrane ends in the centre of a bone, so on the bone's far side the two
+/// distances differ by (1 − 0.6) radii. The width is smaller than that. So the rounding takes no
+/// room there, where the skin is nearest.
 const FILLET: f64 = 0.6;
-/// Slices of this share of the bones' length carry one point of each bone's centre line.
+/// Number of slices along the bones' length; each gives one point of each bone's centre line.
 const N_SLICES: usize = 48;
-/// Bones further apart than this many times the smaller one's radius are not joined.
+/// Bones are joined only if they are closer than this many radii of the smaller one.
 const MEMBRANE_REACH: f64 = 16.0;
-/// Where a bone ends this share of the bones' length before a cut face, the membrane goes on to the face.
+/// If a bone ends at most this far before a cut face, as a share of the bones' length, the membrane
+/// continues to the face.
 const MEMBRANE_OVERHANG: f64 = 0.15;
 /// Sources nearer to a cut face than this share of the bones' length are mirrored at it.
 const MIRROR_REACH: f64 = 0.35;
 
-/// Bones and what joins them, as columns see it.
+/// Bones and the membranes between them, as columns see them.
 pub(super) struct RigidCore {
     bones: Vec<SurfaceIndex>,
     membranes: Vec<Membrane>,
@@ -59,11 +66,11 @@ struct Source {
 }
 
 impl RigidCore {
-    /// Prepares bones for a body with the given cut faces. Everything is scaled by the bones, not by the body, so that a
-    /// cut-out has the core of the whole.
+    /// Prepares bones for a body with the given cut faces. All lengths are scaled by the bones, not
+    /// by the body, so that a cut-out has the same core as the whole body.
     pub(super) fn build(bones: &[Surface], cuts: &[CutFace]) -> Self {
         let size = bones.iter().map(super::extent).fold(0.0, f64::max);
-        // A slice must hold a ring of either bone.
+        // A slice must contain a ring of vertices of either bone.
         let ring = bones
             .iter()
             .map(Surface::mean_edge_length)
@@ -106,7 +113,7 @@ impl RigidCore {
         }
     }
 
-    /// Distance to the core, negative inside it; the crease between bone and membrane is rounded. m
+    /// Distance to the core, negative inside it. The crease between bone and membrane is rounded. m
     pub(super) fn distance(&self, x: Vec3) -> f64 {
         let bone = self.bone_distance(x);
         self.membranes.iter().fold(bone, |d, m| {
@@ -149,8 +156,8 @@ impl RigidCore {
     }
 }
 
-/// Refuses bones that come through the skin (beyond its open ends they may). `skin` is the whole skin, before anything
-/// is cut out of it.
+/// Returns an error if a bone comes out through the skin. Beyond the skin's open ends this is
+/// allowed. `skin` is the whole skin, before a cut-out.
 pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), GrowthError> {
     let index = SurfaceIndex::build(skin);
     let ends = super::cut::find_cut_faces(skin);
@@ -163,7 +170,8 @@ pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), Grow
     for (id, bone) in bones.iter().enumerate() {
         check_near(id, bone, skin)?;
         for &p in &bone.points {
-            // Beyond an end, and where the closest point lies at a rim, there is no side.
+            // Inside and outside are undefined beyond an end, and where the closest point is on a
+            // rim.
             let is_beyond = |c: &CutFace| c.is_flat && (p - c.point).dot(&c.normal) > -near_end;
             if ends.iter().any(is_beyond) {
                 continue;
@@ -192,7 +200,8 @@ pub(super) fn check_inside(bones: &[Surface], skin: &Surface) -> Result<(), Grow
     }
 }
 
-/// Refuses a bone none of whose vertices lies within the box of the skin: another frame, or another unit.
+/// Returns an error if no vertex of a bone lies within the box of the skin: then the frame or the
+/// unit differs.
 fn check_near(id: usize, bone: &Surface, skin: &Surface) -> Result<(), GrowthError> {
     let (Some(bone_box), Some(skin_box)) = (bone.bounds(), skin.bounds()) else {
         return Ok(());
@@ -215,10 +224,11 @@ fn smooth_min(a: f64, b: f64, k: f64) -> f64 {
     a.min(b) - h * h * k * 0.25
 }
 
-/// A surface as points with areas: its triangles, gathered in cells of the given size where they are many
-/// (deterministic: cells in order).
+/// Represents a surface as points with areas. If it has many triangles, those in each cell of the
+/// given size are merged. The result is deterministic because the cells are ordered.
 fn thinned_sources(surface: &Surface, cell: f64) -> Vec<Source> {
-    /// Cells make the field of a round bone a little uneven; up to so many triangles are taken one by one.
+    /// Cells make the field of a round bone a little uneven, so up to this many triangles are taken
+    /// one by one.
     const FEW: usize = 2000;
     if surface.triangles.len() <= FEW {
         let source = |t: usize| {
@@ -275,7 +285,8 @@ fn mirrored(sources: Vec<Source>, cuts: &[CutFace], reach: f64) -> Vec<Source> {
     all
 }
 
-/// The direction along a limb: between its two flat cut faces, or the longest extent of the bones.
+/// The direction along a limb: from one of its two flat cut faces to the other, or else the longest
+/// extent of the bones.
 fn limb_axis(bones: &[Surface], cuts: &[CutFace]) -> Vec3 {
     let ends: Vec<&CutFace> = cuts.iter().filter(|c| c.is_flat).collect();
     if let [a, b] = ends[..]
@@ -288,7 +299,8 @@ fn limb_axis(bones: &[Surface], cuts: &[CutFace]) -> Vec3 {
         .flat_map(|b| b.points.iter().copied())
         .collect();
     let centre = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
-    // Power iteration on the scatter of the points: the axis of a slender set is far ahead of the others.
+    // Power iteration on the scatter matrix of the points. For a slender set, the largest
+    // eigenvalue is far above the others.
     let mut axis = Vec3::new(1.0, 0.9, 0.8).normalize();
     for _ in 0..50 {
         let next: Vec3 = points
@@ -300,7 +312,7 @@ fn limb_axis(bones: &[Surface], cuts: &[CutFace]) -> Vec3 {
     axis
 }
 
-/// Pairs of bones to be joined: each bone with the nearest of those before it (a tree).
+/// Pairs of bones to be joined: each bone and the nearest of the bones before it (a tree).
 fn neighbours(bones: &[Surface]) -> Vec<(usize, usize)> {
     let centres: Vec<Vec3> = bones
         .iter()
@@ -324,7 +336,7 @@ struct SliceOfBone {
     radius: f64,
 }
 
-/// Slices along the axis from `start` on.
+/// Slices of a bone along the axis, counted from `start`.
 fn slices(bone: &Surface, axis: Vec3, start: f64, pitch: f64) -> BTreeMap<i64, SliceOfBone> {
     let mut members: BTreeMap<i64, Vec<Vec3>> = BTreeMap::new();
     for p in &bone.points {
@@ -350,7 +362,8 @@ fn slices(bone: &Surface, axis: Vec3, start: f64, pitch: f64) -> BTreeMap<i64, S
         .collect()
 }
 
-/// The strip between the centre lines of two bones over the slices that hold both, and half its thickness.
+/// The strip between the centre lines of two bones, over the slices that contain both bones, and
+/// half its thickness.
 fn membrane(
     a: &Surface,
     b: &Surface,
@@ -405,8 +418,8 @@ fn membrane(
     Some((strip, MEMBRANE_HALF_THICKNESS * radius_sum / n))
 }
 
-/// Continues the strip straight on beyond the flat cut faces that its ends are close to, so that columns of a cut face
-/// find a core where a bone ends a little before it.
+/// Extends the strip straight beyond the flat cut faces that its ends are close to. So the columns
+/// of a cut face find a core even if a bone ends a little before the face.
 fn extend_to_cuts(
     rows: &mut Vec<(i64, Vec3, Vec3)>,
     axis: Vec3,
@@ -419,7 +432,7 @@ fn extend_to_cuts(
         let Some(&(slice, a, b)) = (if is_last { rows.last() } else { rows.first() }) else {
             return;
         };
-        // Distance to the cut face ahead, along the axis.
+        // Distance to the cut face ahead, measured along the axis.
         let ahead = cuts
             .iter()
             .filter(|c| c.is_flat && c.normal.dot(&step) > 0.5 * pitch)

@@ -1,22 +1,25 @@
-//! Faces at which a body part was cut from the rest: flat caps of a closed mesh, rims of an open one, cut-outs.
+//! Faces where a body part was cut from the rest: flat caps of a closed mesh, rims of an open one,
+//! cut-outs.
 
 use crate::repair::drop_unused;
 use crate::topology::{UnionFind, all_sides, by_edge};
 use crate::{CutFace, Surface, Vec3};
 
-/// Neighbouring triangles belong to one flat region while their normals differ less than this (0.5°).
+/// Cosine of 0.5°. Neighbouring triangles belong to one flat region if the angle between their
+/// normals is smaller.
 const FLAT_COS: f64 = 0.999_962;
-/// A cap meets the skin at a crease sharper than this, on average (30°).
+/// Cosine of 30°. A cap meets the skin at a crease that is sharper than this on average.
 const CREASE_COS: f64 = 0.866;
-/// A flat region smaller than this share of the whole area is not a cap.
+/// Least area of a cap, as a share of the whole area.
 const MIN_CAP_SHARE: f64 = 0.01;
-/// If flat regions make up more than this share, the body is a box, not a limb with cut ends.
+/// If flat regions make up more than this share of the area, the body is a box, not a limb with cut
+/// ends.
 const MAX_CAPS_SHARE: f64 = 0.6;
-/// A rim is flat if it stays within this share of its extent from its plane.
+/// A rim is flat if its points are within this distance of its plane, as a share of its extent.
 const FLAT_TOLERANCE: f64 = 5e-3;
-/// A rim is split into several cut faces at turns sharper than this (40°).
+/// Cosine of 40°. A rim is split into several cut faces at sharper turns.
 const CORNER_COS: f64 = 0.766;
-/// More faces than this in one rim is a ragged edge, not a polygon.
+/// Largest number of faces in one rim. A rim with more is a ragged edge, not a polygon.
 const MAX_SIDES: usize = 8;
 
 /// The triangles that form flat caps, one list per cap.
@@ -44,7 +47,8 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<u32>> {
     };
     let total: f64 = areas.iter().map(nalgebra::Matrix::norm).sum();
     let is_cap = |members: &Vec<u32>| {
-        // Flat as a whole, too: a smooth round surface also bends little from triangle to triangle.
+        // The region must also be flat as a whole, because a smooth round surface also bends little
+        // between neighbouring triangles.
         let is_flat = members
             .iter()
             .all(|&t| normal(t).dot(&normal(members[0])) > FLAT_COS);
@@ -68,7 +72,7 @@ pub(super) fn find_caps(surface: &Surface) -> Vec<Vec<u32>> {
     }
 }
 
-/// Pairs of triangles that share an edge which no third triangle uses.
+/// Pairs of triangles that share an edge of exactly two triangles.
 fn triangle_pairs(surface: &Surface) -> Vec<(u32, u32)> {
     by_edge(&all_sides(surface))
         .filter_map(|on_edge| match on_edge {
@@ -78,8 +82,8 @@ fn triangle_pairs(surface: &Surface) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// The surface without the triangles for which `is_dropped`, and without the vertices that only those used. Vertices
-/// keep their order.
+/// The surface without the triangles for which `is_dropped` is true, and without the vertices that
+/// only those used. The remaining vertices keep their order.
 pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) -> bool) -> Surface {
     let triangles = surface
         .triangles
@@ -95,8 +99,8 @@ pub(super) fn without_triangles(surface: &Surface, is_dropped: impl Fn(usize) ->
     kept
 }
 
-/// The part of a surface within `radius` of `centre`, connected with the vertex nearest to it; ragged teeth and
-/// vertices at which only corners meet are trimmed.
+/// The part of a surface within `radius` of `centre` that is connected with the nearest vertex.
+/// Ragged teeth and vertices at which triangles meet only in a corner are trimmed.
 pub(super) fn cut_out(surface: &Surface, centre: Vec3, radius: f64) -> Surface {
     let is_near: Vec<bool> = surface
         .points
@@ -116,7 +120,8 @@ pub(super) fn cut_out(surface: &Surface, centre: Vec3, radius: f64) -> Surface {
     }
 }
 
-/// Drops triangles that hang on one edge only, and those at vertices at which separate fans meet.
+/// Drops triangles that are connected by only one edge, and triangles at vertices where separate
+/// fans meet.
 fn trim_teeth(surface: &Surface) -> Surface {
     let pairs = triangle_pairs(surface);
     let mut n_neighbours = vec![0; surface.triangles.len()];
@@ -187,11 +192,12 @@ pub(super) fn find_cut_faces(skin: &Surface) -> Vec<CutFace> {
     faces
 }
 
-/// The rim as the flat end of a limb: its own plane cuts the skin at a steep angle.
+/// The rim as a cut face, if it is the flat end of a limb: the plane of the rim cuts the skin at a
+/// steep angle.
 fn limb_end(skin: &Surface, normals: &[Vec3], rim: &[u32]) -> Option<CutFace> {
     let points: Vec<Vec3> = rim.iter().map(|&v| skin.points[v as usize]).collect();
     let centre = points.iter().sum::<Vec3>() / points.len() as f64;
-    // Rims run as their triangles do, that is clockwise as seen from beyond the cut.
+    // Rims have the direction of their triangles: clockwise as seen from beyond the cut.
     let mut area = Vec3::zeros();
     for i in 0..points.len() {
         area -= (points[i] - centre).cross(&(points[(i + 1) % points.len()] - centre));
@@ -217,7 +223,8 @@ fn limb_end(skin: &Surface, normals: &[Vec3], rim: &[u32]) -> Option<CutFace> {
     })
 }
 
-/// A closed rim as runs of vertices between sharp turns; each run ends where the next begins.
+/// Splits a closed rim into runs of vertices between sharp turns. Each run ends where the next
+/// begins.
 fn split_at_corners(skin: &Surface, rim: &[u32]) -> Vec<Vec<u32>> {
     let n = rim.len();
     let p = |i: usize| skin.points[rim[i % n] as usize];
@@ -239,7 +246,7 @@ fn split_at_corners(skin: &Surface, rim: &[u32]) -> Vec<Vec<u32>> {
     sides
 }
 
-/// A run of rim vertices as a face whose normal points out of the skin, along it.
+/// A run of rim vertices as a cut face. Its normal points out of the body and lies along the skin.
 fn side_face(skin: &Surface, normals: &[Vec3], side: &[u32]) -> CutFace {
     let p = |v: u32| skin.points[v as usize];
     let outward: Vec3 = side
@@ -247,7 +254,8 @@ fn side_face(skin: &Surface, normals: &[Vec3], side: &[u32]) -> CutFace {
         .map(|e| (p(e[1]) - p(e[0])).cross(&(normals[e[0] as usize] + normals[e[1] as usize])))
         .sum();
     let length: f64 = side.windows(2).map(|e| (p(e[1]) - p(e[0])).norm()).sum();
-    // All round a flat patch the parts cancel: no direction, rather than that of the rounding errors.
+    // All round a flat patch, the contributions cancel. The normal is then zero rather than the
+    // direction of a rounding error.
     let normal = outward
         .try_normalize(1e-6 * length)
         .unwrap_or_else(Vec3::zeros);

@@ -1,13 +1,16 @@
 //! Growth of a skin surface inward into a layered body (method, eq. 3.1, on real shapes).
 //!
-//! 1. Flat caps of a closed limb are found and taken off; the rims become cut faces.
-//! 2. Every skin vertex gets a *column*: a line inward that leaves along the smoothed normal and turns into the field of
-//!    the rigid core (bones), or runs straight where there is no bone.
-//! 3. Levels are put on the columns by the thickness of the layers; where there is no room, all layers thin in proportion.
-//! 4. Every prism is measured. Where one is turned over or flat, the columns around it are evened out and, if that is not
-//!    enough, shortened; the core then stands off the bone there. If nothing helps, growth is refused, saying where.
+//! 1. Flat caps of a closed limb are found and removed. Their rims become cut faces.
+//! 2. Every skin vertex gets a *column*: a line inward that starts along the smoothed normal and
+//!    turns into the field of the rigid core (bones). Without bones it is straight.
+//! 3. Levels are placed on the columns by the thickness of the layers. If there is too little room,
+//!    all layers are thinned in proportion.
+//! 4. Every prism is checked. Near prisms that are turned over or flat, the columns are relaxed
+//!    and, if that is not enough, shortened; the core then stands off the bone there. If nothing
+//!    helps, growth returns an error with the place.
 //!
-//! What was thinned, shortened and how far the core stands off the bones is in the [`GrowthReport`].
+//! The [`GrowthReport`] says how much was thinned and shortened, and how far the core stands off
+//! the bones.
 
 mod columns;
 mod core;
@@ -25,104 +28,106 @@ use crate::{LayeredBody, Surface, Vec3};
 use columns::{Column, Confinement};
 use core::RigidCore;
 
-/// A layer down to the bone asks for at least this share of the thickness above it; where less is left, all layers thin
-/// in proportion. Without it the last layer would be squeezed to nothing before the others give way.
+/// Least share of the thickness above it that a layer down to the bone asks for. If there is less
+/// room, all layers are thinned in proportion. Without this share, the last layer would be squeezed
+/// to nothing before the others become thinner.
 const LEAST_FILL_SHARE: f64 = 0.2;
 
-/// Larger bodies are refused: their bars and factors would not fit into memory. nodes
+/// Largest number of nodes. The bars and factors of a larger body would not fit into memory.
 pub const MAX_NODES: usize = 2_000_000;
 
-/// What one layer asks for.
+/// Specification of one layer.
 #[derive(Debug, Clone)]
 pub struct LayerSpec {
     /// Name, for messages and reports.
     pub name: String,
-    /// Thickness below the skin, or `None` for a layer that reaches down to the bones (only the last one can).
+    /// Thickness below the skin, or `None` for a layer that reaches down to the bones (only the
+    /// last layer can).
     pub thickness: Option<Thickness>,
-    /// Prisms through the layer's thickness, at least 1.
+    /// Number of prisms through the layer's thickness, at least 1.
     pub n_levels: usize,
-    /// Thickness that the layer keeps where there is no room, in metres; positive.
+    /// Least thickness of the layer where there is too little room, in metres; positive.
     pub min_thickness: f64,
 }
 
-/// How a surface is to be grown.
+/// Parameters of the growth of a surface.
 #[derive(Debug, Clone)]
 pub struct GrowthParams {
-    /// Layers from the skin down, at least one.
+    /// Layers from the skin down; at least one.
     pub layers: Vec<LayerSpec>,
     /// Keep only the part within this distance of a point: `(centre, radius)`, in metres.
     pub cut_out: Option<(Vec3, f64)>,
-    /// A body of more nodes is refused before it is grown; at most [`MAX_NODES`].
+    /// Largest number of nodes. A larger body is refused before it is grown. At most [`MAX_NODES`].
     pub max_nodes: usize,
 }
 
-/// A grown body with what a user should know about it.
+/// A grown body, with a report for the user.
 #[derive(Debug, Clone)]
 pub struct Growth {
     /// The layered body.
     pub body: LayeredBody,
-    /// Figures for people and machines.
+    /// Figures about the body, for people and programs.
     pub report: GrowthReport,
-    /// By which factor the layers of each column were thinned (1: not at all). `[n_vertices]`
+    /// Factor by which the layers of each column were thinned (1: not at all). `[n_vertices]`
     pub thinning: Vec<f64>,
-    /// How far the end of each column stands off the nearest bone, in metres, negative inside it; empty without
-    /// bones. `[n_vertices]`
+    /// Distance from the end of each column to the nearest bone, in metres, negative inside it.
+    /// Empty if there are no bones. `[n_vertices]`
     pub stand_off: Vec<f64>,
 }
 
-/// Why a body could not be grown.
+/// Reason why a body could not be grown.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GrowthError {
     /// The surface has no triangles.
     #[error("{what} has no triangles; give a skin surface with faces")]
     Empty {
-        /// Which surface.
+        /// The surface without triangles.
         what: String,
     },
-    /// The surface is not fit to be grown.
+    /// The surface is not suitable for growth.
     #[error("the skin cannot be grown: {reason}; run `palpa check` on it and repair it first")]
     BadSurface {
-        /// What is wrong and where.
+        /// The defect and its place.
         reason: String,
     },
-    /// A layer specification that makes no sense.
+    /// An invalid layer specification.
     #[error("layer \"{name}\": {reason}")]
     BadLayer {
-        /// The layer.
+        /// Name of the layer.
         name: String,
-        /// What is wrong with it, and what to do.
+        /// What is wrong with the layer, and what to do.
         reason: String,
     },
-    /// A bone comes through the skin.
+    /// A bone comes out through the skin.
     #[error(
         "bone {bone} comes {:.2} mm out of the skin at ({:.1}, {:.1}, {:.1}) mm; check that skin and bones use the \
          same frame and unit, or move the bone inside",
         depth * 1e3, at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
     )]
     BoneOutside {
-        /// Index of the bone in the list given.
+        /// Index of the bone in the list of bones.
         bone: usize,
-        /// How far outside. m
+        /// Distance that the bone reaches outside. m
         depth: f64,
-        /// Where. m
+        /// Position of that point. m
         at: [f64; 3],
     },
-    /// A bone is nowhere inside the skin.
+    /// A bone lies completely outside the skin's box.
     #[error(
         "bone {bone} is nowhere inside the skin: it reaches from ({}) to ({}) mm, the skin from ({}) to ({}) mm; check \
          that both use the same frame and unit",
         millimetres(bone_box[0]), millimetres(bone_box[1]), millimetres(skin_box[0]), millimetres(skin_box[1])
     )]
     BoneApart {
-        /// Index of the bone in the list given.
+        /// Index of the bone in the list of bones.
         bone: usize,
         /// Smallest and largest coordinates of the bone. m
         bone_box: [[f64; 3]; 2],
         /// Smallest and largest coordinates of the skin. m
         skin_box: [[f64; 3]; 2],
     },
-    /// The layers ask for more than the body has, everywhere.
+    /// The layers are thicker than the room in the whole body.
     #[error(
         "the layers are thicker than the body: they ask for {:.2} mm, and the most room below any skin point is \
          {:.2} mm; make the layers thinner, or check the unit of the \
@@ -130,46 +135,46 @@ pub enum GrowthError {
         asked * 1e3, room * 1e3
     )]
     NoRoom {
-        /// Sum of the layers' thickness where there is most room. m
+        /// Sum of the layers' thicknesses at the place with the most room. m
         asked: f64,
-        /// The most room there is. m
+        /// The largest room below a skin point. m
         room: f64,
     },
-    /// More nodes than can be handled.
+    /// The body would have too many nodes.
     #[error(
         "{n_vertices} skin vertices with {n_levels} levels are {} nodes, more than the {max_nodes} that are handled; \
          take a coarser skin, fewer levels, or cut out a part with cutout_radius", n_vertices * n_levels
     )]
     TooLarge {
-        /// Skin vertices.
+        /// Number of skin vertices.
         n_vertices: usize,
-        /// Nodes per column.
+        /// Number of nodes per column.
         n_levels: usize,
-        /// What is handled.
+        /// The largest number of nodes.
         max_nodes: usize,
     },
-    /// Nothing of the skin is left in a cut-out.
+    /// No part of the skin lies in the cut-out.
     #[error("no skin triangle lies whole within {:.1} mm of the cut-out's centre; choose a larger cutout_radius", radius * 1e3)]
     EmptyCutOut {
-        /// The radius. m
+        /// Radius of the cut-out. m
         radius: f64,
     },
-    /// Prisms stayed turned over whatever was tried.
+    /// Some prisms stayed turned over after all rounds.
     #[error(
         "{n_bad} of {n_prisms} prisms cannot be given a positive volume; the worst is in layer \"{layer}\" under \
          skin vertex {vertex} at ({:.1}, {:.1}, {:.1}) mm; smooth or remesh the skin there, or use thinner layers",
         at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
     )]
     Tangled {
-        /// Prisms that are not valid.
+        /// Number of invalid prisms.
         n_bad: usize,
-        /// All prisms.
+        /// Number of all prisms.
         n_prisms: usize,
-        /// The layer of the worst.
+        /// Layer of the worst prism.
         layer: String,
-        /// A skin vertex of the worst.
+        /// A skin vertex of the worst prism.
         vertex: u32,
-        /// Its position. m
+        /// Position of that vertex. m
         at: [f64; 3],
     },
 }
@@ -180,11 +185,12 @@ fn millimetres([x, y, z]: [f64; 3]) -> String {
 
 /// Grows `surface` inward, down to `bones` where a layer asks for it.
 ///
-/// `surface` must be oriented outward and edge-manifold. Cost: about `n_vertices × (steps of a column ≈ 30) ×
-/// (sources of the core's field ≈ 1000)`, a second for 10,000 vertices.
+/// `surface` must be oriented outward and edge-manifold. The cost is about
+/// `n_vertices × (steps of a column ≈ 30) × (sources of the core's field ≈ 1000)`: a second for
+/// 10,000 vertices.
 ///
 /// # Errors
-/// [`GrowthError`], with the place.
+/// [`GrowthError`], with the place of the problem.
 pub fn grow(
     surface: &Surface,
     bones: &[Surface],
@@ -281,7 +287,7 @@ pub fn grow(
     ))
 }
 
-/// What the layers of given thickness ask for together below a skin point. m
+/// Sum of the thicknesses that the layers of given thickness ask for below a skin point. m
 fn fixed_thickness(layers: &[LayerSpec], skin_point: Vec3) -> f64 {
     layers
         .iter()
@@ -290,12 +296,14 @@ fn fixed_thickness(layers: &[LayerSpec], skin_point: Vec3) -> f64 {
         .sum()
 }
 
-/// What a layer that reaches down to the bone asks for at least, given the thickness of the layers above it. m
+/// Least thickness that a layer down to the bone asks for. `fixed` is the thickness of the layers
+/// above it. m
 fn least_fill(layer: &LayerSpec, fixed: f64) -> f64 {
     layer.min_thickness.max(LEAST_FILL_SHARE * fixed)
 }
 
-/// Where the levels of one column lie: arc lengths of its nodes, and by which factor its most thinned layer was thinned.
+/// Writes the arc lengths of one column's nodes to `arcs`. Returns the factor of the layer that was
+/// thinned most.
 fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<f64>) -> f64 {
     let fixed = fixed_thickness(layers, skin_point);
     let nominal: Vec<f64> = layers
@@ -327,8 +335,9 @@ fn level_arcs(layers: &[LayerSpec], skin_point: Vec3, room: f64, arcs: &mut Vec<
         .fold(1.0, f64::min)
 }
 
-/// Thicknesses that fit into `room`: all in proportion to `nominal`, none below its floor, so that what the layers at
-/// their floors keep is taken from the others. If the floors alone are too thick, the floors.
+/// Thicknesses that fit into `room`. They are in proportion to `nominal`, but no layer is thinner
+/// than its floor. The other layers share the room that the layers at their floors leave. If the
+/// floors together exceed the room, every layer gets its floor.
 fn thinned(nominal: &[f64], floors: &[f64], room: f64) -> Vec<f64> {
     let mut is_at_floor = vec![false; nominal.len()];
     loop {
@@ -359,7 +368,8 @@ fn thinned(nominal: &[f64], floors: &[f64], room: f64) -> Vec<f64> {
     }
 }
 
-/// Size of a surface, the same however it lies: twice the largest distance from its mean point. m
+/// Size of a surface, independent of its orientation: twice the largest distance from its mean
+/// point. m
 fn extent(surface: &Surface) -> f64 {
     let centre = surface.points.iter().sum::<Vec3>() / surface.points.len().max(1) as f64;
     2.0 * surface
@@ -473,7 +483,7 @@ fn check_surface(surface: &Surface, what: &str) -> Result<(), GrowthError> {
     Ok(())
 }
 
-/// Refuses when the layers of given thickness find room nowhere.
+/// Returns an error if the layers of given thickness find no room at any vertex.
 fn check_room(skin: &Surface, layers: &[LayerSpec], lines: &[Column]) -> Result<(), GrowthError> {
     let asked = |v: usize| -> f64 {
         let fixed = fixed_thickness(layers, skin.points[v]);
@@ -510,7 +520,7 @@ mod tests {
         let (nominal, floors) = ([1.5, 4.0, 1.1], [0.3, 0.8, 0.5]);
         close(thinned(&nominal, &floors, 9.0), nominal);
         close(thinned(&nominal, &floors, 3.3), [0.75, 2.0, 0.55]);
-        // The last layer stays at its floor, the others share what is left: 1.7 of 5.5.
+        // The last layer stays at its floor. The others share the rest: 1.7 of 5.5.
         close(
             thinned(&nominal, &floors, 2.2),
             [1.5 * 1.7 / 5.5, 4.0 * 1.7 / 5.5, 0.5],

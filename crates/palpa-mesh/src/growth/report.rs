@@ -1,4 +1,4 @@
-//! What a user should know about a grown body.
+//! The report on a grown body, for the user.
 
 use serde::Serialize;
 
@@ -8,10 +8,10 @@ use super::{Growth, LayerSpec};
 use crate::check::self_intersections;
 use crate::{LayeredBody, Surface, Vec3};
 
-/// A place at which a figure is worst.
+/// The place where a figure is worst.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worst {
-    /// The figure there.
+    /// The value of the figure there.
     pub value: f64,
     /// Skin vertex above it.
     pub vertex: u32,
@@ -19,23 +19,23 @@ pub struct Worst {
     pub at: [f64; 3],
 }
 
-/// Minimum, some quantiles and maximum of a figure.
+/// Minimum, quantiles and maximum of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Smallest.
+    /// The smallest value.
     pub min: f64,
-    /// 5 % lie below.
+    /// The value below which 5 % lie.
     pub p05: f64,
-    /// Half lie below.
+    /// The value below which half lie.
     pub median: f64,
-    /// 95 % lie below.
+    /// The value below which 95 % lie.
     pub p95: f64,
-    /// Largest.
+    /// The largest value.
     pub max: f64,
 }
 
 impl Spread {
-    /// The spread of `values`, or `None` of none.
+    /// The spread of `values`, or `None` if there are none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -51,50 +51,52 @@ impl Spread {
     }
 }
 
-/// Thickness that a layer got.
+/// The actual thickness of a layer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LayerReport {
     /// Name of the layer.
     pub name: String,
-    /// Prisms through its thickness.
+    /// Number of prisms through its thickness.
     pub n_levels: usize,
-    /// Thickness over the skin vertices, along the columns. m
+    /// Thickness along the columns, over all skin vertices. m
     pub thickness: Spread,
 }
 
-/// Figures of a grown body.
+/// Figures about a grown body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GrowthReport {
-    /// Skin vertices, which is the number of columns.
+    /// Number of skin vertices, which is the number of columns.
     pub n_vertices: usize,
-    /// Nodes per column.
+    /// Number of nodes per column.
     pub n_levels: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub n_nodes: usize,
-    /// Prisms; all are valid.
+    /// Number of prisms; all are valid.
     pub n_prisms: usize,
-    /// Flat caps that were found on a closed limb and not grown from.
+    /// Number of flat caps found on a closed limb; nothing grows from them.
     pub n_caps: usize,
-    /// Cut faces (ends, sides, rims).
+    /// Number of cut faces (ends, sides, rims).
     pub n_cut_faces: usize,
-    /// Scaled Jacobian of the prisms; 1 is best, above 0 is valid.
+    /// Scaled Jacobian of the prisms: 1 is best, above 0 is valid.
     pub scaled_jacobian: Spread,
     /// The worst prism.
     pub worst_prism: Worst,
     /// Thickness of each layer.
     pub layers: Vec<LayerReport>,
-    /// Share of the skin's area below which the layers had to be thinned.
+    /// Share of the skin's area below which the layers were thinned.
     pub thinned_share: f64,
-    /// The strongest thinning (factor of the thickness), if any.
+    /// The strongest thinning (smallest factor of the thickness), if any.
     pub worst_thinning: Option<Worst>,
     /// Share of the skin's area below which columns were shortened to keep prisms valid.
     pub shortened_share: f64,
-    /// Pairs of triangles of the base that pass through each other: prisms can all be valid, and the body still overlap
-    /// itself, where columns from two sides pass each other without meeting a core.
+    /// Number of pairs of base triangles that pass through each other. Even if all prisms are
+    /// valid, the body can overlap itself where columns from two sides pass each other without
+    /// meeting a core.
     pub n_base_overlaps: usize,
-    /// How far the ends of the columns stand off the nearest bone, negative inside it; absent without bones. m
+    /// Distance from the ends of the columns to the nearest bone, negative inside it; `None`
+    /// without bones. m
     pub stand_off: Option<Spread>,
-    /// The largest stand-off, absent without bones.
+    /// The largest stand-off; `None` without bones.
     pub worst_stand_off: Option<Worst>,
 }
 

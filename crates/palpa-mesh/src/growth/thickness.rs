@@ -1,4 +1,4 @@
-//! Thickness of a layer as a field over the skin.
+//! Thickness of a layer as a function of the skin point.
 
 use rstar::{RTree, primitives::GeomWithData};
 
@@ -9,28 +9,31 @@ use crate::Vec3;
 pub enum Thickness {
     /// The same everywhere.
     Constant(f64),
-    /// A table along an axis, linear between its rows and constant beyond them.
+    /// A table along an axis: linear between its rows, constant beyond them.
     AlongAxis {
-        /// Direction along which positions are measured (any length, not zero).
+        /// Direction along which positions are measured (of any length except zero).
         axis: Vec3,
-        /// Rows `(position along the axis, thickness)`, ascending positions, at least one. m
+        /// Rows `(position along the axis, thickness)` with ascending positions; at least one row.
+        /// m
         table: Vec<[f64; 2]>,
     },
-    /// Measured at scattered points; between them the inverse-distance mean of the nearest four.
+    /// Measured at scattered points. Between them, the inverse-distance weighted mean of the
+    /// nearest four.
     Scattered(ScatteredThickness),
 }
 
-/// Samples of a thickness at points. Built once, asked per vertex.
+/// Samples of a thickness at points. Built once, then evaluated at every vertex.
 #[derive(Debug, Clone)]
 pub struct ScatteredThickness {
     tree: RTree<GeomWithData<[f64; 3], f64>>,
 }
 
-/// Samples that are mixed at one point.
+/// Number of samples that are averaged at one point.
 const N_NEAREST: usize = 4;
 
 impl ScatteredThickness {
-    /// Prepares samples `(point, thickness)`. `None` if there are none, or one is not finite.
+    /// Prepares samples `(point, thickness)`. Returns `None` if there are none, or if one is not
+    /// finite.
     pub fn build(samples: &[(Vec3, f64)]) -> Option<Self> {
         let is_finite = |(p, d): &(Vec3, f64)| d.is_finite() && p.iter().all(|x| x.is_finite());
         if samples.is_empty() || !samples.iter().all(is_finite) {
@@ -73,7 +76,7 @@ impl Thickness {
     }
 }
 
-/// Linear in a table of ascending `[x, y]` rows, constant beyond its ends.
+/// Interpolates linearly in a table of ascending `[x, y]` rows; constant beyond its ends.
 fn interpolate(table: &[[f64; 2]], x: f64) -> f64 {
     let above = table.partition_point(|row| row[0] <= x);
     match (above.checked_sub(1).map(|i| table[i]), table.get(above)) {

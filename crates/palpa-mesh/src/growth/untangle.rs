@@ -1,4 +1,4 @@
-//! Levels on the columns, and what is done where prisms would be turned over.
+//! Placing of levels on the columns, and the repair of prisms that would be turned over.
 
 use super::columns::{Column, Confinement};
 use super::core::RigidCore;
@@ -6,16 +6,16 @@ use super::{GrowthError, LayerSpec, level_arcs};
 use crate::quality::PrismShape;
 use crate::{LayeredBody, Vec3};
 
-/// Prisms with a smaller scaled Jacobian than this are worked on as if they were turned over.
+/// Prisms with a scaled Jacobian below this are improved as if they were turned over.
 const GOOD_ENOUGH: f64 = 0.08;
-/// Rounds of relaxing and shortening before growth is given up.
+/// Largest number of rounds of relaxing and shortening. Then growth fails.
 const MAX_ROUNDS: usize = 40;
-/// Sweeps of relaxation over the nodes of poor prisms in one round.
+/// Largest number of relaxation sweeps over the nodes of poor prisms in one round.
 const MAX_SWEEPS: usize = 25;
-/// What a column of a turned-over prism keeps of its length in one round.
+/// Factor on the length of a turned-over prism's columns in one round.
 const SHORTENING: f64 = 0.94;
 
-/// What placing the levels led to.
+/// The result of placing the levels.
 pub(super) struct Placement {
     /// Factor by which the layers of each column were thinned. `[n_vertices]`
     pub(super) thinning: Vec<f64>,
@@ -25,8 +25,9 @@ pub(super) struct Placement {
     pub(super) shapes: Vec<PrismShape>,
 }
 
-/// Fills the body's positions: levels by thickness, then rounds of relaxing poor prisms; from the second round on the
-/// columns of prisms that are still turned over are shortened, a little each round.
+/// Computes the body's positions. Levels are placed by thickness, then poor prisms are relaxed in
+/// rounds. From the second round on, the columns of prisms that are still turned over are shortened
+/// a little in each round.
 pub(super) fn place_levels(
     body: &mut LayeredBody,
     lines: &[Column],
@@ -74,8 +75,8 @@ fn place_column(
     }
 }
 
-/// Shortens the columns of `turned_over` and draws their neighbours along, so that no step is left between them.
-/// Returns all whose share changed.
+/// Shortens the columns of `turned_over`, and the columns next to them less, so that there is no
+/// step between neighbours. Returns all columns whose share changed.
 fn shorten(turned_over: &[usize], rings: &[Vec<u32>], used_share: &mut [f64]) -> Vec<usize> {
     let mut changed = turned_over.to_vec();
     for &v in turned_over {
@@ -99,7 +100,7 @@ fn body_shapes(body: &LayeredBody) -> Vec<PrismShape> {
     crate::quality::prism_shapes(body, &body.positions)
 }
 
-/// Vertices of the prisms that satisfy `is_in`, ascending.
+/// Vertices of the prisms for which `is_in` is true, ascending.
 fn vertices_of(
     body: &LayeredBody,
     shapes: &[PrismShape],
@@ -121,7 +122,7 @@ fn vertices_of(
     (0..marked.len()).filter(|&v| marked[v]).collect()
 }
 
-/// What a node needs to know of its surroundings when it is moved.
+/// The surroundings of a node, needed to move it.
 struct Surroundings<'a> {
     triangles_at: Vec<Vec<u32>>,
     rings: &'a [Vec<u32>],
@@ -150,8 +151,9 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Moves the nodes of poor prisms, one by one, where that makes the worst prism around the node better; never where
-    /// it makes it worse. Skin nodes stay; nodes stay out of the bones; nodes of flat cut faces stay in them.
+    /// Moves the nodes of poor prisms, one by one, if that improves the worst prism around the
+    /// node; no move makes it worse. Skin nodes do not move. Nodes stay out of the bones, and nodes
+    /// of flat cut faces stay in them.
     fn relax(&self, body: &mut LayeredBody) {
         let mut columns = vertices_of(body, &body_shapes(body), |s| {
             s.scaled_jacobian < GOOD_ENOUGH || !s.is_valid()
@@ -173,7 +175,8 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Tries the mean of the node's neighbours, then small steps along the axes. Says whether the node moved.
+    /// Tries the mean of the node's neighbours, then small steps along the axes. Returns whether
+    /// the node moved.
     fn improve_node(&self, body: &mut LayeredBody, v: usize, l: usize) -> bool {
         let before = self.worst_around(body, v, l);
         if before >= GOOD_ENOUGH {
@@ -214,7 +217,8 @@ impl<'a> Surroundings<'a> {
         best_worth > before + 1e-6
     }
 
-    /// The worst scaled Jacobian of the prisms that meet in node (v, l); at most 0 if one is not valid inside.
+    /// The worst scaled Jacobian of the prisms at node (v, l). At most 0 if one of them is invalid
+    /// inside.
     fn worst_around(&self, body: &LayeredBody, v: usize, l: usize) -> f64 {
         let intervals = l.saturating_sub(1)..(l + 1).min(body.n_levels - 1);
         let mut worst = f64::INFINITY;
@@ -233,7 +237,7 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// The refusal: how many prisms are not valid, and where the worst is.
+/// The error that says how many prisms are invalid, and where the worst one is.
 fn tangled(body: &LayeredBody, shapes: &[PrismShape]) -> GrowthError {
     let invalid = || shapes.iter().enumerate().filter(|(_, s)| !s.is_valid());
     let worst = invalid()

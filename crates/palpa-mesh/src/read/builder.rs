@@ -1,19 +1,21 @@
-//! What the readers fill: points and triangles, with polygons cut on the way in.
+//! The surface that the readers fill: points and triangles. Polygons are cut into triangles as they
+//! are added.
 
 use super::polygon::triangulate;
 use super::{Fault, FileCounts, Parsed, Place, ReadNote};
 use crate::{Surface, Vec3};
 
-/// The most corners that a face may have. Cutting a polygon takes up to the square of its corners; real faces have a few,
-/// the caps of a cylinder some hundred.
+/// Largest number of corners of a face. Cutting a polygon takes up to the square of its corners.
+/// Real faces have a few; the caps of a cylinder have some hundred.
 const MAX_CORNERS: usize = 4096;
 
-/// What cutting all polygons of a file may cost, in squares of corners: as much for each byte, and so much in any case. A file
-/// of many polygons of thousands of corners would otherwise take minutes for each of its megabytes.
+/// Limit on the cost of cutting all polygons of a file, in squares of corners: `CUTTING_PER_BYTE`
+/// for each byte, plus `CUTTING_AT_LEAST`. Without it, a file of many polygons with thousands of
+/// corners would take minutes for each of its megabytes.
 const CUTTING_PER_BYTE: usize = 64;
 const CUTTING_AT_LEAST: usize = 100_000_000;
 
-/// A surface in the making.
+/// A surface under construction.
 #[derive(Debug)]
 pub(super) struct Builder {
     pub(super) points: Vec<Vec3>,
@@ -30,7 +32,7 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// For a file of so many bytes.
+    /// An empty builder for a file of `n_bytes` bytes.
     pub(super) fn new(n_bytes: usize) -> Self {
         Self {
             points: vec![],
@@ -55,7 +57,8 @@ impl Builder {
         self.triangles.reserve(n);
     }
 
-    /// Adds a face of vertices that are all there. One with fewer than three corners is left out and counted.
+    /// Adds a face; all its vertices must exist. A face with fewer than three corners is left out
+    /// and counted.
     pub(super) fn face(&mut self, corners: &[u32], place: Place) -> Parsed<()> {
         self.n_faces += 1;
         match corners {
@@ -88,7 +91,7 @@ impl Builder {
         Ok(())
     }
 
-    /// The index of a vertex that a file names by number, once it is known to be there.
+    /// Checks that a vertex number from the file exists, and returns it as an index.
     pub(super) fn vertex(&self, index: i64, place: Place) -> Parsed<u32> {
         match usize::try_from(index) {
             Ok(i) if i < self.points.len() => Ok(i as u32),
@@ -106,7 +109,7 @@ impl Builder {
         }
     }
 
-    /// Refuses a surface without faces, which is a cloud of points or not a surface at all.
+    /// Returns an error for a surface without faces, such as a cloud of points.
     pub(super) fn check_faces(&self) -> Parsed<()> {
         if !self.triangles.is_empty() {
             return Ok(());

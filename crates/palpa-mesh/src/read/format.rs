@@ -1,10 +1,10 @@
-//! Which format a file is in.
+//! The format of a file.
 
 use serde::Serialize;
 
 use super::{stl, text};
 
-/// A format that surfaces are read from.
+/// A file format for surfaces that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -47,21 +47,22 @@ impl Format {
         }
     }
 
-    /// The format of an extension in lower case.
+    /// The format for an extension; it must be in lower case.
     pub fn of_extension(extension: &str) -> Option<Self> {
         Self::ALL
             .into_iter()
             .find(|f| f.extensions().contains(&extension))
     }
 
-    /// The format of some content: by what it starts with, then by what its extension says, then by how it reads.
+    /// The format of some content, by its first bytes, else by its extension, else by a look at its
+    /// lines.
     pub(super) fn of(bytes: &[u8], extension: Option<&str>) -> Option<Self> {
         Self::of_magic(bytes)
             .or_else(|| extension.and_then(Self::of_extension))
             .or_else(|| looks_like_obj(bytes).then_some(Self::Obj))
     }
 
-    /// The format whose unmistakable mark the content carries.
+    /// The format, if the content has an unmistakable mark.
     fn of_magic(bytes: &[u8]) -> Option<Self> {
         if stl::is_binary(bytes) {
             return Some(Self::Stl);
@@ -81,7 +82,7 @@ impl Format {
     }
 }
 
-/// Whether a line near the top starts as the vertices of an OBJ do.
+/// Whether a line near the top begins like a vertex of an OBJ file.
 fn looks_like_obj(bytes: &[u8]) -> bool {
     let head = text::decode(&bytes[..bytes.len().min(4096)]).0;
     head.lines().any(|line| {

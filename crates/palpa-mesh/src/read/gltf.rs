@@ -1,7 +1,8 @@
 //! glTF 2.0 and GLB: the triangles of every mesh instance of the scene, in the frame of the scene.
 //!
-//! Only what holds geometry is read. Of the `gltf` crate we would need its JSON types alone; it panics on a short GLB
-//! length and refuses files for faults in materials, so the few types stand here.
+//! Only the parts that hold geometry are read. From the `gltf` crate we would need only the JSON
+//! types, but it panics on a short GLB length and refuses files because of faults in materials. So
+//! the few types are defined here.
 
 mod document;
 
@@ -15,10 +16,10 @@ use nalgebra::{Matrix4, Point3};
 use super::{Builder, Fault, MAX_FILE_BYTES, Parsed, Place, ReadNote, load};
 use document::{Accessor, Document, Primitive};
 
-/// Corners that the instances of a file may have together per byte of the file. One mesh may stand at many nodes; a
-/// corner of a mesh that stands once takes some bytes.
+/// Largest number of corners that the instances of a file may have together, per byte of the file.
+/// Many nodes may use the same mesh; a corner of a mesh that is used once takes several bytes.
 const MAX_CORNERS_PER_BYTE: usize = 4;
-/// Corners that are always allowed, however short the file.
+/// Number of corners that is always allowed, however short the file is.
 const MIN_CORNER_LIMIT: usize = 1 << 20;
 
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>, builder: &mut Builder) -> Parsed<()> {
@@ -57,7 +58,8 @@ fn fault(problem: impl Into<String>) -> Fault {
     Fault::new(Place::File, problem)
 }
 
-/// The JSON and the binary chunk of a GLB: a header of 12 bytes, then chunks of length, type and content.
+/// The JSON and the binary chunk of a GLB: a header of 12 bytes, then chunks of length, type and
+/// content.
 fn split_glb(bytes: &[u8]) -> Parsed<(&[u8], Option<&[u8]>)> {
     let word = |at: usize| -> Parsed<u32> {
         let word = bytes
@@ -135,8 +137,8 @@ fn load_buffer(
     Ok(bytes)
 }
 
-/// The file name that a relative URI without folders means, with `%20` and the like decoded. Whatever could lead out of
-/// the folder has none.
+/// The file name in a relative URI without folders, with `%20` and the like decoded. `None` for a
+/// name that could lead out of the folder.
 fn file_name(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
@@ -166,7 +168,8 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Walks the tree of nodes from the roots of the scene, each node once (the format allows no other way).
+    /// Visits the tree of nodes from the roots of the scene. Each node may be reached only once, as
+    /// the format requires.
     fn add_nodes(&mut self) -> Parsed<()> {
         let mut seen = BTreeSet::new();
         let mut open: Vec<(usize, Matrix4<f64>)> = self
@@ -264,7 +267,7 @@ impl Scene<'_> {
                 checked.collect::<Parsed<_>>()?
             }
         };
-        // A mirrored instance turns its triangles inside out, so their winding is turned back.
+        // A mirrored instance turns its triangles inside out, so their winding is reversed again.
         let is_mirrored = scene_from_node.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
         let triangles = n_triangles(primitive.mode, order.len());
         self.builder.reserve_faces(triangles);
@@ -282,7 +285,8 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// Takes corners from what the file may have. A few bytes can name a mesh many times, or announce a buffer of zeros.
+    /// Subtracts corners from the file's limit. A few bytes can use a mesh many times, or announce
+    /// a buffer of zeros.
     fn spend(&mut self, n: usize) -> Parsed<()> {
         self.n_corners_left = self.n_corners_left.checked_sub(n).ok_or_else(|| {
             fault("its parts have far more vertices together than a file of this size holds; apply the instances and export again")
@@ -290,7 +294,7 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// The values of an accessor as numbers, `width` of them for each element.
+    /// The values of an accessor as numbers, `width` values for each element.
     fn values(&self, accessor: &Accessor, width: usize) -> Parsed<Vec<f64>> {
         if accessor.width() != Some(width) {
             return Err(fault(format!(
@@ -351,7 +355,8 @@ impl Scene<'_> {
         Ok(values)
     }
 
-    /// `count` elements of `width` values from a buffer view, after making sure that they are there.
+    /// `count` elements of `width` values from a buffer view. Checks first that the view is long
+    /// enough.
     fn strided(
         &self,
         view: usize,
@@ -402,16 +407,17 @@ fn n_triangles(mode: u32, n_corners: usize) -> usize {
     }
 }
 
-/// How one component type is read; `largest` is what stands for 1 where values are normalised.
-struct Scalar {
+/// How to read one component type. `largest` is the raw value that stands for 1 if values are
+/// normalised.
+struct Component {
     size: usize,
     largest: f64,
     read: fn(&[u8]) -> f64,
 }
 
-fn scalar(component: u32) -> Parsed<Scalar> {
+fn scalar(component: u32) -> Parsed<Component> {
     let of = |size, largest, read| {
-        Ok(Scalar {
+        Ok(Component {
             size,
             largest,
             read,

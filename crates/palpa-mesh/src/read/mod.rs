@@ -1,12 +1,14 @@
-//! Surfaces in: OBJ, STL, PLY, OFF, GLB and glTF, read into a welded [`Surface`].
+//! Reading of surfaces: OBJ, STL, PLY, OFF, GLB and glTF files become a welded [`Surface`].
 //!
-//! The readers are our own, because what is on crates.io does not hold three things at once: coordinates of text files
-//! as `f64` (a scan in a map frame lies millions of metres from its origin), no allocation that a header can lie into
-//! being, and errors that name the line. `stl_io` and `tobj` read `f32` or lose the line; `ply-rs` and `stl_io` reserve
-//! what the header says; `gltf` panics on a short GLB length and refuses files for faults in their materials.
+//! The readers are our own, because no crate on crates.io does three things at once. It must read
+//! coordinates of text files as `f64` (a scan in a map frame lies millions of metres from its
+//! origin). A false count in a header must not cause a large allocation. Errors must name the line.
+//! `stl_io` and `tobj` read `f32` or lose the line. `ply-rs` and `stl_io` reserve the memory that
+//! the header asks for. `gltf` panics on a short GLB length and refuses files because of faults in
+//! their materials.
 //!
-//! Every reader works in time and memory bounded by the size of the file: a count is compared with the bytes that are
-//! left before anything is reserved for it.
+//! The time and memory of every reader are bounded by the size of the file: before memory is
+//! reserved for a count, the count is compared with the remaining bytes.
 
 mod builder;
 mod format;
@@ -30,94 +32,95 @@ use crate::weld::weld_exact;
 use builder::Builder;
 pub use format::Format;
 
-/// The largest file that is read, in bytes. A skin of 20 million triangles fits; a wrong file stops here, and not
-/// where the memory ends.
+/// Largest file that is read, in bytes. A skin of 20 million triangles fits. A wrong file is
+/// refused here, before it exhausts the memory.
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
 
-/// A surface as it came from a file, with what the file said.
+/// A surface read from a file, with information about the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceFile {
-    /// The surface in the units of the file; vertices at exactly the same place are one vertex.
+    /// The surface in the units of the file. Vertices at exactly the same place are merged.
     pub surface: Surface,
-    /// The format that was found, which need not be that of the extension.
+    /// The format of the content, which may differ from that of the extension.
     pub format: Format,
-    /// What was in the file.
+    /// Counts of the items in the file.
     pub counts: FileCounts,
-    /// What the reader had to say, in the order in which it was met.
+    /// The reader's remarks, in the order in which they came up.
     pub notes: Vec<ReadNote>,
 }
 
-/// How much a file held before vertices were welded and polygons cut into triangles.
+/// Counts of the items in a file, before vertices were welded and polygons cut into triangles.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct FileCounts {
-    /// Vertices as they stand in the file.
+    /// Number of vertices in the file.
     pub n_points: usize,
-    /// Faces as they stand in the file, of any number of corners.
+    /// Number of faces in the file, with any number of corners.
     pub n_faces: usize,
-    /// Faces with more than three corners, which were cut into triangles.
+    /// Number of faces with more than three corners, which were cut into triangles.
     pub n_polygons: usize,
-    /// Objects, solids or mesh instances; 1 where the format has no such thing.
+    /// Number of objects, solids or mesh instances; 1 if the format has no such items.
     pub n_objects: usize,
 }
 
-/// Something that a reader met and got over.
+/// A problem that the reader could work around.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ReadNote {
-    /// The content is not what the extension says.
+    /// The content does not match the extension.
     #[error("named .{extension}, but its content is {format}; read as {format}")]
     ExtensionMismatch {
         /// The extension of the file.
         extension: String,
-        /// What the content is.
+        /// The format of the content.
         format: Format,
     },
     /// The text was UTF-16.
     #[error("text is UTF-16; save it as UTF-8 for other programs")]
     Utf16,
-    /// Faces that have fewer than three corners were left out.
+    /// Faces with fewer than three corners were left out.
     #[error("{count} face(s) with fewer than three corners left out, the first at {first}")]
     ShortFaces {
-        /// How many.
+        /// Number of such faces.
         count: usize,
-        /// Where the first of them is.
+        /// Place of the first one.
         first: Place,
     },
-    /// Polygons that cross themselves, double back or are bent so far that no cut into triangles lies flat.
+    /// Polygons that cross themselves, double back, or are bent so much that they cannot be cut
+    /// into flat triangles.
     #[error(
         "{count} polygon(s) that fold over themselves, the first at {first}; cut them into triangles in a mesh program"
     )]
     FoldedPolygons {
-        /// How many.
+        /// Number of such polygons.
         count: usize,
-        /// Where the first of them is.
+        /// Place of the first one.
         first: Place,
     },
     /// Coordinates that are not numbers, in vertices that no face uses.
     #[error("{count} vertex line(s) that are not numbers, the first at {first}; no face uses them")]
     UnreadVertices {
-        /// How many.
+        /// Number of such vertices.
         count: usize,
-        /// Where the first of them is.
+        /// Place of the first one.
         first: Place,
     },
     /// Lines and points, or other parts that are not faces.
     #[error("{count} part(s) of lines or points left out")]
     NotFaces {
-        /// How many.
+        /// Number of such elements.
         count: usize,
     },
-    /// There are bytes behind the last record.
+    /// There are bytes after the last record.
     #[error("{bytes} byte(s) after the last record were not read")]
     TrailingBytes {
-        /// How many.
+        /// Number of bytes.
         bytes: usize,
     },
 }
 
 impl ReadNote {
-    /// How much it matters.
+    /// How severe the remark is.
     pub fn severity(&self) -> Severity {
         match self {
             Self::ShortFaces { .. } => Severity::Repairable,
@@ -151,25 +154,25 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// Why a surface could not be read.
+/// Reason why a surface could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// The file is not there or not readable.
+    /// The file does not exist or is not readable.
     #[error("cannot read {}: {source}; check the path and its permissions", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A directory, a device or a pipe.
     #[error("{} is not a file; name a file with a surface in it", path.display())]
     NotAFile {
-        /// What was named.
+        /// The path that was given.
         path: PathBuf,
     },
-    /// More than [`MAX_FILE_BYTES`].
+    /// The file is larger than [`MAX_FILE_BYTES`].
     #[error(
         "{} has {bytes} bytes, more than the {MAX_FILE_BYTES} that are read; thin the mesh out or cut the part of interest from it",
         path.display()
@@ -177,12 +180,12 @@ pub enum ReadError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file, in bytes.
         bytes: u64,
     },
-    /// Neither content nor extension is known.
+    /// The format is unknown, both by content and by extension.
     #[error(
-        "{} is no surface that is known; give an OBJ, STL, PLY, OFF, GLB or glTF file",
+        "{} is in no known surface format; give an OBJ, STL, PLY, OFF, GLB or glTF file",
         path.display()
     )]
     UnknownFormat {
@@ -194,27 +197,27 @@ pub enum ReadError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong and where.
+        /// The error in the content, with its place.
         source: ContentError,
     },
 }
 
-/// What is wrong with the content of a file, and where.
+/// An error in the content of a file, with its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{format}, {place}: {problem}")]
 pub struct ContentError {
-    /// The format it was read as.
+    /// The format that the file was read as.
     pub format: Format,
-    /// Where the reader stood.
+    /// The place of the error.
     pub place: Place,
-    /// What was found, what was expected and what to do.
+    /// What was found, what was expected, and what to do.
     pub problem: String,
 }
 
-/// What a reader of one format returns; the format is added on the way out.
+/// The result of a reader; the caller adds the format.
 type Parsed<T> = Result<T, Fault>;
 
-/// A problem at a place, from inside a reader.
+/// A problem at a place, inside a reader.
 #[derive(Debug)]
 struct Fault {
     place: Place,
@@ -230,12 +233,14 @@ impl Fault {
 
 /// Reads a surface from an OBJ, STL, PLY, OFF, GLB or glTF file.
 ///
-/// The format is known by its content, and by the extension only where the content leaves it open. Polygons are cut
-/// into triangles, transforms of glTF nodes are applied, and vertices at exactly the same place become one. The
-/// coordinates are those of the file: glTF is in metres, the others say nothing about their unit.
+/// The content decides the format; the extension matters only if the content leaves it open.
+/// Polygons are cut into triangles, transforms of glTF nodes are applied, and vertices at exactly
+/// the same place are merged. Coordinates stay in the units of the file: metres for glTF, unknown
+/// for the other formats.
 ///
 /// # Errors
-/// When the file cannot be read, is too large, is in no known format, breaks the rules of its format, or has no faces.
+/// When the file cannot be read, is too large, has an unknown format, breaks the rules of its
+/// format, or has no faces.
 pub fn read_surface(path: &Path) -> Result<SurfaceFile, ReadError> {
     let bytes = load(path, MAX_FILE_BYTES)?;
     let extension = path
@@ -256,12 +261,12 @@ pub fn read_surface(path: &Path) -> Result<SurfaceFile, ReadError> {
     Ok(file)
 }
 
-/// Reads a surface from bytes in memory, as [`read_surface`] does from a file.
+/// Reads a surface from bytes in memory, like [`read_surface`] from a file.
 ///
-/// A glTF that keeps its buffers in other files cannot be read this way.
+/// A glTF with buffers in other files cannot be read this way.
 ///
 /// # Errors
-/// When the bytes break the rules of the format, or hold no faces.
+/// When the bytes break the rules of the format or hold no faces.
 pub fn read_surface_bytes(bytes: &[u8], format: Format) -> Result<SurfaceFile, ContentError> {
     parse(bytes, format, None)
 }
@@ -293,7 +298,7 @@ fn parse(bytes: &[u8], format: Format, folder: Option<&Path>) -> Result<SurfaceF
     })
 }
 
-/// The bytes of a file, as long as it is a plain file of no more than `limit` bytes.
+/// Reads the bytes of a regular file of at most `limit` bytes.
 fn load(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     let io = |source| ReadError::Io {
         path: path.into(),
@@ -310,7 +315,7 @@ fn load(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     if metadata.len() > limit {
         return Err(too_large(metadata.len()));
     }
-    // The file may grow between the question and the answer, hence the second limit.
+    // The file may grow after its length was read, hence the second limit.
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     let file = File::open(path).map_err(io)?;
     file.take(limit + 1).read_to_end(&mut bytes).map_err(io)?;

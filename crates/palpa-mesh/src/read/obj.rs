@@ -1,4 +1,5 @@
-//! Wavefront OBJ: `v` and `f` lines; what else there is (normals, texture, materials, groups) is passed over.
+//! Wavefront OBJ: `v` and `f` lines. All other content (normals, texture, materials, groups) is
+//! ignored.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
     }
     let text = join_continued(&text);
 
-    // Vertices first: faces may come before the vertices that they use.
+    // Vertices are read first, because faces may come before the vertices that they use.
     let mut unread: BTreeMap<u32, (usize, &str)> = BTreeMap::new();
     for (line, text) in lines(&text) {
         let mut words = text.split_whitespace();
@@ -38,7 +39,7 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         let mut words = text.split_whitespace();
         match words.next() {
             Some("v") => n_before += 1,
-            // `fo` is how the first version of the format said it.
+            // The first version of the format used `fo`.
             Some("f" | "fo") => {
                 corners.clear();
                 for word in words {
@@ -68,7 +69,8 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
     Ok(())
 }
 
-/// The text with lines joined that end in a backslash. Numbers of lines stay: the joined parts leave empty lines behind.
+/// Joins each line that ends in a backslash with the next. Empty lines are added, so that line
+/// numbers stay the same.
 fn join_continued(text: &str) -> Cow<'_, str> {
     if !text.contains("\\\n") && !text.contains("\\\r\n") {
         return text.into();
@@ -90,7 +92,8 @@ fn join_continued(text: &str) -> Cow<'_, str> {
     joined.into()
 }
 
-/// The three coordinates of a vertex, or the word that is not a number. Colours and a weight may follow.
+/// The three coordinates of a vertex, or the word that is not a number. Colours and a weight may
+/// follow.
 fn vertex<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Parsed<Result<Vec3, &'a str>> {
     let mut p = Vec3::zeros();
     let mut n = 0;
@@ -110,7 +113,8 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Parsed<Resul
     Ok(Ok(p))
 }
 
-/// The vertex of a face corner: `7`, `7/1`, `7//3`, `7/1/3`, or counted back from the last vertex before, `-2`.
+/// The vertex of a face corner: `7`, `7/1`, `7//3`, `7/1/3`, or `-2`, counted back from the latest
+/// vertex.
 fn corner(word: &str, n_before: u64, line: usize, builder: &Builder) -> Parsed<u32> {
     let place = Place::Line(line);
     let index = word.split('/').next().unwrap_or("");

@@ -12,7 +12,8 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         .ok_or_else(|| Fault::new(Place::File, "empty; expected the word OFF"))?;
     let mut words = header.split_whitespace();
     let kind = words.next().unwrap_or("");
-    // C, N, ST: colours, normals and texture behind the coordinates. 4OFF and nOFF are of other dimensions.
+    // C, N, ST: colours, normals and texture after the coordinates. 4OFF and nOFF have other
+    // dimensions.
     if !matches!(
         kind,
         "OFF" | "COFF" | "NOFF" | "CNOFF" | "STOFF" | "STCOFF" | "STNOFF" | "STCNOFF"
@@ -24,7 +25,7 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         );
         return Err(Fault::new(Place::Line(line), problem));
     }
-    // The counts stand in the header line or in the next.
+    // The counts are in the header line or in the next line.
     let rest: Vec<&str> = words.collect();
     let (line, counts) = if rest.is_empty() {
         let (line, text) = lines.next().ok_or_else(|| {
@@ -39,7 +40,8 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         let problem = "expected the counts of vertices and faces as whole numbers";
         return Err(Fault::new(Place::Line(line), problem));
     };
-    // The shortest vertex is "0 0 0\n", the shortest face "3 0 1 2\n": what cannot be there is not waited for.
+    // The shortest vertex is "0 0 0\n", the shortest face "3 0 1 2\n". Counts that cannot fit into
+    // the file are refused at once.
     for (n, least, what) in [(n_points, 6, "vertices"), (n_faces, 2, "faces")] {
         if n > text.len() / least + 1 {
             let problem = format!(
@@ -72,7 +74,8 @@ pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
         });
         let n_corners = words.next().transpose()?.unwrap_or(0);
         corners.clear();
-        // Colours may follow, hence the exact number. It is bounded by the words that are there.
+        // Colours may follow, so exactly `n_corners` words are read. The words in the line limit
+        // this number.
         for _ in 0..n_corners {
             let index = words.next().transpose()?.ok_or_else(|| {
                 Fault::new(

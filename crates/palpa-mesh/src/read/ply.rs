@@ -1,4 +1,5 @@
-//! PLY: a text header that declares elements and their properties, then their values as text or as bytes of either order.
+//! PLY: a text header declares elements and their properties. Their values follow as text, or as
+//! bytes in either byte order.
 
 use std::str::SplitWhitespace;
 
@@ -6,7 +7,8 @@ use super::text::{number, shorten};
 use super::{Builder, Fault, Parsed, Place, ReadNote};
 use crate::Vec3;
 
-/// The header stands at the front and is short; this keeps a file without `end_header` from being searched for one.
+/// Longest header, in bytes. The header is short and comes first. The limit stops the search for
+/// `end_header` in a file without one.
 const LONGEST_HEADER: usize = 1 << 20;
 
 pub(super) fn parse(bytes: &[u8], builder: &mut Builder) -> Parsed<()> {
@@ -87,7 +89,7 @@ impl Scalar {
 #[derive(Debug)]
 struct Property {
     name: String,
-    /// The type of the length, where the property is a list.
+    /// The type of the list's length, if the property is a list.
     list: Option<Scalar>,
     scalar: Scalar,
 }
@@ -110,7 +112,7 @@ enum Encoding {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
-    /// Bytes up to the first value.
+    /// Number of bytes before the first value.
     len: usize,
 }
 
@@ -207,7 +209,7 @@ fn parse_property(words: &mut SplitWhitespace<'_>) -> Option<Property> {
     Some(Property { name, list, scalar })
 }
 
-/// What is left of the body, read value by value.
+/// The rest of the body, read value by value.
 #[derive(Debug)]
 enum Values<'a> {
     Ascii {
@@ -222,7 +224,8 @@ enum Values<'a> {
 }
 
 impl Values<'_> {
-    /// The next value; `None` where the file ends, or the word that is not a number.
+    /// The next value. The error is `None` at the end of the file, or the word that is not a
+    /// number.
     fn next(&mut self, scalar: Scalar) -> Result<f64, Option<String>> {
         match self {
             Self::Ascii { words, .. } => {
@@ -257,7 +260,7 @@ impl Values<'_> {
         }
     }
 
-    /// Bytes that are left, at most.
+    /// Upper bound on the number of remaining bytes.
     fn bytes_left(&self) -> usize {
         match self {
             Self::Ascii { len, .. } => *len,
@@ -265,10 +268,11 @@ impl Values<'_> {
         }
     }
 
-    /// Refuses an element of which there are more than the bytes that are left can hold, before anything is reserved.
+    /// Returns an error if the remaining bytes cannot hold all values of an element, before memory
+    /// is reserved for them.
     fn check_room(&self, element: &Element) -> Parsed<()> {
         let least: usize = match self {
-            // A digit and a blank for each value, though the last may do without.
+            // A digit and a blank for each value; the last value may lack the blank.
             Self::Ascii { .. } => 2 * element.properties.len(),
             Self::Binary { .. } => element
                 .properties
@@ -317,7 +321,7 @@ impl Values<'_> {
         })
     }
 
-    /// The length of a list, once so many values can still be there.
+    /// The length of a list. Checks that the remaining bytes can hold that many values.
     fn list_len(
         &mut self,
         property: &Property,

@@ -1,28 +1,30 @@
 //! Cutting polygons into triangles by clipping ears.
 //!
-//! Every corner of the polygon stays a corner of some triangle: a triangulator that drops collinear corners (as `earcut`
-//! does) would tear the surface open where the neighbour across the edge keeps them. Orientation is decided by
-//! exact predicates, on the projection along the polygon's mean normal.
+//! Every corner of the polygon stays a corner of some triangle. A triangulator that drops collinear
+//! corners (as `earcut` does) would tear the surface open if the neighbour across the edge keeps
+//! them. Exact predicates decide the orientation, on the projection along the polygon's mean
+//! normal.
 
 use robust::{Coord, orient2d};
 
 use crate::Vec3;
 
-/// How often the ears of a polygon are looked for anew when none is left. A polygon that needs more is folded all over.
+/// How often the search for ears is repeated when a polygon has none left. A polygon that needs
+/// more repeats is folded all over.
 const MAX_SEARCHES: usize = 4;
 
-/// Appends the `corners.len() − 2` triangles of a polygon, wound as the polygon is; returns whether they lie flat beside each
-/// other.
+/// Appends the `corners.len() − 2` triangles of a polygon, with the winding of the polygon. Returns
+/// whether they lie flat beside each other.
 ///
-/// A polygon that folds over itself, has no area or has corners that are not finite has no clean triangulation. It is cut
-/// all the same.
+/// A polygon that folds over itself, has no area, or has a corner that is not finite cannot be cut
+/// cleanly. It is cut nevertheless.
 pub(super) fn triangulate(points: &[Vec3], corners: &[u32], triangles: &mut Vec<[u32; 3]>) -> bool {
     let flat = project(points, corners);
     let is_upright = |t: [usize; 3]| orient2d(flat[t[0]], flat[t[1]], flat[t[2]]) > 0.0;
     if let &[a, b, c, d] = corners {
         let first = is_upright([0, 1, 2]) && is_upright([0, 2, 3]);
         let second = is_upright([0, 1, 3]) && is_upright([1, 2, 3]);
-        // Along the shorter diagonal, unless only the other keeps both halves upright.
+        // Cut along the shorter diagonal, unless only the other one keeps both halves upright.
         let length_sq = |i: usize, j: usize| {
             (points[corners[i] as usize] - points[corners[j] as usize]).norm_squared()
         };
@@ -39,7 +41,8 @@ pub(super) fn triangulate(points: &[Vec3], corners: &[u32], triangles: &mut Vec<
         });
         return first || second;
     }
-    // Corners that are left, as a ring, and the ears among them. Clipping one changes its two neighbours.
+    // The remaining corners, as a ring, and which of them are ears. Clipping an ear affects only
+    // its two neighbours.
     let mut ring: Vec<usize> = (0..corners.len()).collect();
     let ears = |ring: &[usize]| -> Vec<bool> {
         (0..ring.len()).map(|i| check_ear(&flat, ring, i)).collect()
@@ -49,11 +52,13 @@ pub(super) fn triangulate(points: &[Vec3], corners: &[u32], triangles: &mut Vec<
     let mut is_clean = true;
     let mut from = 0;
     while ring.len() > 3 {
-        // Going round instead of starting over keeps the triangles from fanning out of one corner.
+        // Searching onwards from the last ear, and not from the start, avoids a fan of triangles at
+        // one corner.
         let n = ring.len();
         let find_ear = |is_ear: &[bool]| (0..n).map(|k| (from + k) % n).find(|&i| is_ear[i]);
         let mut ear = find_ear(&is_ear);
-        // Where corners touch, as along the seam of a hole, clipping may free an ear further off.
+        // Where corners touch, such as along the seam of a hole, clipping may create an ear further
+        // away.
         if ear.is_none() && n_searches < MAX_SEARCHES {
             n_searches += 1;
             is_ear = ears(&ring);
@@ -75,12 +80,13 @@ pub(super) fn triangulate(points: &[Vec3], corners: &[u32], triangles: &mut Vec<
     is_clean && is_upright([ring[0], ring[1], ring[2]])
 }
 
-/// The corners in the plane across the mean normal, counter-clockwise.
+/// The corners projected along the mean normal, counter-clockwise.
 fn project(points: &[Vec3], corners: &[u32]) -> Vec<Coord<f64>> {
     let origin = points[corners[0] as usize];
     let at = |i: usize| points[corners[i % corners.len()] as usize] - origin;
     let normal: Vec3 = (0..corners.len()).map(|i| at(i).cross(&at(i + 1))).sum();
-    // Dropping the largest axis of the normal rounds nothing, so that collinear corners stay collinear.
+    // Dropping the coordinate of the normal's largest component causes no rounding, so that
+    // collinear corners stay collinear.
     let axis = normal.iamax();
     let (x, y) = match (axis, normal[axis] < 0.0) {
         (0, false) => (1, 2),
@@ -99,8 +105,9 @@ fn project(points: &[Vec3], corners: &[u32]) -> Vec<Coord<f64>> {
         .collect()
 }
 
-/// Whether the corner `at` can be cut off: it is convex, and no other corner lies in or on the triangle cut off. Corners at
-/// the place of one of the three do not count, or the seam of a polygon with a hole could never be cut.
+/// Whether the corner `at` can be cut off: it is convex, and no other corner lies in or on the
+/// triangle. Corners at the same place as one of the three do not count; otherwise the seam of a
+/// polygon with a hole could never be cut.
 fn check_ear(flat: &[Coord<f64>], ring: &[usize], at: usize) -> bool {
     let n = ring.len();
     let [a, b, c] = [(at + n - 1) % n, at, (at + 1) % n].map(|i| flat[ring[i]]);
@@ -126,7 +133,7 @@ mod tests {
         (points, (0..xy.len() as u32).collect())
     }
 
-    /// Signed areas along +z, each half the cross product.
+    /// Signed areas along +z: half the cross product of each triangle.
     fn areas(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f64> {
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| points[v as usize]);
@@ -137,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_concave_polygon_is_covered_once() {
-        // A star of eight corners, every other one drawn in: area 8 · ½ · 2 · 0.6 · sin 45°.
+        // A star of eight corners, every other one pulled inward: area 8 · ½ · 2 · 0.6 · sin 45°.
         let star: Vec<_> = (0..8)
             .map(|i| {
                 let (s, c) = (f64::from(i) * std::f64::consts::FRAC_PI_4).sin_cos();
@@ -175,7 +182,8 @@ mod tests {
 
     #[test]
     fn a_hole_joined_by_a_seam_is_left_open() {
-        // A 4 × 4 square, and a 2 × 2 hole wound the other way; the seam 0–4 is walked there and back.
+        // A 4 × 4 square and a 2 × 2 hole with the opposite winding. The seam 0–4 is passed in both
+        // directions.
         let (mut points, _) = polygon(&[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]);
         points.extend(polygon(&[(1.0, 1.0), (1.0, 3.0), (3.0, 3.0), (3.0, 1.0)]).0);
         let mut triangles = vec![];

@@ -1,17 +1,17 @@
-//! STL, binary and ASCII. The normals in the file are passed over: they say nothing that the winding does not, and often
-//! something wrong.
+//! STL, binary and ASCII. The normals in the file are ignored: they add nothing to the winding, and
+//! they are often wrong.
 
 use super::text::{decode, lines, point};
 use super::{Builder, Fault, Parsed, Place, ReadNote};
 use crate::Vec3;
 
-/// An 80-byte header and the number of triangles.
+/// Length of the header, in bytes: 80 bytes of text and the number of triangles.
 const HEADER: usize = 84;
-/// A normal and three corners as `f32`, and two bytes of attributes.
+/// Length of a record, in bytes: a normal and three corners as `f32`, and two bytes of attributes.
 const RECORD: usize = 50;
 
-/// Whether some bytes are exactly as long as a binary STL with their number of triangles. Files that start with `solid` may
-/// be binary all the same; the length decides.
+/// Whether the length of the bytes fits a binary STL with their number of triangles. A file that
+/// starts with `solid` may still be binary, so the length decides.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
     n_triangles(bytes).is_some_and(|n| n > 0 && bytes.len() as u64 == expected_len(n))
 }

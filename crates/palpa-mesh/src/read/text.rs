@@ -1,11 +1,11 @@
-//! What the text formats share: encodings, lines, numbers.
+//! Common parts of the text formats: encodings, lines, numbers.
 
 use std::borrow::Cow;
 
 use super::{Fault, Parsed, Place};
 
-/// The text of a file, and whether it was UTF-16. Bytes that are no text become the replacement character: they stand in
-/// names and comments, and where a number should be, the number is refused.
+/// The text of a file, and whether it was UTF-16. Invalid bytes become the replacement character.
+/// In names and comments this does no harm, and in a number it causes an error.
 pub(super) fn decode(bytes: &[u8]) -> (Cow<'_, str>, bool) {
     match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => (String::from_utf8_lossy(rest), false),
@@ -22,9 +22,10 @@ fn utf16(bytes: &[u8], unit: impl Fn([u8; 2]) -> u16) -> String {
         .collect()
 }
 
-/// The lines of a text with their numbers from 1, without comments after `#` and without surrounding blanks.
+/// The lines of a text with their numbers from 1, without comments after `#` and without
+/// surrounding blanks.
 ///
-/// Lines end with `\n`, `\r\n` or `\r` alone, as old files have it.
+/// Lines end with `\n` or `\r\n`, or with `\r` alone in old files.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let (lf, cr) = (text.contains('\n'), '\r');
     text.split(if lf { '\n' } else { cr })
@@ -32,12 +33,13 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .map(|(i, line)| (i + 1, line.split('#').next().unwrap_or("").trim()))
 }
 
-/// A number that stands in a file, as the nearest `f64`. `nan` and `inf` are numbers here; the check finds them.
+/// A number as the nearest `f64`. `nan` and `inf` count as numbers here; the check of the surface
+/// finds them.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok()
 }
 
-/// Three coordinates from the front of some words.
+/// Three coordinates from the first words.
 pub(super) fn point<'a>(
     words: &mut impl Iterator<Item = &'a str>,
     line: usize,
@@ -60,7 +62,7 @@ pub(super) fn point<'a>(
     Ok(p)
 }
 
-/// A word for a message: no longer than a screen line.
+/// A word for a message, cut to fit on a screen line.
 pub(super) fn shorten(word: &str) -> String {
     const LONGEST: usize = 40;
     if word.chars().count() <= LONGEST {

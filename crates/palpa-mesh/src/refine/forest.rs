@@ -1,4 +1,5 @@
-//! The red forest: triangles divided into four, with vertices hanging on the edges of their larger neighbours.
+//! The red forest: triangles divided into four, with hanging vertices on the edges of larger
+//! neighbours.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -10,31 +11,33 @@ use crate::{Surface, Vec3};
 #[derive(Debug, Clone, Copy)]
 struct Tree {
     corners: [u32; 3],
-    /// The triangle of the old skin.
+    /// The triangle of the old skin that this one is a part of.
     root: u32,
     depth: u32,
-    /// Whether it was divided; if not, it is a leaf.
+    /// Whether it was divided. If not, it is a leaf.
     is_split: bool,
     /// Whether it is larger than wanted.
     is_too_large: bool,
 }
 
-/// Divided triangles over a skin. Its leaves keep two rules that make the green closure possible and good:
-/// no edge of a leaf is divided more than once, and at most one of its three is divided.
+/// Divided triangles over a skin. The leaves obey two rules, so that the green closure exists and
+/// has good angles: no edge of a leaf is divided more than once, and at most one of its three edges
+/// is divided.
 #[derive(Debug)]
 pub(super) struct Forest {
     points: Vec<Vec3>,
     n_old: usize,
-    /// The ends of the edge in whose middle a new vertex stands. `[n_new]`
+    /// For each new vertex, the ends of the edge whose midpoint it is. `[n_new]`
     ends: Vec<[u32; 2]>,
     trees: Vec<Tree>,
-    /// The vertex in the middle of an edge (smaller end first).
+    /// The vertex at the midpoint of an edge (smaller end first).
     middles: HashMap<[u32; 2], u32>,
-    /// The leaf that walks an edge in this direction.
+    /// The leaf on a directed edge.
     leaf_of: HashMap<[u32; 2], u32>,
-    /// Leaves that break a rule.
+    /// Leaves that violate a rule.
     forced: Vec<u32>,
-    /// Leaves that are larger than wanted, level by level, so that a limit cuts off the finest first.
+    /// Leaves that are larger than wanted, level by level, so that a limit omits the finest
+    /// divisions.
     wanted: VecDeque<u32>,
 }
 
@@ -56,7 +59,7 @@ impl Forest {
         forest
     }
 
-    /// Divides leaves until all are as small as wanted, or a limit is reached.
+    /// Divides leaves until all are as small as wanted, or until a limit is reached.
     pub(super) fn refine(
         &mut self,
         params: &RefineParams,
@@ -79,7 +82,8 @@ impl Forest {
             if tree.is_split {
                 continue;
             }
-            // The rules come before the limit of depth: a leaf forced beyond it has neighbours at the limit.
+            // The rules take precedence over the limit of depth. If a leaf is forced beyond it, its
+            // neighbours are at the limit.
             let breaks_rule = self.breaks_rule(tree.corners);
             if breaks_rule || (tree.is_too_large && tree.depth < params.max_depth) {
                 for child in self.split(leaf) {
@@ -89,7 +93,8 @@ impl Forest {
         }
     }
 
-    /// The conforming triangles, in the order of the old ones, and the old triangle of each.
+    /// The conforming triangles, in the order of the old ones, and the index of each one's old
+    /// triangle.
     pub(super) fn triangles(&self) -> (Vec<[u32; 3]>, Vec<u32>) {
         let mut found = Vec::with_capacity(self.trees.len() + self.trees.len() / 4);
         for tree in self.trees.iter().filter(|tree| !tree.is_split) {
@@ -103,12 +108,12 @@ impl Forest {
                 }
             }
         }
-        // Stable: the parts of one triangle stay in the order in which they came about.
+        // A stable sort keeps the parts of one triangle in the order of their creation.
         found.sort_by_key(|(root, _)| *root);
         found.into_iter().map(|(root, t)| (t, root)).unzip()
     }
 
-    /// Where each vertex comes from: the old ones first.
+    /// The origin of each vertex, the old vertices first.
     pub(super) fn origins(&self) -> Origins {
         let mut origins = Origins::identity(self.n_old);
         for &ends in &self.ends {
@@ -117,7 +122,8 @@ impl Forest {
         origins
     }
 
-    /// A run of rim vertices with those that were set between them, and for a closed one between its last and its first.
+    /// A run of rim vertices, with the new vertices between them. In a closed run, also those
+    /// between the last and the first.
     pub(super) fn along_rim(&self, run: &[u32], is_closed: bool) -> Vec<u32> {
         let mut filled = Vec::with_capacity(2 * run.len());
         for (k, &v) in run.iter().enumerate() {
@@ -164,7 +170,7 @@ impl Forest {
         id
     }
 
-    /// Puts a leaf on the list if it is larger than wanted.
+    /// Adds a leaf to the list if it is larger than wanted.
     fn measure(&mut self, leaf: u32, wanted: &impl Fn(u32, &[Vec3; 3]) -> f64) {
         let tree = &mut self.trees[leaf as usize];
         let corners = tree.corners.map(|v| self.points[v as usize]);
@@ -177,13 +183,13 @@ impl Forest {
         }
     }
 
-    /// The vertex in the middle of side `k` of a triangle, if its edge is divided.
+    /// The vertex at the midpoint of side `k` of a triangle, if that edge is divided.
     fn middle(&self, corners: [u32; 3], k: usize) -> Option<u32> {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         self.middles.get(&[a.min(b), a.max(b)]).copied()
     }
 
-    /// Whether a leaf with these corners has two divided edges, or one that is divided twice.
+    /// Whether a leaf with these corners has two divided edges, or an edge that is divided twice.
     fn breaks_rule(&self, corners: [u32; 3]) -> bool {
         let is_split = |a: u32, b: u32| self.middles.contains_key(&[a.min(b), a.max(b)]);
         let mut n_split = 0;
@@ -198,7 +204,7 @@ impl Forest {
         false
     }
 
-    /// Divides a leaf into four and lists the leaves that now break a rule.
+    /// Divides a leaf into four and lists the leaves that now violate a rule.
     fn split(&mut self, leaf: u32) -> [u32; 4] {
         let Tree {
             corners: [a, b, c],
@@ -215,7 +221,8 @@ impl Forest {
         let children = [[a, ma, mc], [ma, b, mb], [mc, mb, c], [ma, mb, mc]]
             .map(|corners| self.plant(corners, root, depth + 1));
         for (k, child) in children.into_iter().enumerate() {
-            // An edge of the leaf may have been divided twice before it; the inner child has none of its edges.
+            // An edge of the leaf may already have been divided twice. The inner child has no part
+            // of the leaf's edges.
             if k < 3 && self.breaks_rule(self.trees[child as usize].corners) {
                 self.forced.push(child);
             }
@@ -223,8 +230,8 @@ impl Forest {
         children
     }
 
-    /// The vertex in the middle of an edge. If it is new, the leaf beyond the edge is looked at: the one that walks it, or the one
-    /// that walks the edge of which it is a half.
+    /// The vertex at the midpoint of an edge. If it is new, checks the leaf on the other side of
+    /// the edge. That leaf has this edge as a side, or an edge of which this one is a half.
     fn halve(&mut self, from: u32, to: u32) -> u32 {
         let edge = [from.min(to), from.max(to)];
         if let Some(&m) = self.middles.get(&edge) {
@@ -247,7 +254,7 @@ impl Forest {
         m
     }
 
-    /// The edge of which `from`–`to` is a half, in the same direction.
+    /// The edge that `from`–`to` is a half of, in the same direction.
     fn whole(&self, from: u32, to: u32) -> Option<[u32; 2]> {
         let ends_of = |v: u32| self.ends.get((v as usize).checked_sub(self.n_old)?);
         let other = |[a, b]: [u32; 2], v: u32| if a == v { b } else { a };

@@ -1,4 +1,5 @@
-//! A circle in the skin: the edge of a flat punch, so that no triangle lies partly under it.
+//! A circle imprinted in the skin: the edge of a flat punch, so that no triangle lies partly under
+//! it.
 
 use std::collections::HashMap;
 
@@ -6,11 +7,12 @@ use super::origin::Origins;
 use super::{Refined, assemble, is_valid};
 use crate::{LayeredBody, Surface, Vec3};
 
-/// A vertex moves onto the circle if its edge crosses it within this share of its length; else the edge is split.
+/// A vertex moves onto the circle if one of its edges crosses it within this share of the edge's
+/// length. Otherwise the edge is split.
 const SNAP: f64 = 0.35;
-/// Moving a vertex must leave its triangles this share of their smallest angle.
+/// A move must leave the triangles of the vertex at least this share of their smallest angle.
 const ANGLE_KEPT: f64 = 0.5;
-/// A ring of fewer vertices is no circle.
+/// Least number of vertices in a ring; fewer do not make a circle.
 const FEWEST_ON_RING: usize = 8;
 
 /// A circle round an axis.
@@ -24,42 +26,42 @@ pub struct Circle {
     pub radius: f64,
 }
 
-/// A body with a circle in its skin.
+/// A body with a circle imprinted in its skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imprint {
-    /// The body and where it comes from. Vertices that moved onto the circle have origins of two parts.
+    /// The body and its origin. Vertices that moved onto the circle have origins of two parts.
     pub refined: Refined,
-    /// The vertices on the circle, a closed run that goes round as the triangles inside do.
+    /// The vertices on the circle, as a closed run in the direction of the triangles inside.
     pub ring: Vec<u32>,
-    /// The triangles inside, ascending.
+    /// The triangles inside the circle, ascending.
     pub inside: Vec<u32>,
-    /// Radius of the circle with the area of the patch inside, seen along the axis: a little less than the circle's,
-    /// since the ring is a polygon. m
+    /// Radius of a circle with the area of the patch inside, seen along the axis. It is a little
+    /// less than the radius of the circle, because the ring is a polygon. m
     pub effective_radius: f64,
-    /// How many vertices were moved.
+    /// Number of vertices that were moved.
     pub n_moved: usize,
 }
 
-/// Why a circle cannot be made.
+/// Reason why a circle cannot be imprinted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImprintError {
-    /// Radius or axis make no circle.
+    /// The radius or the axis is invalid.
     #[error(
-        "a circle of radius {radius} m round ({direction}) is none; give a positive radius and an axis"
+        "a circle of radius {radius} m about the axis ({direction}) is not possible; give a positive radius and an axis"
     )]
     NoCircle {
-        /// Its radius. m
+        /// Radius of the circle. m
         radius: f64,
-        /// Its axis.
+        /// Axis of the circle.
         direction: String,
     },
-    /// The circle runs over the rim.
+    /// The circle crosses the rim of the skin.
     #[error(
         "the circle runs over the rim of the skin at vertex {vertex}; move it inward or make it smaller"
     )]
     OverRim {
-        /// A rim vertex inside.
+        /// A rim vertex inside the circle.
         vertex: u32,
     },
     /// The mesh is too coarse for the circle.
@@ -68,27 +70,28 @@ pub enum ImprintError {
         radius * 1e3
     )]
     TooCoarse {
-        /// The radius. m
+        /// Radius of the circle. m
         radius: f64,
     },
 }
 
-/// Where a vertex lies.
+/// Position of a vertex relative to the circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum CircleSide {
     Inside,
     On,
     Outside,
 }
 
-/// Makes the circle a ring of vertices, such that no edge crosses it.
+/// Turns the circle into a ring of vertices, so that no edge crosses it.
 ///
-/// Edges that cross it near one of their ends have that end moved along them onto the circle, with its column; others
-/// are split there, which changes no geometry. A move is only made where all prisms stay valid and angles good; on a
-/// curved skin it changes the shape a little. The skin should be refined to a third of the radius or finer before.
+/// If an edge crosses the circle near one of its ends, that end moves along the edge onto the
+/// circle, with its column. Other edges are split at the circle, which does not change the
+/// geometry. A vertex moves only if all prisms stay valid and angles stay good. On a curved skin, a
+/// move changes the shape a little. Refine the skin to a third of the radius or finer first.
 ///
 /// # Errors
-/// If the circle is none, runs over the rim, or is smaller than the triangles there.
+/// If the circle is invalid, crosses the rim, or is smaller than the triangles there.
 pub fn imprint_circle(body: &LayeredBody, circle: &Circle) -> Result<Imprint, ImprintError> {
     let axis = circle.direction.try_normalize(0.0).filter(|axis| {
         circle.radius > 0.0
@@ -123,7 +126,10 @@ pub fn imprint_circle(body: &LayeredBody, circle: &Circle) -> Result<Imprint, Im
     };
     let mut loops = part.boundary_loops();
     let is_ring = |ring: &Vec<u32>| {
-        ring.len() >= FEWEST_ON_RING && ring.iter().all(|&v| cut.sides[v as usize] == Side::On)
+        ring.len() >= FEWEST_ON_RING
+            && ring
+                .iter()
+                .all(|&v| cut.sides[v as usize] == CircleSide::On)
     };
     let ring = match loops.pop() {
         Some(ring) if loops.is_empty() && is_ring(&ring) => ring,
@@ -145,15 +151,16 @@ pub fn imprint_circle(body: &LayeredBody, circle: &Circle) -> Result<Imprint, Im
     })
 }
 
-/// The triangles within the circle that hang together with the vertex in its middle.
-fn patch(skin: &Surface, sides: &[Side], seed: u32, circle: &Circle, axis: Vec3) -> Vec<u32> {
+/// The triangles within the circle that are connected with the vertex in its middle.
+fn patch(skin: &Surface, sides: &[CircleSide], seed: u32, circle: &Circle, axis: Vec3) -> Vec<u32> {
     let side = |v: u32| sides[v as usize];
     let is_within = |t: &u32| {
         let corners = skin.triangles[*t as usize];
-        if corners.iter().any(|&v| side(v) == Side::Outside) {
+        if corners.iter().any(|&v| side(v) == CircleSide::Outside) {
             return false;
         }
-        // Three corners on the circle: a triangle between chords, or one on another sheet of the skin.
+        // All three corners lie on the circle: the triangle is between chords, or on another sheet
+        // of the skin.
         let centre = skin.corners(*t as usize).iter().sum::<Vec3>() / 3.0;
         across(centre - circle.point, axis).norm() < circle.radius
     };
@@ -168,22 +175,22 @@ fn patch(skin: &Surface, sides: &[Side], seed: u32, circle: &Circle, axis: Vec3)
         .unwrap_or_default()
 }
 
-/// The part of a vector across a unit axis.
+/// The component of a vector perpendicular to a unit axis.
 fn across(v: Vec3, axis: Vec3) -> Vec3 {
     v - axis * v.dot(&axis)
 }
 
-/// A cut of the skin in the making.
+/// A cut of the skin under construction.
 struct Cut {
-    sides: Vec<Side>,
-    /// Edges that cross, from the vertex inside to the one outside.
+    sides: Vec<CircleSide>,
+    /// Edges that cross the circle, from the inner to the outer vertex.
     crossing: Vec<[u32; 2]>,
-    /// Each vertex seen from the axis, across it.
+    /// The vector from the axis to each vertex, perpendicular to the axis.
     across: Vec<Vec3>,
     radius: f64,
     is_rim: Vec<bool>,
     origins: Origins,
-    /// The vertex nearest to the point on the axis, inside.
+    /// The vertex nearest to the point on the axis; it is inside.
     seed: u32,
     n_moved: usize,
 }
@@ -205,7 +212,8 @@ impl Cut {
             .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
             .filter(|&v| is_within(v))
             .ok_or_else(|| too_coarse.clone())?;
-        // The circle's cylinder may meet the skin again on the far side: only what hangs together with the seed counts.
+        // The cylinder of the circle may meet the skin again on the far side. Only vertices
+        // connected with the seed count.
         let edges = skin.edges();
         let inside = reached(skin.points.len(), &edges, seed, is_within);
         let mut is_rim = vec![false; skin.points.len()];
@@ -230,7 +238,13 @@ impl Cut {
         Ok(Self {
             sides: inside
                 .iter()
-                .map(|&is_in| if is_in { Side::Inside } else { Side::Outside })
+                .map(|&is_in| {
+                    if is_in {
+                        CircleSide::Inside
+                    } else {
+                        CircleSide::Outside
+                    }
+                })
                 .collect(),
             crossing,
             across,
@@ -242,13 +256,15 @@ impl Cut {
         })
     }
 
-    /// The share of the way from `a`, inside, to `b`, outside, at which their edge meets the circle.
+    /// Where the edge from the inner vertex `a` to the outer vertex `b` meets the circle, as a
+    /// share of its length.
     fn share(&self, [a, b]: [u32; 2]) -> f64 {
         let (p, step) = (
             self.across[a as usize],
             self.across[b as usize] - self.across[a as usize],
         );
-        // |p + t step| = radius; the product of the roots is negative, and the sum of two terms of one sign exact.
+        // Solves |p + t step| = radius. The product of the roots is negative. The form of the root
+        // is chosen so that it only adds terms of the same sign, without cancellation.
         let (aa, bb) = (step.norm_squared(), p.dot(&step));
         let cc = p.norm_squared() - self.radius * self.radius;
         let root = (bb * bb - aa * cc).max(0.0).sqrt();
@@ -260,7 +276,7 @@ impl Cut {
         share.clamp(0.0, 1.0)
     }
 
-    /// Moves vertices onto the circle, the nearest first.
+    /// Moves vertices onto the circle, nearest first.
     fn move_vertices(&mut self, body: &LayeredBody) {
         let mut moves: Vec<(f64, [u32; 2])> = Vec::new();
         for &[a, b] in &self.crossing {
@@ -282,7 +298,10 @@ impl Cut {
         let mut moved = body.clone();
         let mut place: Vec<Option<(u32, f64)>> = vec![None; body.n_vertices()];
         for (share, [v, to]) in moves {
-            if [v, to].iter().any(|&u| self.sides[u as usize] == Side::On) {
+            if [v, to]
+                .iter()
+                .any(|&u| self.sides[u as usize] == CircleSide::On)
+            {
                 continue;
             }
             let old: Vec<Vec3> = (0..body.n_levels)
@@ -301,7 +320,7 @@ impl Cut {
             if is_good {
                 let step = self.across[to as usize] - self.across[v as usize];
                 self.across[v as usize] += step * share;
-                self.sides[v as usize] = Side::On;
+                self.sides[v as usize] = CircleSide::On;
                 place[v as usize] = Some((to, share));
                 self.n_moved += 1;
             } else {
@@ -314,17 +333,18 @@ impl Cut {
         self.origins = Origins::moved(&place);
     }
 
-    /// Splits the edges that still cross. Returns the triangles and the one that each is a part of.
+    /// Splits the edges that still cross. Returns the new triangles, and for each the old triangle
+    /// that it is a part of.
     fn split(&mut self, body: &LayeredBody) -> (Vec<[u32; 3]>, Vec<u32>) {
         let mut on_edge: HashMap<[u32; 2], u32> = HashMap::new();
         for &[a, b] in &self.crossing {
             let ends = [self.sides[a as usize], self.sides[b as usize]];
-            if ends == [Side::Inside, Side::Outside] {
+            if ends == [CircleSide::Inside, CircleSide::Outside] {
                 on_edge.insert([a.min(b), a.max(b)], self.origins.len() as u32);
                 self.origins.push_between([a, b], self.share([a, b]));
             }
         }
-        self.sides.resize(self.origins.len(), Side::On);
+        self.sides.resize(self.origins.len(), CircleSide::On);
         let points = self.origins.interpolate(&body.skin.points, 1);
         let mut triangles = Vec::new();
         let mut parents = Vec::new();
@@ -339,7 +359,7 @@ impl Cut {
     }
 }
 
-/// The vertices that hang together with `seed` over edges whose ends are both within.
+/// The vertices that are connected with `seed` over edges with both ends within.
 fn reached(n: usize, edges: &[[u32; 2]], seed: u32, is_within: impl Fn(u32) -> bool) -> Vec<bool> {
     let mut sets = crate::topology::UnionFind::new(n);
     for &[a, b] in edges.iter().filter(|e| e.iter().all(|&v| is_within(v))) {
@@ -366,8 +386,9 @@ fn divide(
     }
 }
 
-/// The corner triangle, and the quad `m n`–`rest` cut along its shorter diagonal. The corner is `[tip, n, m]`, with n towards the
-/// second of `rest` and m towards the first.
+/// The corner triangle `[tip, n, m]`, and the quad between `m`, `n` and `[p, q]`, cut along its
+/// shorter diagonal. `n` lies on the edge from the tip to `q`, and `m` on the edge from the tip to
+/// `p`.
 fn corner_off([tip, n, m]: [u32; 3], [p, q]: [u32; 2], points: &[Vec3]) -> Vec<[u32; 3]> {
     let length = |a: u32, b: u32| (points[a as usize] - points[b as usize]).norm_squared();
     let quad = if length(m, q) < length(n, p) {

@@ -1,28 +1,30 @@
-//! More levels in the columns of a body.
+//! Additional levels in the columns of a body.
 
 use std::ops::{Add, Mul};
 
 use crate::LayeredBody;
 use crate::quality::PrismShape;
 
-/// A body with more levels, and where they come from.
+/// A body with more levels, and the origin of each level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelSplit {
     /// The body, over the same skin.
     pub body: LayeredBody,
-    /// For each level, the old level at or above it and the share of the way from there to the next. `[n_levels]`
+    /// The origin of each level: the old level at or above it, and the share of the way from there
+    /// to the next old level. `[n_levels]`
     pub origins: Vec<(usize, f64)>,
-    /// Prisms that are turned over though the prism they are a part of passes the checks of [`crate::quality`]. 0 but
-    /// for prisms on the brink.
+    /// Number of prisms that are turned over although the old prism around them passes the checks
+    /// of [`crate::quality`]. It is 0 except for prisms on the brink.
     pub n_invalid: usize,
     n_old: usize,
 }
 
 impl LevelSplit {
-    /// Carries a field with one value per node of the old body (`[n_nodes]`) to the new ones, linearly between levels.
+    /// Carries a field with one value per node of the old body (`[n_nodes]`) to the new nodes,
+    /// linearly between levels.
     ///
     /// # Panics
-    /// If `field` has not one value per old node.
+    /// If `field` does not have one value per old node.
     pub fn interpolate<T>(&self, field: &[T]) -> Vec<T>
     where
         T: Copy + Mul<f64, Output = T> + Add<Output = T>,
@@ -54,10 +56,11 @@ where
         .collect()
 }
 
-/// Divides each interval in all columns into parts of these heights, as shares of it; they stay in the interval's layer.
+/// Divides each interval in all columns. `parts` holds the heights of each interval's parts, as
+/// shares of the interval. The parts stay in the interval's layer.
 ///
 /// # Panics
-/// Unless there are parts for each interval, of positive heights that add up to 1.
+/// Unless there are parts for each interval, with positive heights that add up to 1.
 pub fn split_levels(body: &LayeredBody, parts: &[Vec<f64>]) -> LevelSplit {
     let is_whole = |heights: &Vec<f64>| {
         heights.iter().all(|&height| height > 0.0)
@@ -106,7 +109,7 @@ pub fn split_levels(body: &LayeredBody, parts: &[Vec<f64>]) -> LevelSplit {
 /// Mean depth of each level below the skin, along the columns of these vertices. m, `[n_levels]`
 ///
 /// # Panics
-/// Without vertices.
+/// If there are no vertices.
 pub fn mean_depths(body: &LayeredBody, vertices: &[u32]) -> Vec<f64> {
     assert!(!vertices.is_empty(), "depths of no columns");
     let mut depths = vec![0.0; body.n_levels];
@@ -122,8 +125,9 @@ pub fn mean_depths(body: &LayeredBody, vertices: &[u32]) -> Vec<f64> {
     depths
 }
 
-/// Wants intervals of height `h` within `radius` of `depth`, and higher ones outside: by `growth` times the distance
-/// beyond. Given the depths of top and bottom; lengths in metres. For [`along`].
+/// A function of the depths of an interval's top and bottom that returns the wanted height. The
+/// height is `h` within `radius` of `depth`; outside, it grows by `growth` times the distance
+/// beyond. Lengths in metres. For use with [`along`].
 pub fn near_depth(depth: f64, radius: f64, h: f64, growth: f64) -> impl Fn(f64, f64) -> f64 {
     move |top, bottom| {
         let distance = (top - depth).max(depth - bottom).max(0.0);
@@ -131,7 +135,8 @@ pub fn near_depth(depth: f64, radius: f64, h: f64, growth: f64) -> impl Fn(f64, 
     }
 }
 
-/// A wish for heights (m) along a column whose levels are at `depths` (ascending, m), for [`parts_for`].
+/// Wanted heights (m) along a column with levels at `depths` (ascending, m), for use with
+/// [`parts_for`].
 pub fn along(
     depths: Vec<f64>,
     wanted: impl Fn(f64, f64) -> f64,
@@ -142,10 +147,11 @@ pub fn along(
     }
 }
 
-/// Divides each of `n` intervals so that no part is higher than `wanted` says, but for a few per cent that come from whole
-/// numbers of parts. `wanted` gives, for an interval and where in it a part
-/// begins and ends, as shares of it, the greatest height, as a share too. Also says whether that took no more than
-/// `max_levels` levels; if not, all parts are higher than wanted by the same factor. NaN is no wish.
+/// Divides each of `n` intervals so that no part is higher than `wanted` allows. Because the number
+/// of parts is whole, heights may differ by a few per cent. `wanted` takes an interval and the
+/// begin and end of a part, as shares of the interval; it returns the greatest height, also as a
+/// share. NaN means no limit. The returned flag says whether at most `max_levels` levels were
+/// enough. If not, all parts are higher than wanted by the same factor.
 ///
 /// ```text
 /// let wanted = along(mean_depths(&body, &below_the_tool), near_depth(14e-3, 6e-3, 1e-3, 0.3));
@@ -157,7 +163,8 @@ pub fn parts_for(
     wanted: impl Fn(usize, f64, f64) -> f64,
     max_levels: usize,
 ) -> (Vec<Vec<f64>>, bool) {
-    /// Factor between two tries at fewer levels, and where they end.
+    /// Factor by which heights grow from one try to the next, until there are few enough levels,
+    /// and its limit.
     const COARSER: f64 = 1.05;
     const COARSEST: f64 = 1e6;
     let least = 1.0 / max_levels as f64;
@@ -172,7 +179,7 @@ pub fn parts_for(
             })
             .collect();
         let n_levels = 1 + parts.iter().map(Vec::len).sum::<usize>();
-        // Where a part had to be as high as `least`, there are too many already.
+        // If a part is limited by `least`, there are already too many levels.
         if n_levels <= max_levels {
             return (parts, is_resolved);
         }
@@ -184,9 +191,10 @@ pub fn parts_for(
     }
 }
 
-/// Heights of parts from 0 to 1 that are no higher than wanted between where they begin and end.
+/// Heights of parts that fill the range from 0 to 1. No part is higher than wanted between its
+/// begin and end.
 fn divide(wanted: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-    /// Rounding must not cost a level.
+    /// Rounding must not add a level.
     const ROUNDING: f64 = 1e-9;
     const HALVINGS: usize = 40;
     let mut heights = Vec::new();
@@ -209,7 +217,7 @@ fn divide(wanted: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         heights.push(good);
         from += good;
     }
-    // The last one reaches beyond the end: all of them are made lower alike.
+    // The last part reaches beyond the end, so all parts are lowered by the same factor.
     let sum: f64 = heights.iter().sum();
     heights.iter().map(|height| height / sum).collect()
 }
@@ -226,7 +234,9 @@ mod tests {
         let near = || near_depth(8e-3, 2e-3, 2e-3, 0.5);
         let wanted = along(depths.clone(), near());
         let (parts, is_resolved) = parts_for(3, &wanted, 100);
-        // 2 mm at up to 4 mm above: 4 mm wanted. Then 2 mm. From 2 mm below on 3 mm, 4.5 mm, 6.75 mm, 10.1 mm, and some.
+        // The top interval is 2 mm high and at least 4 mm outside the radius, where 4 mm are
+        // wanted: one part. Then parts of 2 mm. From 2 mm outside the radius on: 3 mm, 4.5 mm, 6.75
+        // mm, 10.1 mm, and a rest.
         let n: Vec<usize> = parts.iter().map(Vec::len).collect();
         assert_eq!((n, is_resolved), (vec![1, 5, 5], true));
         assert!(parts[2].windows(2).all(|pair| pair[1] > 1.2 * pair[0]));

@@ -1,8 +1,9 @@
-//! Local refinement of a body: columns where the skin's triangles are too large, levels where intervals are too high.
+//! Local refinement of a body: new columns where the skin's triangles are too large, new levels
+//! where intervals are too high.
 //!
-//! The geometry stays exactly what it was: a new column is the weighted mean of the columns of the triangle that it
-//! stands in, level by level, and a new level divides the columns between two old ones, so that every new prism is
-//! a part of an old one.
+//! The geometry stays exactly the same. A new column is the weighted mean, level by level, of the
+//! columns of the triangle that contains it. A new level divides the columns between two old
+//! levels. So every new prism is a part of an old one.
 //!
 //! ```text
 //! red: 1 → 4          green: 1 → 2, next to a red one
@@ -12,9 +13,10 @@
 //!    / \ / \             /  |  \
 //!   a──ma───b           a───m───b
 //! ```
-//! [`refine`] is red–green refinement (Bank, Sherman & Weiser 1983): the triangles of the red forest are all similar to their
-//! ancestors, the green ones only close it and are never refined themselves, so that angles do not degrade with the
-//! number of rounds. To refine further, or elsewhere, start again from the body as it was grown.
+//! [`refine`] is red–green refinement (Bank, Sherman & Weiser 1983). The triangles of the red
+//! forest are all similar to their ancestors. The green triangles only close it and are never
+//! refined themselves, so that angles do not get worse with the number of rounds. To refine
+//! further, or elsewhere, start again from the body as it was grown.
 
 mod forest;
 mod imprint;
@@ -31,11 +33,12 @@ pub use levels::{LevelSplit, along, mean_depths, near_depth, parts_for, split_le
 pub use origin::Origins;
 pub use size::near_points;
 
-/// How far refinement may go.
+/// Limits of refinement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RefineParams {
-    /// No triangle is split for its size once the skin has this many vertices. What keeps the mesh conforming is
-    /// still done, so that the number can be exceeded, usually by a few per cent.
+    /// Once the skin has this many vertices, no more triangles are split because of their size.
+    /// Splits that keep the mesh conforming still happen, so that the number can be exceeded,
+    /// usually by a few per cent.
     pub max_vertices: usize,
     /// How often a triangle of the skin may be divided into four.
     pub max_depth: u32,
@@ -50,29 +53,31 @@ impl Default for RefineParams {
     }
 }
 
-/// A refined body, and where its parts come from.
+/// A refined body, and the origin of its parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refined {
-    /// The body. Its first vertices are those of the body it was made from, with the same indices.
+    /// The refined body. Its first vertices are those of the old body, with the same indices.
     pub body: LayeredBody,
-    /// For each vertex, its place on the skin it was made from.
+    /// For each vertex, its place on the old skin.
     pub origins: Origins,
-    /// For each triangle, the one that it is a part of, ascending. `[n_triangles]`
+    /// For each triangle, the old triangle that it is a part of, ascending. `[n_triangles]`
     pub parents: Vec<u32>,
-    /// Triangles that are still larger than wanted because a limit was reached; 0: resolved.
+    /// Number of triangles that are still larger than wanted because a limit was reached; 0 if
+    /// there are none.
     pub n_too_large: usize,
-    /// Prisms that are turned over though the prism they are a part of passes the checks of [`crate::quality`]: it is
-    /// folded inside. 0 but for prisms on the brink.
+    /// Number of prisms that are turned over although the old prism around them passes the checks
+    /// of [`crate::quality`]: it is folded inside. It is 0 except for prisms on the brink.
     pub n_invalid: usize,
-    /// Vertices of the body it was made from.
+    /// Number of vertices of the old body.
     n_old: usize,
 }
 
 impl Refined {
-    /// This one in terms of the body that `earlier` was made from, where it was itself made from the body of `earlier`.
+    /// Combines two refinements. `self` was made from the body of `earlier`; the result refers to
+    /// the body that `earlier` was made from.
     ///
     /// # Panics
-    /// If it was made from a body with another number of vertices.
+    /// If `self` was made from a body with another number of vertices.
     #[must_use]
     pub fn after(self, earlier: &Self) -> Self {
         assert_eq!(
@@ -96,8 +101,8 @@ impl Refined {
 
     /// Carries a field from the old vertices to the new ones, linearly in each triangle.
     ///
-    /// `field` holds the same number of values for each vertex of the old body, vertex by vertex: one (`[n_vertices]`),
-    /// or one per level (`[n_nodes]`, as positions are).
+    /// `field` holds the same number of values for each vertex of the old body, vertex by vertex:
+    /// one (`[n_vertices]`), or one per level (`[n_nodes]`, like positions).
     ///
     /// # Panics
     /// If the length of `field` is not a multiple of the number of old vertices.
@@ -115,10 +120,12 @@ impl Refined {
     }
 }
 
-/// Refines the skin until no triangle has an edge longer than wanted, and builds the columns below it.
+/// Refines the skin until no triangle has an edge longer than wanted, and builds the columns below
+/// it.
 ///
-/// `wanted` is asked for the least wanted edge length (m) in a triangle, given the triangle of the old skin that it is a part
-/// of, and its corners; [`near_points`] makes such functions. NaN is no wish.
+/// `wanted` returns the smallest wanted edge length (m) in a triangle. It takes the index of the
+/// old triangle that contains it, and the triangle's corners. [`near_points`] makes such functions.
+/// NaN means no limit.
 ///
 /// # Panics
 /// If the skin is not conforming and oriented (no directed edge twice); grown bodies are.
@@ -144,7 +151,7 @@ pub fn refine(
     refined
 }
 
-/// Whether an edge of the rim leads from the last vertex of a run back to the first.
+/// Whether a rim edge joins the last vertex of a run to the first.
 fn is_closed(skin: &Surface, run: &[u32]) -> bool {
     let &[first, .., last] = run else {
         return false;
@@ -153,7 +160,7 @@ fn is_closed(skin: &Surface, run: &[u32]) -> bool {
     run.len() > 2 && skin.triangles.iter().filter(has_edge).count() == 1
 }
 
-/// The body over the new triangles, whose columns are the means that `origins` say.
+/// The body over the new triangles. Its columns are the weighted means in `origins`.
 fn assemble(
     body: &LayeredBody,
     origins: Origins,

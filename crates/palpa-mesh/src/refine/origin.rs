@@ -1,18 +1,19 @@
-//! Where the vertices of a refined skin lie on the skin it was made from.
+//! The places of a refined skin's vertices on the old skin.
 
 use std::ops::{Add, Mul};
 
-/// For each vertex, the old vertices between which it lies, with weights that sum up to 1: one for a vertex that stayed,
-/// two on an edge, three in a triangle (more where a moved vertex was split from another).
+/// For each vertex, the old vertices between which it lies, with weights that sum up to 1. An old
+/// vertex has one, a vertex on an edge two, a vertex in a triangle three. There are more if a moved
+/// vertex was split from another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origins {
-    /// Where the parts of each vertex begin. `[n_vertices + 1]`
+    /// Index of the first part of each vertex, and one past the last. `[n_vertices + 1]`
     first: Vec<usize>,
     parts: Vec<(u32, f64)>,
 }
 
 impl Origins {
-    /// The first `n` vertices, each at itself.
+    /// `n` old vertices, each at its own place.
     pub(super) fn identity(n: usize) -> Self {
         Self {
             first: (0..=n).collect(),
@@ -20,7 +21,7 @@ impl Origins {
         }
     }
 
-    /// Each vertex at itself, or the given share of the way to another.
+    /// Each vertex at its own place, or moved to another by the given share of the way.
     pub(super) fn moved(place: &[Option<(u32, f64)>]) -> Self {
         let mut origins = Self::identity(0);
         for (v, place) in place.iter().enumerate() {
@@ -33,7 +34,7 @@ impl Origins {
         origins
     }
 
-    /// Adds a vertex `share` of the way from vertex `a` of these to vertex `b`.
+    /// Adds a vertex between `a` and `b` of these vertices, at `share` of the way from `a`.
     pub(super) fn push_between(&mut self, [a, b]: [u32; 2], share: f64) {
         let weighted = [(a, 1.0 - share), (b, share)];
         let mixed = mix(weighted.iter().flat_map(|&(v, weight)| {
@@ -43,7 +44,8 @@ impl Origins {
         self.push(mixed);
     }
 
-    /// The same places in terms of what these vertices' own origins are.
+    /// Combines these origins with those of their old vertices in `earlier`. The result refers to
+    /// the vertices before `earlier`.
     pub(super) fn after(&self, earlier: &Self) -> Self {
         let mut composed = Self::identity(0);
         for v in 0..self.len() {
@@ -76,7 +78,7 @@ impl Origins {
         &self.parts[self.first[v]..self.first[v + 1]]
     }
 
-    /// Weighted means of `stride` values per old vertex, for each new one.
+    /// Weighted means of `stride` values per old vertex, for each new vertex.
     pub(super) fn interpolate<T>(&self, field: &[T], stride: usize) -> Vec<T>
     where
         T: Copy + Mul<f64, Output = T> + Add<Output = T>,
@@ -96,7 +98,7 @@ impl Origins {
     }
 }
 
-/// Adds up the weights of equal vertices, in the order of their first appearance.
+/// Adds the weights of equal vertices, in the order of their first appearance.
 fn mix(parts: impl Iterator<Item = (u32, f64)>) -> Vec<(u32, f64)> {
     let mut mixed: Vec<(u32, f64)> = Vec::with_capacity(3);
     for (v, weight) in parts {

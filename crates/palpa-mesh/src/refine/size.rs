@@ -1,14 +1,15 @@
-//! How large triangles should be.
+//! Wanted sizes of triangles.
 
 use rstar::RTree;
 
 use crate::Vec3;
 
-/// Wants edges of length `h` within `radius` of any of the points, and longer ones outside: by `growth` times the distance
-/// beyond. Lengths in metres.
+/// A function that wants edges of length `h` within `radius` of any of the points. Outside, the
+/// wanted length grows by `growth` times the distance beyond. Lengths in metres.
 ///
-/// It asks for the least over a triangle, by a bound: it takes the distance of its centre less that of its farthest
-/// corner from it. So nothing small is missed between the corners of a large triangle. Without points nothing is wanted.
+/// The function returns a lower bound of the wanted length in a triangle. It uses the distance of
+/// the triangle's centre minus the distance from the centre to the farthest corner. So no point
+/// between the corners of a large triangle is missed. Without points, there is no limit.
 ///
 /// # Panics
 /// If lengths or `growth` are negative or not finite, or a point is not finite.

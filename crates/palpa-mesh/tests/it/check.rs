@@ -248,7 +248,8 @@ fn size_and_place() {
 
 #[test]
 fn self_intersections_are_those_of_brute_force() {
-    // Two spheres through each other, at an angle where no vertices coincide, and a tube pushed through both.
+    // Two spheres through each other, at an angle where no vertices coincide, and a tube pushed
+    // through both.
     let turned = nalgebra::Rotation3::from_euler_angles(0.3, 0.7, 1.1);
     let mut other = icosphere(2);
     other
@@ -263,8 +264,9 @@ fn self_intersections_are_those_of_brute_force() {
     assert_eq!(check_surface(&surface).verdict, Verdict::Bad);
 }
 
-/// Pairs of triangles of which a side of one passes through the inside of the other, by a parametric formula in floating point:
-/// another way than that of the code under test, good for triangles in general position.
+/// Pairs of triangles of which a side of one passes through the inside of the other, by a
+/// parametric formula in floating point: another way than that of the code under test, good for
+/// triangles in general position.
 fn brute_force(surface: &Surface) -> Vec<[u32; 2]> {
     let pierces = |a: Vec3, b: Vec3, [u, v, w]: [Vec3; 3]| {
         // a + s (b − a) = u + p (v − u) + q (w − u)

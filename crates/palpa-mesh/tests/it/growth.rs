@@ -173,7 +173,8 @@ fn flat_caps_of_a_closed_limb_are_found_and_not_grown_from() {
 
 #[test]
 fn without_room_all_layers_thin_in_proportion_and_none_is_dropped() {
-    // A bone that runs 3 mm under the skin on one side: 5.5 mm of skin and fat, and muscle below, do not fit there.
+    // A bone that runs 3 mm under the skin on one side: 5.5 mm of skin and fat, and muscle below,
+    // do not fit there.
     let (skin, bone) = cylinder(0.16, 0.04, 0.012, 4e-3);
     let mut bone = bone;
     bone.points.iter_mut().for_each(|p| p.y += 0.025);

@@ -38,7 +38,8 @@ fn assert_imprinted(old: &LayeredBody, circle: &Circle, imprint: &Imprint) {
                 .all(|&v| off(v) < eps)
         );
     }
-    // Outside triangles reach in nowhere near the place; those on the far side of a limb are another matter.
+    // Outside triangles reach in nowhere near the place; those on the far side of a limb are
+    // another matter.
     let near = |t: usize| {
         let p = body.skin.corners(t).iter().sum::<Vec3>() / 3.0;
         (p - circle.point).norm() < 1.5 * circle.radius

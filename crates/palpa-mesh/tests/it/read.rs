@@ -327,7 +327,8 @@ fn off_with_comments_colours_and_polygons() {
     insta::assert_snapshot!(refuse(Format::Off, "4OFF\n"), @r#"OFF, line 1: "4OFF" is not read; save it as plain ASCII OFF"#);
 }
 
-/// Two triangles of a unit square, as a glTF document around `buffers`, with a node that `transform` moves.
+/// Two triangles of a unit square, as a glTF document around `buffers`, with a node that
+/// `transform` moves.
 fn gltf_square(transform: &str, buffer_uri: &str) -> String {
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],

@@ -121,7 +121,8 @@ fn angles_do_not_degrade_with_the_number_of_rounds() {
         let refined = refine(&body, &params, near_points(&place, 0.0, h, 0.5));
         assert_faithful(&body, &refined);
         assert_eq!(refined.n_too_large, 0);
-        // Half an angle of 45° is the least that a green triangle over such a red one can have: atan(1/2) − … = 18.43°.
+        // Half an angle of 45° is the least that a green triangle over such a red one can have:
+        // atan(1/2) − … = 18.43°.
         let angle = smallest_angle(&refined.body.skin);
         assert!(angle > 18.4, "round {round}: {angle}°");
         let nearest = longest_edges(&refined.body.skin)
@@ -261,8 +262,8 @@ fn a_closed_rim_is_refined_all_round() {
     assert!(refined.body.cut_faces[0].vertices.len() > body.cut_faces[0].vertices.len());
 }
 
-/// The work does not grow faster than the mesh: each triangle of the forest is asked once, and they are at most
-/// a third more than those of the result.
+/// The work does not grow faster than the mesh: each triangle of the forest is asked once, and they
+/// are at most a third more than those of the result.
 #[test]
 fn wishes_are_asked_for_once_a_triangle_whatever_the_size() {
     for n in [25, 50, 100] {

@@ -66,9 +66,9 @@ proptest! {
     }
 }
 
-/// Few vertices, many triangles on them: fans, doubles and folds. The vertices are on a small grid or on two
-/// lines, shifted by about the tolerance of welding or of flatness, then turned and moved away from the
-/// origin, so that nothing is exact.
+/// Few vertices, many triangles on them: fans, doubles and folds. The vertices are on a small grid
+/// or on two lines, shifted by about the tolerance of welding or of flatness, then turned and moved
+/// away from the origin, so that nothing is exact.
 fn awkward() -> impl Strategy<Value = Surface> {
     let vertex = (
         prop::array::uniform3(-2_i8..=2),
@@ -122,8 +122,9 @@ fn needs_no_second_repair(surface: &Surface, options: &RepairOptions) -> Surface
     once
 }
 
-/// Corners on one line, two triangles on them that are each other's double. Each used to be kept for the
-/// other's sake, and the one that was left after dropping doubles fell to the second repair.
+/// Corners on one line, two triangles on them that are each other's double. Each used to be kept
+/// for the other's sake, and the one that was left after dropping doubles fell to the second
+/// repair.
 #[test]
 fn a_flat_triangle_and_its_double_both_go() {
     let mut points = vec![Vec3::zeros(); 12];
@@ -136,8 +137,8 @@ fn a_flat_triangle_and_its_double_both_go() {
     assert_eq!(repaired, Surface::default());
 }
 
-/// Turning the longest side of the flat triangle a–m–b makes the flat triangle far–a–m, whose longest side
-/// turned makes the first one again.
+/// Turning the longest side of the flat triangle a–m–b makes the flat triangle far–a–m, whose
+/// longest side turned makes the first one again.
 #[test]
 fn flat_triangles_are_not_turned_to_and_fro() {
     let points = [
@@ -154,7 +155,8 @@ fn flat_triangles_are_not_turned_to_and_fro() {
     assert_eq!(repaired, surface);
 }
 
-/// The side of a closed part without volume is rounding error, which may differ when the part is turned.
+/// The side of a closed part without volume is rounding error, which may differ when the part is
+/// turned.
 #[test]
 fn a_closed_part_without_volume_is_turned_once_at_most() {
     let square = [[0., 0., 0.], [3., 0., 0.], [3., 1., 0.], [0., 1., 0.]];
@@ -170,8 +172,8 @@ fn a_closed_part_without_volume_is_turned_once_at_most() {
     }
 }
 
-/// An unused vertex just outside used to take the place of a used one near it. That widened the bounding box,
-/// and with it the tolerance, so that the second repair welded the last two.
+/// An unused vertex just outside used to take the place of a used one near it. That widened the
+/// bounding box, and with it the tolerance, so that the second repair welded the last two.
 #[test]
 fn unused_vertices_do_not_widen_the_tolerance() {
     let points = [
@@ -217,7 +219,8 @@ fn what_is_far_is_recentred_once() {
 fn everything_that_is_safe_at_once() {
     let clean = tube(16, 8);
     let mut damaged = clean.clone();
-    // Unweld all, with a jitter below the tolerance; turn a fifth; double some; add triangles without area and loose points.
+    // Unweld all, with a jitter below the tolerance; turn a fifth; double some; add triangles
+    // without area and loose points.
     damaged.points = clean
         .triangles
         .iter()
@@ -259,7 +262,8 @@ fn everything_that_is_safe_at_once() {
 
 #[test]
 fn a_flat_triangle_is_turned_away_without_a_slit() {
-    // A pyramid over a square whose side 0–1 has a vertex in its middle, bridged by the flat triangle 0-1-5.
+    // A pyramid over a square whose side 0–1 has a vertex in its middle, bridged by the flat
+    // triangle 0-1-5.
     let points = [
         [0., 0., 0.],
         [2., 0., 0.],

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 
 use palpa_mesh::{Surface, Vec3};
 
-/// A unit sphere: an icosahedron with every edge halved `n` times. Closed, outward, `20 · 4ⁿ` triangles.
+/// A unit sphere: an icosahedron with every edge halved `n` times. Closed, outward, `20 · 4ⁿ`
+/// triangles.
 pub(crate) fn icosphere(n: usize) -> Surface {
     let g = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corners = [
@@ -64,7 +65,8 @@ pub(crate) fn icosphere(n: usize) -> Surface {
     Surface { points, triangles }
 }
 
-/// The side of a cylinder of radius 0.04 and length 0.2 along x, open at both ends, outward. `2 · around · along` triangles.
+/// The side of a cylinder of radius 0.04 and length 0.2 along x, open at both ends, outward.
+/// `2 · around · along` triangles.
 pub(crate) fn tube(around: u32, along: u32) -> Surface {
     let point = |i: u32, j: u32| {
         let (sin, cos) = (TAU * f64::from(i) / f64::from(around)).sin_cos();

@@ -16,7 +16,8 @@ pub(crate) fn assert_sound(body: &LayeredBody) {
     assert_cut_faces(body);
 }
 
-/// Every edge has two triangles that walk it in opposite directions, or lies on the rim; every vertex is used.
+/// Every edge has two triangles that walk it in opposite directions, or lies on the rim; every
+/// vertex is used.
 pub(crate) fn assert_conforming(skin: &Surface) {
     let mut directed: Vec<[u32; 2]> = skin
         .triangles
@@ -38,7 +39,8 @@ pub(crate) fn assert_conforming(skin: &Surface) {
     assert!(is_used.iter().all(|&u| u));
 }
 
-/// Cut faces run along the rim from neighbour to neighbour, cover it, and are flat where they say so.
+/// Cut faces run along the rim from neighbour to neighbour, cover it, and are flat where they say
+/// so.
 fn assert_cut_faces(body: &LayeredBody) {
     let loops = body.skin.boundary_loops();
     let n_rim: usize = loops.iter().map(Vec::len).sum();

@@ -1,4 +1,5 @@
-//! The picture of sections: layers in their colours, bones, tool, scale bar, states side by side.
+//! The picture of sections: layers in their colours, bones, tool, scale bar, and states side by
+//! side.
 
 use palpa_mesh::Vec3;
 
@@ -6,7 +7,8 @@ use super::{Plane, Point2, Section};
 use crate::canvas::{Anchor, Canvas, Font, INK, MUTED, Stroke, WHITE};
 use crate::{Color, Picture};
 
-/// Colours of the layers from the skin down: skin, fat and muscle look like it; told apart in grey too.
+/// Colours of the layers from the skin down, similar to real skin, fat and muscle. They also differ
+/// in grey.
 const LAYERS: [Color; 6] = [
     Color::rgb(0xd9, 0x9a, 0x6c),
     Color::rgb(0xf7, 0xe3, 0xa1),
@@ -16,10 +18,10 @@ const LAYERS: [Color; 6] = [
     Color::rgb(0xb9, 0xa2, 0xcc),
 ];
 const BONE: Color = Color::rgb(0xd8, 0xd4, 0xc8);
-/// What the columns end on and what does not move, as far as it is no bone.
+/// Colour of the rigid core where it is not bone.
 const CORE: Color = Color::rgb(0xf3, 0xf2, 0xee);
 const LUMP: Color = Color::rgb(0x3d, 0x6e, 0x8a);
-/// Shades from the least value to the largest: dark on white, in equal steps of lightness.
+/// Colours from the least value to the largest: light to dark, in equal steps of lightness.
 const SHADES: [Color; 6] = [
     Color::rgb(0xfc, 0xf7, 0xea),
     Color::rgb(0xf8, 0xd5, 0x9c),
@@ -35,34 +37,34 @@ const MARGIN: f64 = 24.0;
 const LEGEND: f64 = 150.0;
 const HEADER: f64 = 56.0;
 const FOOTER: f64 = 56.0;
-/// The plate that stands for a bonded disc.
+/// Thickness of the plate that stands for a bonded disc. m
 const PLATE_THICKNESS: f64 = 2e-3;
 
 /// One state of the body in the picture.
 #[derive(Debug, Clone)]
 pub struct Panel<'a> {
-    /// What the panel shows: "at rest".
+    /// Title of the panel, for example "at rest".
     pub title: &'a str,
     /// The cut body.
     pub section: &'a Section,
     /// The cut bones, from [`cut_surface`](super::cut_surface).
     pub bones: &'a [Vec<Point2>],
-    /// The cut lumps, likewise.
+    /// The cut lumps, in the same form.
     pub lumps: &'a [Vec<Point2>],
-    /// What the cells are shaded by; without it they have the colours of their layers.
+    /// Values that shade the cells. If `None`, cells have the colours of their layers.
     pub shades: Option<Shades<'a>>,
-    /// The tool, if it is there.
+    /// The outline of the tool, if there is one.
     pub tool: Option<ToolOutline>,
 }
 
-/// Values that cells are shaded by.
+/// Values that shade the cells.
 #[derive(Debug, Clone, Copy)]
 pub struct Shades<'a> {
-    /// What they are, with their unit: "von Mises stress, kPa".
+    /// Name of the values, with their unit: "von Mises stress, kPa".
     pub name: &'a str,
-    /// One for each prism of the body.
+    /// One value for each prism of the body.
     pub values: &'a [f64],
-    /// The value of the darkest shade.
+    /// The value that gets the darkest shade.
     pub most: f64,
 }
 
@@ -72,26 +74,26 @@ impl Shades<'_> {
     }
 }
 
-/// The shade at a share of the way from the least to the most.
+/// The shade of a value, given as a share from 0 (least) to 1 (most).
 fn shade_of(share: f64) -> Color {
     let at = share * (SHADES.len() - 1) as f64;
     let first = (at as usize).min(SHADES.len() - 2);
     SHADES[first].mixed(SHADES[first + 1], at - first as f64)
 }
 
-/// What the plane shows of a tool.
+/// The outline of a tool in the plane.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ToolOutline {
-    /// A thin plate, corner by corner.
+    /// A thin plate, as its corners in order.
     Plate([Point2; 4]),
-    /// A convex shape, round its rim.
+    /// A convex shape, as points around its rim.
     Shape(Vec<Point2>),
     /// A single node.
     Node(Point2),
 }
 
 impl ToolOutline {
-    /// A disc of `radius` that presses at `centre` in `direction`; the plane is taken to hold both.
+    /// A disc of `radius` that presses at `centre` in `direction`; both must lie in the plane.
     pub fn disc(plane: &Plane, centre: &Vec3, direction: &Vec3, radius: f64) -> Self {
         let [x, y] = plane.project(centre);
         let [tip_x, tip_y] = plane.project(&(centre + direction));
@@ -115,13 +117,14 @@ impl ToolOutline {
         ])
     }
 
-    /// A node at `at`.
+    /// A single node at `at`.
     pub fn node(plane: &Plane, at: &Vec3) -> Self {
         Self::Node(plane.project(at))
     }
 
-    /// A convex shape, given by the distance of a point from it (m, negative inside) and a point inside, in the plane; what
-    /// lies farther than `most` from there is left out.
+    /// A convex shape, given by a point inside it in the plane and by `distance`: the distance of a
+    /// point from the shape (m, negative inside). The outline stops at the distance `most` from the
+    /// inner point.
     pub fn shape(plane: &Plane, inside: &Vec3, most: f64, distance: impl Fn(&Vec3) -> f64) -> Self {
         const RAYS: u32 = 240;
         let [x, y] = plane.project(inside);
@@ -151,14 +154,14 @@ impl ToolOutline {
     }
 }
 
-/// Draws states of one body side by side at the same scale.
+/// Draws states of one body side by side, at the same scale.
 pub fn draw(title: &str, subtitle: &str, panels: &[Panel<'_>]) -> Picture {
     let (lo, hi) = bounds(panels);
     let size = [(hi[0] - lo[0]).max(1e-6), (hi[1] - lo[1]).max(1e-6)];
     let n = panels.len().max(1) as f64;
     let gap = 24.0;
     let panel_width = (WIDTH - 2.0 * MARGIN - LEGEND - gap * n) / n;
-    // A tall section is shrunk rather than made a tall picture.
+    // A tall section is scaled down, so that the picture does not become tall.
     let scale = (panel_width / size[0]).min(620.0 / size[1]);
     let height = HEADER + 34.0 + (size[1] * scale).max(120.0) + FOOTER;
     let mut canvas = Canvas::new(WIDTH, height);
@@ -207,7 +210,8 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
             Some(shades) => shades.color(prism),
             None => LAYERS[layer % LAYERS.len()],
         };
-        // The edge is a shade of the layer: it shows the elements and closes the seams between them.
+        // The edge has a darker shade of the layer: it shows the elements and hides the seams
+        // between them.
         let edge = Stroke::new(shade(color), 0.45);
         canvas.polygon(&[&seen(cell)], color, Some(edge));
     }
@@ -286,7 +290,7 @@ fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
     }
 }
 
-/// A value with three digits.
+/// A value with three significant digits.
 fn rounded(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -295,7 +299,7 @@ fn rounded(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A bar of a round length, about a quarter of the section's width.
+/// A scale bar of a round length, about a quarter of the section's width.
 fn draw_scale_bar(canvas: &mut Canvas, [x, y]: Point2, width: f64, scale: f64) {
     let rough_mm = 250.0 * width;
     let power = 10.0_f64.powf(rough_mm.log10().floor());
@@ -323,7 +327,7 @@ fn shade(color: Color) -> Color {
     color.mixed(INK, 0.3)
 }
 
-/// The corners of the box round all panels.
+/// Two opposite corners of the bounding box of all panels.
 fn bounds(panels: &[Panel<'_>]) -> (Point2, Point2) {
     let points = panels.iter().flat_map(|panel| {
         let cells = panel.section.cells.iter().flat_map(|(_, cell)| cell);

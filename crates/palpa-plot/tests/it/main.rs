@@ -11,7 +11,8 @@ use std::path::PathBuf;
 
 use palpa_plot::output::OutDir;
 
-/// A folder under the target folder for results that people and the Python checks look at after the tests.
+/// A folder under the target folder for results that people and the Python checks look at after the
+/// tests.
 fn results(name: &str) -> OutDir {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("results");
     OutDir::create(path.join(name)).unwrap()

@@ -1,4 +1,5 @@
-//! Sections tile the cut: areas against formulas, neighbours without gaps, pictures that are not blank.
+//! Sections tile the cut: areas against formulas, neighbours without gaps, pictures that are not
+//! blank.
 
 use std::f64::consts::PI;
 
@@ -34,8 +35,8 @@ fn body(
     }
 }
 
-/// Two triangles a cell over an `n × m` grid of vertices, the first index running fastest; the grid closes on itself in
-/// the first direction if `is_ring`.
+/// Two triangles a cell over an `n × m` grid of vertices, the first index running fastest; the grid
+/// closes on itself in the first direction if `is_ring`.
 fn grid(n: u32, m: u32, is_ring: bool) -> Vec<[u32; 3]> {
     let columns = if is_ring { n } else { n - 1 };
     (0..m - 1)
@@ -81,7 +82,8 @@ fn area(section: &Section, layer: Option<usize>) -> f64 {
 fn a_block_has_the_area_of_its_section_in_any_direction() {
     let block = block();
     let centre = Vec3::new(0.05, 0.05, -0.02);
-    // The normal, and the area of the cut through the centre: straight, oblique in plan, and through nodes.
+    // The normal, and the area of the cut through the centre: straight, oblique in plan, and
+    // through nodes.
     let oblique = 0.1 / 0.3_f64.cos();
     for (normal, expected) in [
         (Vec3::x(), 0.1 * 0.04),
@@ -135,7 +137,8 @@ fn a_tube_has_the_area_of_its_polygon() {
         for x in [0.1, 0.1037] {
             let plane = Plane::new(Vec3::new(x, 0.0, 0.0), Vec3::x(), Vec3::z()).unwrap();
             let section = cut_body(&tube, &tube.positions, &plane);
-            // Its n-gon: the diagonals of the cells, straight along the tube, add corners but no area.
+            // Its n-gon: the diagonals of the cells, straight along the tube, add corners but no
+            // area.
             let n_gon = 0.5 * f64::from(n) * (2.0 * PI / f64::from(n)).sin();
             let expected = n_gon * (0.05 * 0.05 - 0.01 * 0.01);
             let found = area(&section, None);

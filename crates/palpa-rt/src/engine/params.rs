@@ -1,4 +1,4 @@
-//! Settings of an engine, and why it cannot start.
+//! Settings of an engine, and the errors when it starts.
 
 use crate::{
     threads::{Priority, Wish},
@@ -12,20 +12,21 @@ use std::{io, path::PathBuf};
 pub struct EngineParams {
     /// Period of the loop, s.
     pub period: f64,
-    /// The law; its period is set to the loop's.
+    /// Settings of the law; its period is set to the loop's.
     pub servo: ServoParams,
-    /// The tissue's thread.
+    /// Settings of the tissue's thread.
     pub tissue: TissueParams,
-    /// How long the loop spins before each tick instead of sleeping, s: less lateness for more CPU.
+    /// How long the loop spins before each tick instead of sleeping, s. Spinning reduces lateness
+    /// but uses more CPU.
     pub spin: f64,
     /// Priority and core of the loop's thread, if the system grants them.
     pub servo_wish: Wish,
-    /// The same for the tissue's thread.
+    /// Priority and core of the tissue's thread.
     pub tissue_wish: Wish,
-    /// The same for the background's thread: zones that come late hold the tissue back, so it is no
-    /// lower than the others.
+    /// Priority and core of the background's thread. Its priority is not lower than the others',
+    /// because zones that come late hold the tissue back.
     pub background_wish: Wish,
-    /// The same for the recorder's thread.
+    /// Priority and core of the recorder's thread.
     pub recorder_wish: Wish,
     /// Whether memory is locked in RAM.
     pub lock_memory: bool,
@@ -57,16 +58,16 @@ impl Default for EngineParams {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
-    /// No device, or more than the law can serve.
-    #[error("{found} devices; from 1 to {MAX_TOOLS} can be served")]
+    /// There is no device, or there are more than the law can serve.
+    #[error("{found} devices are given; the loop serves 1 to {MAX_TOOLS}")]
     Devices {
-        /// How many there were.
+        /// Number of devices.
         found: usize,
     },
-    /// The period is no time, s.
+    /// The period is not a positive time.
     #[error("a period of {period} s; expected more than 0 and at most 0.1 s")]
     Period {
-        /// What it was.
+        /// The period, s.
         period: f64,
     },
     /// The log cannot be created.
@@ -74,10 +75,10 @@ pub enum StartError {
     Log {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: mcap::McapError,
     },
-    /// The system gives no thread.
-    #[error("no thread: {0}")]
+    /// The system cannot start a thread.
+    #[error("cannot start a thread: {0}")]
     Thread(#[from] io::Error),
 }

@@ -1,4 +1,4 @@
-//! What an engine tells while it runs and at its end.
+//! Reports of an engine while it runs and at its end.
 
 use crate::{
     event::Level, histogram::Quantiles, record::StepRecord, recorder::EventRow,
@@ -22,7 +22,7 @@ pub struct Report {
     pub duration: f64,
     /// Ticks done.
     pub ticks: u64,
-    /// Ticks left out: missed deadlines.
+    /// Ticks skipped because of missed deadlines.
     pub skipped: u64,
     /// CPU time of a tick, s.
     pub tick_cpu: Quantiles,
@@ -30,9 +30,9 @@ pub struct Report {
     pub lateness: Quantiles,
     /// Histogram of the CPU time of ticks: lower end, upper end (s), count.
     pub tick_cpu_histogram: Vec<(f64, f64, u64)>,
-    /// Histogram of lateness.
+    /// Histogram of lateness: lower end, upper end (s), count.
     pub lateness_histogram: Vec<(f64, f64, u64)>,
-    /// Force of each device.
+    /// Smoothness and energy of the force of each device.
     pub forces: Vec<ForceReport>,
     /// Steps of the tissue.
     pub steps: u64,
@@ -42,9 +42,9 @@ pub struct Report {
     pub step_cpu: Quantiles,
     /// Wall time of a step, s.
     pub step_wall: Quantiles,
-    /// Steps whose patch was held back.
+    /// Steps whose patch was not published.
     pub held_back: u64,
-    /// CPU time of background jobs, s each.
+    /// CPU time of each background job, s.
     pub jobs: Quantiles,
     /// CPU time of all background jobs as a share of the run.
     pub background_cpu_share: f64,
@@ -56,9 +56,9 @@ pub struct Report {
     pub panicked: Vec<&'static str>,
     /// Events, in order.
     pub events: Vec<EventRow>,
-    /// What the system granted the threads.
+    /// Scheduling that the system granted to each thread.
     pub granted: Vec<Granted>,
-    /// Whether memory was locked, or why not.
+    /// Whether memory was locked; the reason if not.
     pub memory_locked: Result<(), String>,
     /// File of the log.
     pub log: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! A table of numbers as a Parquet file, a row group at a time.
+//! A table of numbers as a Parquet file, written one row group at a time.
 
 use crate::layout::{Record, Value};
 use parquet::{
@@ -71,7 +71,7 @@ impl ParquetTable {
         for (column, value) in self.columns.iter_mut().zip(values) {
             match (column, value) {
                 (Column::F64(all), Value::F64(v)) => all.push(*v),
-                // The same bits: the logical type says that they have no sign.
+                // The bits stay the same; the logical type marks them as unsigned.
                 (Column::U64(all), Value::U64(v)) => all.push(v.cast_signed()),
                 (Column::Bool(all), Value::Bool(v)) => all.push(*v),
                 _ => unreachable!("a record's values have the same types each time"),

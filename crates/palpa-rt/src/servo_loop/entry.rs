@@ -1,14 +1,14 @@
-//! The record of one tick, with those of its devices.
+//! The record of one tick, with the records of its devices.
 
 use crate::record::{DeviceRecord, TickRecord};
 use palpa_servo::{DeviceState, MAX_TOOLS, TickReport, ToolReport};
 
-/// Records of one tick.
+/// A tick with its devices.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TickEntry {
     /// The tick.
     pub tick: TickRecord,
-    /// Its devices; those past `tick.n_devices` mean nothing.
+    /// Its devices; entries from `tick.n_devices` on are not used.
     pub devices: [DeviceRecord; MAX_TOOLS],
 }
 

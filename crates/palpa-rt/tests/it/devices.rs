@@ -17,8 +17,8 @@ use std::{
 /// A condition that does not come true in this time is a hang. No outcome depends on it otherwise.
 const HANG: Duration = Duration::from_mins(2);
 
-/// Waits until something is so. It is asked whenever the loop reads a device of [`announced`], which
-/// wakes the thread that made the device.
+/// Waits until something is so. It is asked whenever the loop reads a device of [`announced`],
+/// which wakes the thread that made the device.
 pub(crate) fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let since = Instant::now();
     while !is_so() {

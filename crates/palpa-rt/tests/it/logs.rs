@@ -80,7 +80,7 @@ fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
         Log::open(&cut)
             .unwrap_err()
             .to_string()
-            .contains("no log that can be read")
+            .contains("cannot be read as a log")
     );
 }
 

@@ -1,4 +1,4 @@
-//! Values that are written in one of two ways.
+//! Values that can be written in one of two forms.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::{ThicknessTable, TissueTable};
 use crate::units::Length;
 
-/// The tissue of a layer or lump: a name of the catalogue, or values given here.
+/// The tissue of a layer or lump: a name from the catalogue, or values.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum TissueSpec {
@@ -26,7 +26,7 @@ pub(crate) enum ThicknessSpec {
     Varying(ThicknessTable),
 }
 
-/// A direction: a name of an axis or three numbers.
+/// A direction: the name of an axis, or three numbers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum AxisSpec {
     Name(AxisName),
@@ -45,9 +45,10 @@ pub(crate) enum AxisName {
     Z,
 }
 
-/// A value that is written as a text or as a table.
+/// A value that is written either as a text or as a table.
 ///
-/// serde's untagged enums would do the same, but lose the place and the reason of an error inside the table.
+/// serde's untagged enums would do the same, but would lose the position and the reason of an error
+/// inside the table.
 trait TextOrTable: Sized {
     const EXPECTING: &'static str;
     type Table: DeserializeOwned;

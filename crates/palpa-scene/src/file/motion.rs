@@ -7,45 +7,45 @@ use super::AxisSpec;
 use crate::motion::{DeviceKind, DevicePreset, Grip, MotionKind};
 use crate::units::{Length, Time, Velocity};
 
-/// The haptic device that presses in real time (`palpa loop-report`), and how it is held.
+/// The haptic device used in real time (`palpa loop-report`), and the grip of the hand on it.
 #[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct DeviceTable {
     /// How the device is driven. Default: "simulated".
     pub(crate) kind: DeviceKind,
-    /// Which device. Default: "falcon".
+    /// The model of the device. Default: "falcon".
     pub(crate) preset: DevicePreset,
-    /// How a simulated hand holds it. Default: "medium".
+    /// The grip of the simulated hand. Default: "medium".
     pub(crate) grip: Grip,
 }
 
-/// How the simulated hand moves in real time, over and over.
+/// The motion of the simulated hand in real time. It is repeated.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct MotionTable {
-    /// What it does. Default: "press".
+    /// Kind of motion. Default: "press".
     pub(crate) kind: MotionKind,
-    /// How far down the hand goes, from where the tool first touches, 1 µm to 500 mm. The tool stays higher, since the
-    /// hand gives way. Default: as in [press].
+    /// Depth that the hand moves to, from the first touch of the tool, 1 µm to 500 mm. The tool
+    /// stays higher, because the hand gives way. Default: as in [press].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) depth: Option<Length>,
-    /// Its largest speed, 0.01 mm/s to 1 m/s. Default: "50 mm/s".
+    /// Largest speed of the hand, 0.01 mm/s to 1 m/s. Default: "50 mm/s".
     pub(crate) speed: Velocity,
-    /// How long it rests at the depth, 0 s to 600 s. Default: "0.5 s".
+    /// Time that the hand rests at the depth, 0 s to 600 s. Default: "0.5 s".
     pub(crate) hold: Time,
-    /// How far it strokes, drags or palpates across the skin, 0.1 mm to 500 mm, half of it on each side of the place that
-    /// is pressed. Default: "20 mm".
+    /// Length of a stroke, drag or palpation across the skin, 0.1 mm to 500 mm. Half of it lies on
+    /// each side of the pressed place. Default: "20 mm".
     pub(crate) length: Length,
-    /// The direction in which it does: "x", "y", "z" or three numbers, of which the part along the skin counts. Default:
-    /// the tool's `axis`, or any.
+    /// Direction of a stroke, drag or palpation: "x", "y", "z" or three numbers. Only the part
+    /// along the skin counts. Default: the tool's `axis`, or any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) along: Option<AxisSpec>,
-    /// How often it taps or drags there and back, or at how many places it palpates, 1 to 100. Default: 3.
+    /// Number of taps, of drags there and back, or of palpated places, 1 to 100. Default: 3.
     pub(crate) times: u32,
-    /// How much the hand trembles, root of the mean square of 8 to 12 Hz, 0 m to 5 mm; a healthy hand 0.05 mm to 0.2 mm.
-    /// Default: "0 mm".
+    /// Tremor of the hand, as the root mean square of a motion at 8 to 12 Hz, 0 m to 5 mm. A
+    /// healthy hand has 0.05 mm to 0.2 mm. Default: "0 mm".
     pub(crate) tremor: Length,
-    /// How high over the skin it begins and ends, 0.1 mm to 100 mm. Default: "5 mm".
+    /// Height of the tool above the skin at the start and end, 0.1 mm to 100 mm. Default: "5 mm".
     pub(crate) above: Length,
 }
 

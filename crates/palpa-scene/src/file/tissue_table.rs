@@ -1,4 +1,4 @@
-//! A tissue as it is written.
+//! The table of a tissue in a scene file.
 
 #![expect(
     clippy::doc_markdown,
@@ -17,37 +17,39 @@ use crate::parameters::{self, Numbers, PARAMETERS, ParameterSpec, Unit};
 use crate::units::{Density, Pressure, SpringConstant, Time};
 use crate::{Moduli, Volume};
 
-/// A tissue by its values: a law with its parameters, or `spring`. The simplest is `young` with `poisson`.
+/// A tissue given by its values: either a law with its parameters, or `spring`. The simplest form
+/// is `young` with `poisson`.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = parameters::describe)]
 pub(crate) struct TissueTable {
-    /// What the tissue is called in reports. Default: "given in the scene".
+    /// Name of the tissue in reports. Default: "given in the scene".
     #[serde(default = "default_name")]
     pub(crate) name: String,
-    /// The elastic law, which says what parameters the tissue takes. All laws are alike at small strain. Default:
-    /// "neo-hookean".
+    /// The elastic law. It determines which parameters the tissue takes. All laws agree at small
+    /// strain. Default: "neo-hookean".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) law: Option<LawName>,
     #[serde(flatten)]
     #[schemars(skip)]
     pub(crate) numbers: Numbers<f64>,
-    /// Ogden: 1 to 6 terms; the shear modulus is the sum of their `mu`.
+    /// Ogden only: 1 to 6 terms. The sum of their `mu` is the shear modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) terms: Option<Vec<OgdenTable>>,
-    /// How the energy of a change of volume grows; the linear and the St. Venant-Kirchhoff law have the quadratic one.
-    /// Default: "quadratic".
+    /// The energy of a change of volume. The linear and the St. Venant-Kirchhoff law always use the
+    /// quadratic one. Default: "quadratic".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) volume: Option<Volume>,
-    /// How the tissue relaxes while it is held. Default: not at all.
+    /// Relaxation of the stress at constant strain. Default: not at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) prony: Option<PronyTable>,
-    /// The stiffness of every bar of the layer, 1 µN/m to 1 MN/m; for the reference method only, without any law.
+    /// Stiffness of every bar of the layer, 1 µN/m to 1 MN/m. For the reference method only, and
+    /// without a law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) spring: Option<SpringConstant>,
     /// Density, 100 kg/m³ to 20000 kg/m³. Default: not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) density: Option<Density>,
-    /// Where the values are from, in words. Default: nothing said.
+    /// Source of the values, in words. Default: nothing said.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub(crate) source: String,
 }
@@ -68,7 +70,8 @@ impl Default for TissueTable {
     }
 }
 
-/// serde's `flatten` would read the same, but lose the place of an error inside the table.
+/// serde's `flatten` would read the same keys, but would lose the position of an error inside the
+/// table.
 impl<'de> Deserialize<'de> for TissueTable {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Table;
@@ -123,7 +126,7 @@ enum Key {
     Number(&'static ParameterSpec),
 }
 
-/// The keys beside the parameters of laws.
+/// The keys other than the parameters of laws.
 const OTHERS: [(&str, Key); 8] = [
     ("name", Key::Name),
     ("law", Key::Law),
@@ -166,27 +169,29 @@ impl<'de> Deserialize<'de> for Key {
     }
 }
 
-/// A term of Ogden's energy, 2 mu/alpha² (λ1^alpha + λ2^alpha + λ3^alpha − 3) of the isochoric stretches, as in Abaqus and
-/// CalculiX. Others write mu·alpha/2 for what is `mu` here.
+/// A term of Ogden's energy, 2 mu/alpha² (λ1^alpha + λ2^alpha + λ3^alpha − 3), in the isochoric
+/// stretches, as in Abaqus and CalculiX. Other definitions use mu·alpha/2 where this one has `mu`.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OgdenTable {
-    /// What the term adds to the shear modulus, 1 Pa to 1 GPa.
+    /// Contribution of the term to the shear modulus, 1 Pa to 1 GPa.
     pub(crate) mu: Pressure,
-    /// Its exponent, of either sign and a size of 0.001 to 100.
+    /// The exponent, positive or negative, with an absolute value of 0.001 to 100.
     pub(crate) alpha: f64,
 }
 
-/// Relaxation as a Prony series: held at a strain, the stress falls by the share `g` of each term with its time constant.
+/// Relaxation as a Prony series: at constant strain, each term reduces the stress by its share `g`
+/// with its time constant.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PronyTable {
-    /// 1 to 12 terms, whose `g` are 0.99 at most together.
+    /// 1 to 12 terms. The sum of their `g` is 0.99 at most.
     pub(crate) terms: Vec<PronyTermTable>,
-    /// Whether the law's moduli are those at rest, after all relaxation, or at once, before any. Default: "long-term".
+    /// Whether the law's moduli are the long-term ones, after all relaxation, or the instantaneous
+    /// ones, before any. Default: "long-term".
     #[serde(default)]
     pub(crate) moduli: Moduli,
-    /// Whether the resistance to a change of volume relaxes, too. Default: false.
+    /// Whether the resistance to a change of volume relaxes too. Default: false.
     #[serde(default)]
     pub(crate) volume: bool,
 }
@@ -195,9 +200,9 @@ pub(crate) struct PronyTable {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PronyTermTable {
-    /// The share of the stiffness at once that relaxes, 0.001 to 0.99.
+    /// Share of the instantaneous stiffness that relaxes, 0.001 to 0.99.
     pub(crate) g: f64,
-    /// Its time constant, 0.1 ms to 100000 s.
+    /// The time constant, 0.1 ms to 100000 s.
     pub(crate) tau: Time,
 }
 

@@ -1,4 +1,4 @@
-//! Tools and lumps as they are written.
+//! The tables of tools and lumps in a scene file.
 
 #![expect(
     clippy::doc_link_with_quotes,
@@ -14,92 +14,103 @@ use super::{AxisSpec, TissueSpec};
 use crate::shape::ToolShape;
 use crate::units::{Angle, Length};
 
-/// What presses. A disc and a node hold the skin; the other shapes press by contact.
+/// The tool. A disc and a node are bonded to the skin; all other shapes press by contact.
 #[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ToolTable {
-    /// Its shape. Default: "disc".
+    /// Shape of the tool. Default: "disc".
     #[serde(default)]
     pub(crate) shape: ToolShape,
-    /// Disc, sphere, flat punch and capsule: its radius, 0.1 mm to 200 mm. Cone: that of its shaft. Default: "8 mm".
+    /// Disc, sphere, flat punch and capsule: the radius, 0.1 mm to 200 mm. Cone: the radius of its
+    /// shaft. Default: "8 mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radius: Option<Length>,
-    /// Fingertip only: the radii of the pad along the finger, across it and in the direction of the press, each 0.1 mm to
-    /// 200 mm. Default: ["8 mm", "7 mm", "7 mm"], which curve by 9.1 mm along and 7 mm across; pads of index fingers
-    /// have 7-10 mm and 6-8 mm (from memory, after Serina et al. 1998).
+    /// Fingertip only: the radii of the pad along the finger, across it and in the direction of the
+    /// press, each 0.1 mm to 200 mm. Default: ["8 mm", "7 mm", "7 mm"], with radii of curvature of
+    /// 9.1 mm along and 7 mm across the finger. The pads of index fingers have 7-10 mm and 6-8 mm
+    /// (from memory, after Serina et al. 1998).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radii: Option<[Length; 3]>,
-    /// Capsule only: the length of its straight part, 0.1 mm to 400 mm. Default: "20 mm".
+    /// Capsule only: the length of the straight part, 0.1 mm to 400 mm. Default: "20 mm".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) length: Option<Length>,
-    /// Box only: its whole size along, across and in the direction of the press, each 0.2 mm to 400 mm. Default:
-    /// ["16 mm", "16 mm", "16 mm"].
+    /// Box only: the full size along, across and in the direction of the press, each 0.2 mm to 400
+    /// mm. Default: ["16 mm", "16 mm", "16 mm"].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) size: Option<[Length; 3]>,
-    /// Cone only: the whole angle at its tip, 20 deg to 160 deg. Default: "120 deg".
+    /// Cone only: the full angle at the tip, 20 deg to 160 deg. Default: "120 deg".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) opening_angle: Option<Angle>,
-    /// Cone only: the radius by which its tip is rounded, 1 µm to 200 mm, no more than `radius`. Default: "3 mm", or
-    /// `radius` if that is less.
+    /// Cone only: the radius of the rounded tip, 1 µm to 200 mm, no more than `radius`. Default: "3
+    /// mm", or `radius` if that is less.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) tip_radius: Option<Length>,
-    /// Flat punch, box and cone: the radius by which the edges are rounded, 1 µm to 200 mm, no more than the radius of
-    /// punch or cone or half the box's smallest size. Default: 0.3 of these.
+    /// Flat punch, box and cone: the radius of the rounded edges, 1 µm to 200 mm. It is limited to
+    /// the radius of the punch or cone, or to half the smallest size of the box. Default: 0.3 of
+    /// these.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) edge_radius: Option<Length>,
-    /// Capsule, box and fingertip: the direction that the tool's length points along, as nearly as it can lying across the
-    /// press. Default: as near to x as it goes, or to y where the press is along x.
+    /// Capsule, box and fingertip: the direction of the tool's length. Only the part across the
+    /// press counts. Default: as near to x as possible, or to y if the press is along x.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) axis: Option<AxisSpec>,
-    /// All but disc and node: Coulomb's coefficient of friction with the skin, 0 to 5. Default: 0, without friction.
+    /// All shapes except disc and node: Coulomb's coefficient of friction with the skin, 0 to 5.
+    /// Default: 0, without friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) friction: Option<f64>,
 }
 
-/// A lump in the layers. It lies below a place of the skin (`depth`, with `below` or where the tool presses) or in a place
-/// of the body (`at`); a mesh may also stay where it is.
+/// A lump in the layers. It lies either below a place of the skin (`depth`, with `below` or where
+/// the tool presses), or at a point of the body (`at`). A mesh may also keep the position in its
+/// file.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LumpTable {
-    /// What the lump is called in reports. Default: "lump".
+    /// Name of the lump in reports. Default: "lump".
     #[serde(default = "default_name")]
     pub(crate) name: String,
-    /// Its shape. Default: "sphere".
+    /// Shape of the lump. Default: "sphere".
     #[serde(default)]
     pub(crate) shape: LumpShapeName,
-    /// Sphere and capsule: its radius, 0.1 mm to 200 mm.
+    /// Sphere and capsule: the radius, 0.1 mm to 200 mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radius: Option<Length>,
-    /// Ellipsoid only: its three radii, each 0.1 mm to 200 mm: along `axis`, across it, and into the depth.
+    /// Ellipsoid only: the three radii, each 0.1 mm to 200 mm: along `axis`, across it, and into
+    /// the depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radii: Option<[Length; 3]>,
-    /// Capsule only: the length of its straight part, 0.1 mm to 400 mm; from end to end it is two radii longer.
+    /// Capsule only: the length of the straight part, 0.1 mm to 400 mm. The total length is two
+    /// radii more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) length: Option<Length>,
     /// Mesh only: a closed triangle mesh in the frame and unit of the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) file: Option<PathBuf>,
-    /// How deep the lump's centre is below the skin at rest, along its inward normal, 0.1 mm to 500 mm.
+    /// Depth of the lump's centre below the skin at rest, along the inward normal, 0.1 mm to 500
+    /// mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) depth: Option<Length>,
-    /// With `depth`: the point whose nearest point of the skin the lump is below, each coordinate within 10 m. Default:
-    /// where the tool presses (`press.at`, `press.vertex` or the middle of the skin).
+    /// With `depth`: the lump lies below the point of the skin nearest to this point, each
+    /// coordinate within 10 m. Default: where the tool presses (`press.at`, `press.vertex` or the
+    /// middle of the skin).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) below: Option<[Length; 3]>,
-    /// With `depth`, in place of `below`: the skin vertex that the lump is below, by its number, from 0.
+    /// With `depth`, instead of `below`: number of the skin vertex that the lump lies below, from
+    /// 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) below_vertex: Option<u32>,
-    /// In place of `depth`: where the lump's centre is, each coordinate within 10 m.
+    /// Instead of `depth`: the centre of the lump, each coordinate within 10 m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) at: Option<[Length; 3]>,
-    /// Ellipsoid and capsule: the direction of the first radius, or of the length. Default: along the skin, as near to x
-    /// as it goes, or to y where the skin looks along x.
+    /// Ellipsoid and capsule: the direction of the first radius, or of the length. Default: along
+    /// the skin, as near to x as possible, or to y if the skin's normal is along x.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) axis: Option<AxisSpec>,
-    /// The name of a tissue in the catalogue, or a table with its elasticity.
+    /// Name of a tissue in the catalogue, or a table with its values.
     pub(crate) tissue: TissueSpec,
-    /// The width over which the lump passes into what is round it, with its surface in the middle, 0 m to 50 mm and no more
-    /// than twice its smallest radius. Default: "0 m", a sharp edge.
+    /// Width of the transition between the lump's tissue and the tissue around it, centred on the
+    /// lump's surface, 0 m to 50 mm and no more than twice the smallest radius. Default: "0 m", a
+    /// sharp edge.
     #[serde(default, skip_serializing_if = "super::is_none")]
     pub(crate) transition: Length,
 }

@@ -1,4 +1,4 @@
-//! The body: files or a generator, and what is cut out of it.
+//! The body: files or a generator, and its cut-out.
 
 use super::{Reader, coordinates, each};
 use crate::SceneError;
@@ -66,7 +66,7 @@ fn cutout(
         return match middle {
             None => Ok(None),
             Some(_) => Err(at.key("cutout_at").invalid(
-                "a middle without a radius; add `cutout_radius = \"60 mm\"` or remove `cutout_at`",
+                "a centre without a radius; add `cutout_radius = \"60 mm\"` or remove `cutout_at`",
             )),
         };
     };
@@ -76,7 +76,7 @@ fn cutout(
         (Some(point), _) => Target::Point(coordinates(&at.key("cutout_at"), point)?),
         (None, Target::Middle) => {
             return Err(radius_at.invalid(
-                "a cut-out needs its middle; give `cutout_at` here, or `at` or `vertex` in [press]",
+                "a cut-out needs a centre; give `cutout_at` here, or `at` or `vertex` in [press]",
             ));
         }
         (None, pressed) => pressed,
@@ -150,7 +150,8 @@ fn generator(at: &Site<'_>, table: &GeneratorTable) -> Result<Generator, SceneEr
             let scale = at
                 .key("scale")
                 .within(table.scale.unwrap_or(1.0), &limits::SCALE)?;
-            // Girth and length of an adult's forearm are both about 25 cm, its wrist's radius 25 mm.
+            // An adult's forearm is about 25 cm long and 25 cm around; the radius of its wrist is
+            // 25 mm.
             let area = (0.25 * scale).powi(2);
             (Generator::Forearm { spacing, scale }, area, 0.025 * scale)
         }
@@ -169,7 +170,7 @@ fn generator(at: &Site<'_>, table: &GeneratorTable) -> Result<Generator, SceneEr
             "a spacing of {} gives about {vertices:.0} skin vertices, more than the {:.0} allowed; take {:.1} mm or more",
             table.spacing,
             limits::MAX_VERTICES,
-            // Rounded up in the first digit that is shown.
+            // Rounded up in the first digit that the message shows.
             (finest * 1e4).ceil() / 10.0
         )));
     }

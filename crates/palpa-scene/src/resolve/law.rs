@@ -1,4 +1,5 @@
-//! From the numbers that are written of a tissue to its elastic law: which go together, and which are possible.
+//! From the numbers of a tissue to its elastic law: checks which numbers go together and which
+//! values are possible.
 
 use crate::law::LawName;
 use crate::limits;
@@ -6,7 +7,7 @@ use crate::parameters::{Missing, Numbers, ParameterSpec};
 use crate::units::Pressure;
 use crate::{Elastic, Energy, Law, OgdenTerm, Resistance, Sourced, Stiffness, Volume};
 
-/// The numbers that are written of a tissue's elasticity, each within its own range.
+/// The numbers that a scene gives for a tissue's elasticity, each within its own range.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Parts {
     pub(crate) law: LawName,
@@ -15,10 +16,10 @@ pub(crate) struct Parts {
     pub(crate) volume: Option<Volume>,
 }
 
-/// Why the numbers of a tissue make no law.
+/// The reason why the numbers of a tissue do not give a valid law.
 #[derive(Debug)]
 pub(crate) struct LawFault {
-    /// The key that is to blame, if one is.
+    /// The key that is wrong, if it is a single one.
     pub(crate) key: Option<&'static str>,
     pub(crate) message: String,
 }
@@ -34,7 +35,7 @@ fn fault<T>(
 }
 
 impl Parts {
-    /// The law that the numbers give.
+    /// The law given by the numbers.
     pub(crate) fn law(mut self) -> Result<Law, LawFault> {
         self.check_keys()?;
         if self.law.is_quadratic() && self.volume == Some(Volume::Logarithmic) {
@@ -80,7 +81,7 @@ impl Parts {
         }
     }
 
-    /// The parameter with this key, or its default.
+    /// The parameter with this key, as given or its default.
     fn number(&self, key: &str) -> Result<Sourced, LawFault> {
         if let Some(number) = self.numbers.get(key) {
             return Ok(number.clone());
@@ -131,7 +132,7 @@ impl Parts {
         }
     }
 
-    /// The terms as given, or the one that a modulus and an exponent make.
+    /// The terms as given, or the single term given by a modulus and an exponent.
     fn ogden_terms(
         &self,
         terms: Option<Vec<OgdenTerm>>,
@@ -145,7 +146,7 @@ impl Parts {
             (None, Some(alpha)) if is_modulus_given => {
                 let stiffness = self.stiffness()?;
                 let given = stiffness.sourced().clone();
-                // Any law of this stiffness has its shear modulus.
+                // Any law with this stiffness has the same shear modulus.
                 let likeness = Elastic {
                     energy: Energy::NeoHookean { stiffness },
                     resistance: resistance.clone(),
@@ -166,8 +167,8 @@ impl Parts {
     }
 }
 
-/// Whether the numbers together give a solid: a Poisson's ratio and a stiffness that a body can have, and an energy that
-/// grows with strain throughout.
+/// Checks that the numbers together give a solid: possible values of stiffness and Poisson's ratio,
+/// and an energy that grows with strain everywhere.
 fn check(elastic: &Elastic) -> Result<(), LawFault> {
     if matches!(elastic.resistance, Resistance::Bulk(_)) {
         check_bulk(elastic)?;

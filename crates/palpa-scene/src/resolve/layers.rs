@@ -9,7 +9,7 @@ use crate::scene::Layer;
 use crate::units::Length;
 use crate::{SceneError, Thickness};
 
-/// How thin a layer may become whose thickness is not known beforehand. m
+/// Default least thickness of a layer whose thickness is not known beforehand, m.
 const MIN_THICKNESS: f64 = 0.5e-3;
 
 impl Reader<'_> {

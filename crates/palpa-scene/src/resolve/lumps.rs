@@ -11,7 +11,7 @@ use crate::units::Length;
 use crate::{Law, SceneError};
 
 impl LumpShapeName {
-    /// Its name in a sentence, and the keys that give its shape.
+    /// Name of the shape in a sentence, and the keys of its sizes.
     fn takes(self) -> (&'static str, &'static [&'static str]) {
         match self {
             Self::Sphere => ("a sphere", &["radius"]),
@@ -52,7 +52,7 @@ impl Reader<'_> {
             .filter(|r| transition.si() > 2.0 * r)
         {
             return Err(transition_at.invalid(format!(
-                "a transition of {transition} leaves nothing of a lump of radius {} as it is; take {} at most",
+                "a transition of {transition} is too wide for a lump of radius {}; take {} at most",
                 Length::from_si(radius),
                 Length::from_si(2.0 * radius)
             )));
@@ -61,7 +61,7 @@ impl Reader<'_> {
         let tissue = tissue(&tissue_at, table.tissue)?;
         if matches!(tissue.law, Law::Spring { .. }) {
             return Err(tissue_at.invalid(
-                "a lump is no network of bars; give it `young = \"80 kPa\"` instead of `spring`",
+                "a lump cannot be a network of bars; give it `young = \"80 kPa\"` instead of `spring`",
             ));
         }
         Ok(Lump {

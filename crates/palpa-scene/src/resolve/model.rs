@@ -15,7 +15,7 @@ impl Reader<'_> {
             (DynamicsName::QuasiStatic, None) => Dynamics::QuasiStatic,
             (DynamicsName::QuasiStatic, Some(_)) => {
                 return Err(at.key("damping").invalid(
-                    "nothing is damped in equilibrium; add `dynamics = \"implicit\"` or remove `damping`",
+                    "damping has no effect in equilibrium; add `dynamics = \"implicit\"` or remove `damping`",
                 ));
             }
             (DynamicsName::Implicit, None) => Dynamics::Implicit(Damping::default()),

@@ -32,7 +32,7 @@ impl Reader<'_> {
     }
 }
 
-/// The device has no ranges.
+/// The device's keys have no ranges to check.
 pub(super) fn device(device: &DeviceTable) -> Device {
     Device {
         kind: device.kind,

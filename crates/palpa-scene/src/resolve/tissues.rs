@@ -1,4 +1,4 @@
-//! Tissues: a name of the catalogue, or a law with its parameters.
+//! Tissues: a name from the catalogue, or a law with its parameters.
 
 use super::law::{LawFault, Parts};
 use crate::error::Site;
@@ -23,7 +23,7 @@ pub(super) fn tissue(at: &Site<'_>, spec: TissueSpec) -> Result<Tissue, SceneErr
         })
 }
 
-/// What the scene gives, with the words in which it says where from.
+/// The values that the scene gives, and its text about their source.
 struct Sources<'a> {
     at: &'a Site<'a>,
     source: &'a str,
@@ -96,7 +96,7 @@ fn inline(at: &Site<'_>, table: TissueTable) -> Result<Tissue, SceneError> {
     })
 }
 
-/// Bars of one stiffness take nothing else.
+/// Refuses other keys beside `spring`.
 fn check_spring(at: &Site<'_>, table: &TissueTable) -> Result<(), SceneError> {
     if table.numbers.get("young").is_some() {
         return Err(at
@@ -154,7 +154,7 @@ fn relaxation(at: &Site<'_>, prony: &PronyTable, source: &str) -> Result<Prony, 
         })
         .collect::<Result<Vec<_>, _>>()?;
     let sum: f64 = terms.iter().map(|term| term.g).sum();
-    // Decimal shares that add up to the bound may miss it by rounding.
+    // The sum of decimal numbers may miss the limit by rounding.
     if sum > limits::PRONY_SUM + 1e-9 {
         return Err(at.invalid(format!(
             "the shares `g` add up to {sum:.4}, and some stiffness must be left in the end; make them {} at most together",

@@ -1,4 +1,4 @@
-//! The device and the hand's motion as a scene file writes them.
+//! From the device and the hand's motion back to their tables.
 
 use super::direction;
 use crate::file::{DeviceTable, MotionTable};

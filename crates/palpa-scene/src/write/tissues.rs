@@ -1,15 +1,15 @@
-//! Tissues back to their names or tables.
+//! From tissues back to their names or tables.
 
 use crate::file::{OgdenTable, PronyTable, PronyTermTable, TissueSpec, TissueTable};
 use crate::units::{Density, Pressure, SpringConstant, Time};
 use crate::{Elastic, Law, OgdenTerm, Prony, PronyTerm, Tissue, Volume, catalogue};
 
-/// How tissues of the catalogue are written.
+/// How to write tissues of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Names {
     /// By their names.
     OfCatalogue,
-    /// In full, as any other.
+    /// In full, like any other tissue.
     None,
 }
 
@@ -33,7 +33,8 @@ pub(super) fn tissue(tissue: &Tissue, names: Names) -> TissueSpec {
 }
 
 fn elastic(law: &Elastic, table: &mut TissueTable) {
-    // A number that has a default and not the stiffness's own status is that default, and stays so.
+    // A number with a default whose status differs from that of the stiffness is the default
+    // itself. It is left out.
     let status = law.energy.given().status;
     table.law = Some(law.energy.law());
     for (spec, number) in law.numbers().given() {

@@ -1,4 +1,4 @@
-//! Tools and lumps back to their tables.
+//! From tools and lumps back to their tables.
 
 use super::{Names, direction, point, relative, tissue, vertex};
 use crate::file::{LumpShapeName, LumpTable, ToolTable};

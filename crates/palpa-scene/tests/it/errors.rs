@@ -298,12 +298,24 @@ fn what_a_law_does_not_take() {
     insta::assert_snapshot!(said);
 }
 
+/// The refusals of a scene with one more table each.
+fn refusals_of(tables: &[(&str, String)]) -> String {
+    let mut said = String::new();
+    for (table, keys) in tables {
+        let text = format!(
+            "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{table}\n{keys}"
+        );
+        let keys = keys.replace('\n', "; ");
+        writeln!(said, "{table} {keys}\n    {}", refusal(&text)).unwrap();
+    }
+    said
+}
+
 #[test]
-fn wrong_lumps_and_tools() {
+fn wrong_lumps() {
     let tissue = "tissue = \"fibrous lump\"";
     let good = format!("{tissue}\nradius = \"6 mm\"\ndepth = \"9 mm\"");
-    let mut said = String::new();
-    for (table, keys) in [
+    let mut said = refusals_of(&[
         ("[[lump]]", "radius = \"6 mm\"\ndepth = \"9 mm\"".to_owned()),
         ("[[lump]]", tissue.to_owned()),
         ("[[lump]]", format!("{tissue}\nradius = \"6 mm\"")),
@@ -352,65 +364,38 @@ fn wrong_lumps_and_tools() {
         ),
         ("[[lump]]", format!("{good}\ntransition = \"13 mm\"")),
         ("[[lump]]", format!("{good}\ntransition = \"-1 mm\"")),
-        ("[tool]", "shape = \"needle\"".to_owned()),
-        ("[tool]", "friction = 0.3".to_owned()),
-        ("[tool]", "shape = \"sphere\"\nfriction = -0.3".to_owned()),
-        ("[tool]", "shape = \"sphere\"\nfriction = 6".to_owned()),
-        ("[tool]", "shape = \"sphere\"\nlength = \"6 mm\"".to_owned()),
-        ("[tool]", "shape = \"sphere\"\naxis = \"x\"".to_owned()),
-        (
-            "[tool]",
-            "shape = \"flat-punch\"\nedge_radius = \"9 mm\"".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"flat-punch\"\nedge_radius = \"0 mm\"".to_owned(),
-        ),
-        ("[tool]", "shape = \"capsule\"\nlength = \"1 m\"".to_owned()),
-        ("[tool]", "shape = \"capsule\"\naxis = [0, 0, 0]".to_owned()),
-        ("[tool]", "shape = \"box\"\nradius = \"6 mm\"".to_owned()),
-        (
-            "[tool]",
-            "shape = \"box\"\nsize = [\"9 mm\", \"0 mm\", \"9 mm\"]".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"box\"\nsize = [\"9 mm\", \"2 mm\", \"9 mm\"]\nedge_radius = \"1.5 mm\""
-                .to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 mm\"]".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 m\", \"9 mm\"]".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"cone\"\nopening_angle = \"170 deg\"".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"cone\"\nradius = \"5 mm\"\ntip_radius = \"6 mm\"".to_owned(),
-        ),
-        (
-            "[tool]",
-            "shape = \"sphere\"\ntip_radius = \"1 mm\"".to_owned(),
-        ),
-    ] {
-        let text = format!(
-            "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{table}\n{keys}"
-        );
-        let keys = keys.replace('\n', "; ");
-        writeln!(said, "{table} {keys}\n    {}", refusal(&text)).unwrap();
-    }
+    ]);
     let many = format!(
         "[body]\nsurface = \"s.ply\"\n[[layer]]\nthickness = \"9 mm\"\ntissue = \"fat\"\n{}",
         format!("[[lump]]\n{good}\n").repeat(65)
     );
     writeln!(said, "65 lumps\n    {}", refusal(&many)).unwrap();
     insta::assert_snapshot!(said);
+}
+
+#[test]
+fn wrong_tools() {
+    let tools = [
+        "shape = \"needle\"",
+        "friction = 0.3",
+        "shape = \"sphere\"\nfriction = -0.3",
+        "shape = \"sphere\"\nfriction = 6",
+        "shape = \"sphere\"\nlength = \"6 mm\"",
+        "shape = \"sphere\"\naxis = \"x\"",
+        "shape = \"flat-punch\"\nedge_radius = \"9 mm\"",
+        "shape = \"flat-punch\"\nedge_radius = \"0 mm\"",
+        "shape = \"capsule\"\nlength = \"1 m\"",
+        "shape = \"capsule\"\naxis = [0, 0, 0]",
+        "shape = \"box\"\nradius = \"6 mm\"",
+        "shape = \"box\"\nsize = [\"9 mm\", \"0 mm\", \"9 mm\"]",
+        "shape = \"box\"\nsize = [\"9 mm\", \"2 mm\", \"9 mm\"]\nedge_radius = \"1.5 mm\"",
+        "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 mm\"]",
+        "shape = \"fingertip\"\nradii = [\"9 mm\", \"9 m\", \"9 mm\"]",
+        "shape = \"cone\"\nopening_angle = \"170 deg\"",
+        "shape = \"cone\"\nradius = \"5 mm\"\ntip_radius = \"6 mm\"",
+        "shape = \"sphere\"\ntip_radius = \"1 mm\"",
+    ];
+    insta::assert_snapshot!(refusals_of(&tools.map(|keys| ("[tool]", keys.to_owned()))));
 }
 
 #[test]

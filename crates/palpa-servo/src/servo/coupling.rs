@@ -1,29 +1,30 @@
-//! The coupling: a spring between device and tool where the tissue is stiffer than the device
-//! renders stably.
+//! The coupling: a spring between device and tool, used where the tissue is stiffer than the device
+//! can render stably.
 
 use crate::solver::ToolLoad;
 use crate::{DeviceSpec, Mat3, ToolContact};
 
-/// Stiffness against a tool over the one that the work of its contact forces gives: 1.2 for a
-/// sphere (Hertz).
+/// Ratio of the stiffness against a tool to the stiffness estimated from the work of its contact
+/// forces: 1.2 for a sphere (Hertz).
 const SHAPE: f64 = 1.2;
-/// Below this force the stiffness is unknown, N.
+/// Smallest force from which the stiffness is estimated, N.
 const MIN_LOAD: f64 = 1e-3;
-/// Time in which the coupling softens, s, and in which it stiffens, which gives energy out.
+/// Time in which the coupling softens, s.
 const SOFTEN: f64 = 5e-3;
+/// Time in which the coupling stiffens, s. Longer, because stiffening gives energy out.
 const STIFFEN: f64 = 0.1;
 
 /// The coupling of one tool.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coupling {
-    /// m/N; 0 where the tissue's own stiffness is rendered.
+    /// Compliance of the spring, m/N; 0 if the tissue's own stiffness is rendered.
     pub(super) compliance: f64,
     /// Stiffness of the tissue against the tool, N/m; 0 without contact.
     pub(super) stiffness: f64,
     /// Present estimate of [`SHAPE`], 1 to 2.
     shape: f64,
-    /// Compliance of the tissue nearest to the tool, m/N: the coupling is made ready for it before
-    /// anything is touched.
+    /// Compliance of the tissue nearest to the tool, m/N. The coupling adapts to it before the tool
+    /// touches anything.
     pub(super) ahead: Option<f64>,
 }
 
@@ -35,8 +36,8 @@ impl Coupling {
         ahead: None,
     };
 
-    /// Compares the stiffness that the tissue sent with the one that its forces give, for
-    /// [`Coupling::shape`].
+    /// Updates [`Coupling::shape`] from the stiffness that the tissue sent and the stiffness
+    /// estimated from its forces.
     pub(super) fn calibrate(&mut self, contact: Option<&ToolContact>, load: &ToolLoad) {
         let force_sq = load.force.norm_squared();
         let (Some(contact), true) = (contact, force_sq > MIN_LOAD * MIN_LOAD && load.work > 0.0)
@@ -52,7 +53,8 @@ impl Coupling {
         self.shape += 0.2 * (shape - self.shape);
     }
 
-    /// Puts stiffness beyond what the device renders into the spring.
+    /// Adapts the spring so that device and tool together are no stiffer than the device can
+    /// render.
     pub(super) fn update(&mut self, load: &ToolLoad, spec: Option<&DeviceSpec>, dt: f64) {
         let force_sq = load.force.norm_squared();
         let wanted = match spec {
@@ -61,7 +63,8 @@ impl Coupling {
                     self.stiffness = (self.shape * force_sq / load.work).min(1e9);
                     (1.0 / spec.max_stiffness - 1.0 / self.stiffness).max(0.0)
                 } else {
-                    // Else the first touch of something hard would be felt at its full stiffness.
+                    // Without this, the first touch of something hard would be felt at its full
+                    // stiffness.
                     self.stiffness = 0.0;
                     let ahead = self.ahead.unwrap_or(f64::INFINITY).max(0.0);
                     (1.0 / spec.max_stiffness - ahead).max(0.0)

@@ -1,11 +1,11 @@
-//! The limits of the device: size and slew of what is commanded.
+//! The limits of the device: size and slew rate of the commanded force and moment.
 
 use crate::{DeviceSpec, ForceCommand, Limits, Vec3};
 
-/// Forces below this are cut to zero where they decay, N: far below what any device resolves.
+/// Decaying forces below this are set to zero, N; far below the resolution of any device.
 const FORCE_DUST: f64 = 1e-6;
 
-/// Limits of a device that is not there.
+/// Limits used where there is no device.
 pub(super) const NO_DEVICE: DeviceSpec = DeviceSpec {
     max_force: 0.0,
     max_torque: 0.0,
@@ -14,7 +14,7 @@ pub(super) const NO_DEVICE: DeviceSpec = DeviceSpec {
     max_damping: 0.0,
 };
 
-/// Limits that are no positive numbers become zero.
+/// The limits, with every value that is not a positive number set to zero.
 pub(super) fn checked_spec(spec: &DeviceSpec) -> DeviceSpec {
     let positive = |x: f64| if x > 0.0 && x < 1e9 { x } else { 0.0 };
     DeviceSpec {
@@ -26,8 +26,8 @@ pub(super) fn checked_spec(spec: &DeviceSpec) -> DeviceSpec {
     }
 }
 
-/// The command nearest to `wanted` that the device allows `dt` seconds after the `last` one, and
-/// the limits that it met.
+/// The command nearest to `wanted` that the device allows `dt` seconds after `last`, and the limits
+/// that were met.
 pub(super) fn limited(
     wanted: &ForceCommand,
     last: &ForceCommand,
@@ -40,7 +40,7 @@ pub(super) fn limited(
     if force != wanted.force {
         limits |= Limits::FORCE;
     }
-    // A device without moments leaves them out; that is no limit met.
+    // A device without moments drops the moment; this does not count as a limit.
     if torque != wanted.torque && spec.max_torque > 0.0 {
         limits |= Limits::TORQUE;
     }
@@ -60,8 +60,8 @@ pub(super) fn limited(
         force: without_dust(last.force + by_slewed),
         torque: without_dust(last.torque + by_torque),
     };
-    // Two finite forces within the limits make one within them; this is for rounding and for
-    // oversights.
+    // The step between two forces within the limits stays within them. This second check catches
+    // rounding and programming errors.
     let command = ForceCommand {
         force: shortened(&next.force, spec.max_force),
         torque: shortened(&next.torque, spec.max_torque),
@@ -69,7 +69,7 @@ pub(super) fn limited(
     (command, limits)
 }
 
-/// The vector, or the one of that length in its direction; zero for one that is not finite.
+/// The vector, shortened to `length` if it is longer; zero if it is not finite.
 pub(super) fn shortened(v: &Vec3, length: f64) -> Vec3 {
     let norm = v.norm();
     if norm <= length {

@@ -1,11 +1,11 @@
-//! Patches come in: which are usable, how one takes over from another without a jump, and when one
-//! is stale.
+//! Arrival of patches: which are usable, how a new patch takes over without a jump, and when a
+//! patch is stale.
 
 use super::Servo;
 use crate::solver::ToolLoad;
 use crate::{ContactPatch, Faults, Limits, MAX_CONTACTS, MAX_TOOLS, TickReport, Vec3};
 
-/// A patch with larger values than these is no contact, m and m/N and N.
+/// Largest plausible values of a patch, m, m/N and N; a patch with larger values is not usable.
 const MAX_LENGTH: f64 = 1e3;
 const MAX_COMPLIANCE: f64 = 1e2;
 const MAX_LOAD: f64 = 1e4;
@@ -13,12 +13,12 @@ const MAX_LOAD: f64 = 1e4;
 /// The patch that forces come from.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum PatchUse {
-    /// There is none, or it cannot be used: tools are free.
+    /// There is no patch, or it cannot be used. The tools move freely.
     Unusable,
     Used {
-        /// s, on the loop's clock
+        /// Time of arrival on the loop's clock, s.
         arrived_at: f64,
-        /// Time to the next patch, s: as the tissue declares it or as it was measured.
+        /// Time to the next patch, s: declared by the tissue or measured.
         period: f64,
     },
 }
@@ -28,7 +28,7 @@ impl PatchUse {
         matches!(self, Self::Used { .. })
     }
 
-    /// What a patch that arrives at `now`, s, makes of it, in a loop with this period, s.
+    /// The state after `patch` arrives at `now`, s, in a loop with the period `loop_period`, s.
     fn followed_by(self, patch: &ContactPatch, now: f64, loop_period: f64) -> Self {
         if !is_usable(patch) {
             return Self::Unusable;
@@ -50,7 +50,8 @@ impl PatchUse {
 }
 
 impl Servo {
-    /// Takes a new patch over without a jump: its difference at the same poses is bridged.
+    /// Takes over a new patch without a jump: the transfer bridges the difference in force at the
+    /// same poses.
     pub(super) fn change_patch(
         &mut self,
         now: f64,
@@ -110,15 +111,15 @@ impl Servo {
         };
         report.patch_age = now - sampled;
         let limit = (self.params.stale_periods * period).max(self.params.stale_after);
-        // By its arrival too: a patch that is late on arrival is no use, but its coming shows that
-        // the tissue lives.
+        // The age counts from the arrival too: a patch may be old when it arrives, but its arrival
+        // shows that the tissue still runs.
         if now - arrived_at > limit || report.patch_age > 4.0 * limit {
             report.faults |= Faults::STALE_PATCH;
         }
     }
 }
 
-/// Whether a patch holds numbers that can be a contact.
+/// Whether the numbers of a patch are finite and plausible for a contact.
 fn is_usable(patch: &ContactPatch) -> bool {
     if patch.id == 0 || patch.n_contacts > MAX_CONTACTS || patch.n_tools > MAX_TOOLS {
         return false;
@@ -138,7 +139,7 @@ fn is_usable(patch: &ContactPatch) -> bool {
             && c.force.iter().all(|x| x.abs() < MAX_LOAD)
     });
     let used = 3 * patch.n_contacts;
-    // Not `all`, which would stop the vector unit at every entry.
+    // Not `all`: its early exit at every entry would prevent vector instructions.
     let compliance_is = (patch.compliance.chunks_exact(ContactPatch::STRIDE))
         .take(used)
         .map(|column| {

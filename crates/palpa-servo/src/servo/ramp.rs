@@ -5,22 +5,22 @@ use crate::{Faults, ServoParams};
 /// Time at zero force without a fault before the force comes back, s.
 const QUIET: f64 = 0.05;
 
-/// The share of the force that is let through, and whether it rises or falls.
+/// The share of the force that passes, and whether it rises or falls.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ramp {
     gain: f64,
     way: Way,
 }
 
-/// What a ramp does. `quiet_for` is the time at zero force without a fault, s.
+/// State of a ramp. `quiet_for` is the time at zero force without a fault, s.
 #[derive(Debug, Clone, Copy)]
 enum Way {
-    /// The share rises to one, or is there. The force is this tick's.
+    /// The share rises to one or is one. The force is this tick's.
     Up,
-    /// Only the patch is old. The share falls to zero, but the force is this tick's: it still lets
-    /// go of a hand that draws back.
+    /// The only fault is a stale patch. The share falls to zero, but the force is this tick's, so
+    /// it still falls when the hand draws back.
     DownLive { quiet_for: f64 },
-    /// There was another fault. The share falls to zero, of the last good force.
+    /// There was another fault. The share of the last good force falls to zero.
     DownHeld { quiet_for: f64 },
 }
 
@@ -32,7 +32,7 @@ impl Ramp {
         }
     }
 
-    /// The share, 0 to 1, as it moves: along a straight line.
+    /// The share, 0 to 1; linear in time.
     pub(super) fn gain(&self) -> f64 {
         self.gain
     }
@@ -42,12 +42,12 @@ impl Ramp {
         self.gain * self.gain * (3.0 - 2.0 * self.gain)
     }
 
-    /// Whether the last good force is let through rather than this tick's.
+    /// Whether the last good force passes instead of this tick's.
     pub(super) fn is_held(&self) -> bool {
         matches!(self.way, Way::DownHeld { .. })
     }
 
-    /// Moves on by `dt`, s. Returns whether the force begins to come back in this tick.
+    /// Advances by `dt`, s. Returns whether the force begins to return in this tick.
     pub(super) fn update(&mut self, faults: Faults, dt: f64, params: &ServoParams) -> bool {
         if !faults.is_empty() {
             self.way = if self.is_held() || faults != Faults::STALE_PATCH {

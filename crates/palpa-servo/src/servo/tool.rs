@@ -9,10 +9,10 @@ use crate::hand::HandPiece;
 use crate::solver::ToolLoad;
 use crate::{DeviceSpec, ForceCommand, Limits, ServoParams, ToolContact, ToolReport, Vec3};
 
-/// All that belongs to one tool.
+/// The state of one tool.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tool {
-    /// Limits of its device; `None` for a tool that nobody holds.
+    /// Limits of its device; `None` for a tool without a device.
     pub(super) spec: Option<DeviceSpec>,
     pub(super) hand: HandPiece,
     pub(super) energy: Energy,
@@ -47,13 +47,14 @@ impl Tool {
         0.5 * (load.work + self.coupling.compliance * load.force.norm_squared())
     }
 
-    /// A new patch stores another energy at the same pose; that is no work.
+    /// Resets the stored energy after a new patch: it stores a different energy at the same pose,
+    /// and this difference is not work.
     pub(super) fn restart_store(&mut self, load: &ToolLoad) {
         self.stored = self.stored_by(load);
     }
 
-    /// Counts the energy of the tick that ended. While the force ramps, work says nothing of the
-    /// tissue.
+    /// Counts the energy of the tick that ended. While the force ramps, the work says nothing about
+    /// the tissue.
     pub(super) fn count_energy(
         &mut self,
         load: &ToolLoad,
@@ -77,7 +78,7 @@ impl Tool {
         }
     }
 
-    /// From the tissue's force to the command, through ramp, damping and limits.
+    /// Turns the tissue's force into the command, through ramp, damping and limits.
     pub(super) fn render(
         &mut self,
         load: &ToolLoad,

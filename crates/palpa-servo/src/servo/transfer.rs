@@ -5,12 +5,12 @@ use super::limits::{shortened, without_dust};
 use crate::solver::ToolLoad;
 use crate::{DeviceSpec, ForceCommand};
 
-/// The difference of one tool that still fades.
+/// The remaining difference of one tool.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Transfer {
-    /// Part of the force, N and N m.
+    /// The difference that is added to the force of the new patch, N and N m.
     pub(super) force: ForceCommand,
-    /// Time in which it fades, s.
+    /// Time left to fade, s.
     left: f64,
 }
 
@@ -20,8 +20,8 @@ impl Transfer {
         left: 0.0,
     };
 
-    /// Adds the difference from the old to the new patch, cut to the share `most` of the device's
-    /// limits, to fade in `time`, s. Returns whether the force was cut.
+    /// Adds the difference between the old and the new patch; it fades within `time`, s. The sum is
+    /// cut to the share `most` of the device's limits. Returns whether the force was cut.
     pub(super) fn bridge(
         &mut self,
         old: &ToolLoad,
@@ -41,7 +41,7 @@ impl Transfer {
         force.norm() > max_force
     }
 
-    /// Moves on by `dt`, s, along a straight line to zero in the time that is left.
+    /// Advances by `dt`, s: the difference falls linearly to zero in the time that is left.
     pub(super) fn fade(&mut self, dt: f64) {
         let share = if self.left > dt {
             1.0 - dt / self.left

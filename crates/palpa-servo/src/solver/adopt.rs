@@ -1,4 +1,4 @@
-//! A new patch: forces and anchors go on where a vertex is known.
+//! Taking over a new patch: vertices of the previous patch keep their forces and anchors.
 
 use super::{ContactSolver, add_columns, tool_of};
 use crate::{Candidate, ContactPatch, MAX_CONTACTS, Vec3};
@@ -24,7 +24,7 @@ impl Key {
     }
 }
 
-/// A contact of the patch before.
+/// A contact of the previous patch.
 #[derive(Debug, Clone, Copy)]
 struct Known {
     key: Key,
@@ -33,8 +33,8 @@ struct Known {
 }
 
 impl ContactSolver {
-    /// Takes a patch over. Vertices of the patch before keep their forces and anchors; the others
-    /// have the new patch's.
+    /// Takes over a patch. Vertices of the previous patch keep their forces and anchors; the others
+    /// start with those of the new patch.
     pub(crate) fn adopt(&mut self, patch: &ContactPatch) {
         self.carry_over(patch);
         for (i, own) in self.own.iter_mut().enumerate().take(self.n) {
@@ -73,8 +73,8 @@ impl ContactSolver {
             .enumerate()
         {
             let is_bonded = tool_of(patch, candidate.tool).is_some_and(|tool| tool.is_bonded);
-            // The order is mostly the same from patch to patch: the search starts at the same
-            // place.
+            // The order mostly stays the same from patch to patch, so the search starts at the same
+            // index.
             let (before, after) = known.split_at(i.min(known.len()));
             let found = after
                 .iter()
@@ -91,7 +91,7 @@ impl ContactSolver {
         }
     }
 
-    /// Positions without forces, and with those that were carried over.
+    /// Computes the positions without forces, and those with the forces that were carried over.
     fn place_vertices(&mut self, patch: &ContactPatch) {
         for (free, candidate) in self.free.chunks_exact_mut(3).zip(&patch.contacts) {
             free.copy_from_slice(candidate.position.as_slice());

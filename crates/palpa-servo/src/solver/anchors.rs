@@ -1,4 +1,4 @@
-//! Friction's memory: the anchors.
+//! The friction anchors.
 
 use super::{ContactSolver, tool_of, vec3};
 use crate::{ContactPatch, MAX_CONTACTS, MAX_TOOLS, Pose, Vec3};
@@ -30,7 +30,7 @@ impl ContactSolver {
         }
     }
 
-    /// Moves all anchors to where their vertices are now: friction holds nothing back any more.
+    /// Moves all anchors to where their vertices are now, so that friction starts from zero.
     pub(crate) fn release_anchors(&mut self, patch: &ContactPatch, poses: &[Pose; MAX_TOOLS]) {
         self.is_sliding = [true; MAX_CONTACTS];
         self.move_anchors(patch, poses);

@@ -3,17 +3,17 @@
 use super::{ContactSolver, add_columns, vec3};
 use crate::{ContactPatch, MAX_TOOLS, Vec3};
 
-/// Contact forces below this do not matter, N: a change of their sum by it ends the sweeps.
+/// Change of the forces that does not matter, N: the sweeps end below it.
 const CHANGE_DUST: f64 = 1e-7;
-/// Weight of the changes of single contacts beside those of the tools' forces. The tools' forces
-/// are what a hand feels; contacts settle last where vertices are dense.
+/// Weight of the changes of single contacts, relative to the changes of the tools' forces. A hand
+/// feels the tools' forces only; single contacts settle last where vertices are dense.
 const CONTACT_SHARE: f64 = 0.1;
 
 /// Effort and quality of a solution.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Solution {
     pub(crate) sweeps: u32,
-    /// Change of the forces in the last sweep as a share of their sum.
+    /// Change of the forces in the last sweep, as a share of their sum.
     pub(crate) residual: f64,
     /// Contacts with a force.
     pub(crate) n_active: u32,
@@ -23,7 +23,7 @@ pub(crate) struct Solution {
 
 /// The effect of one sweep.
 struct Sweep {
-    /// Change of the tools' forces, with a share of that of the contacts, N.
+    /// Change of the tools' forces, plus a share of the change of the contacts' forces, N.
     change: f64,
     /// Sum of the squares of the contacts' changes, N².
     change_sq: f64,
@@ -52,7 +52,7 @@ impl ContactSolver {
             } = self.sweep(patch, couplings);
             solution.sweeps += 1;
             solution.residual = change / sum.max(CHANGE_DUST);
-            // A NaN ends it too.
+            // A NaN ends the sweeps too.
             if change.is_nan() || change <= tolerance * sum + CHANGE_DUST || k + 1 == allowed {
                 break;
             }
@@ -62,14 +62,15 @@ impl ContactSolver {
                 0.0
             };
             last_sq = change_sq;
-            // Sweeps that grow again have met another set of contacts: the directions begin anew.
+            // If the change grows again, the set of active contacts has changed, so the directions
+            // are reset.
             let beta = if beta > 1.0 { 0.0 } else { beta };
             self.go_on(beta);
             self.update_stretch(patch, couplings);
         }
     }
 
-    /// A step along the conjugate direction, with the share `beta` of the last one.
+    /// Steps along the conjugate direction; `beta` is the share of the previous direction in it.
     #[inline]
     fn go_on(&mut self, beta: f64) {
         let used = 3 * self.n;

@@ -1,4 +1,4 @@
-//! The hand's way to its goal, at the speeds of a person's hand.
+//! The hand's path to its goal, at the speeds of a person's hand.
 //!
 //! ```text
 //!          travel, over the skin or round the body
@@ -16,23 +16,23 @@ use palpa_servo::Pose;
 
 use super::skin::{Place, Skin};
 
-/// How high the tip hovers over the skin, m.
+/// Height of the tip above the skin while it hovers, m.
 pub(crate) const HOVER: f64 = 6e-3;
 /// Speeds, m/s: down and up, along the skin while pressing, and in the air.
 const PRESS_SPEED: f64 = 0.04;
 const STROKE_SPEED: f64 = 0.06;
 const AIR_SPEED: f64 = 0.35;
-/// The hand lifts and travels through the air to places further away than this, m.
+/// Distance above which the hand lifts and travels through the air to a place, m.
 const STRIDE: f64 = 15e-3;
-/// Shortest and longest wait over a new place, s, while the mesh is refined there.
+/// Shortest and longest wait over a new place, s. The mesh is refined there meanwhile.
 const SETTLE: f64 = 0.1;
 const LONGEST_SETTLE: f64 = 4.0;
-/// The hand presses a place within this share of the radius of the fine part of the mesh.
+/// The hand presses a place only within this share of the radius of the mesh's fine part.
 const FINE: f64 = 0.5;
-/// Distance between skin and tool on the way round the body, m; the tool's size is added.
+/// Distance between skin and tool on the path around the body, m; the tool's size is added.
 const CLEARANCE: f64 = 12e-3;
 
-/// Where the hand shall go.
+/// The goal of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Goal {
     /// The place on the skin.
@@ -41,14 +41,14 @@ pub(crate) struct Goal {
     pub(crate) depth: f64,
 }
 
-/// The hand's state on its way.
+/// The hand's state on its path.
 #[derive(Debug, Clone, PartialEq)]
 enum Doing {
     /// At the place, over the skin or pressing.
     There,
-    /// Travelling through the air; the points still ahead, the next one last.
+    /// Travelling through the air, with the remaining points; the next one is last.
     Travel(Vec<Vec3>),
-    /// Waiting over a new place; time waited so far, s.
+    /// Waiting over a new place, with the time waited so far, s.
     Settling(f64),
 }
 
@@ -63,7 +63,7 @@ pub(crate) struct HandDriver {
     goal: Option<Goal>,
     /// Preferred direction of the tool's x axis.
     along: Vec3,
-    /// Size of the tool, m; kept clear of the skin on the way round the body.
+    /// Size of the tool, m; this much more distance is kept on the path around the body.
     tool_size: f64,
 }
 
@@ -109,14 +109,14 @@ impl HandDriver {
         matches!(self.doing, Doing::Travel(_))
     }
 
-    /// Whether the hand hovers at rest.
+    /// Whether the hand hovers without moving.
     pub(crate) fn is_lifted(&self) -> bool {
         self.doing == Doing::There && self.depth <= -HOVER
     }
 
-    /// Moves the hand on by `dt` seconds. Returns the commanded pose of the tool in the scene's
-    /// frame. `fine` is the fine part of the mesh (centre and radius, m) where it moves with the
-    /// hand: the hand waits over a new place until the mesh is fine there.
+    /// Moves the hand by `dt` seconds. Returns the commanded pose of the tool in the scene's frame.
+    /// `fine` is the fine part of the mesh (centre and radius, m) if it moves with the hand: the
+    /// hand then waits over a new place until the mesh is fine there.
     pub(crate) fn advance(&mut self, skin: &Skin, fine: Option<(Vec3, f64)>, dt: f64) -> Pose {
         match &mut self.doing {
             Doing::Travel(points) => {
@@ -180,8 +180,8 @@ impl HandDriver {
         }
         let ahead = self.place.point + off * (way / off.norm());
         if let Some(mut place) = skin.nearest(ahead) {
-            // The normal turns towards that of the goal at the pace of the way: no jump where
-            // triangles meet.
+            // The normal turns towards the goal's normal at the pace of the movement, so that it
+            // does not jump at edges of triangles.
             let share = way / off.norm();
             let turned = self.place.normal.lerp(&to.normal, share);
             place.normal = turned.try_normalize(1e-6).unwrap_or(to.normal);
@@ -213,7 +213,8 @@ fn is_outside(skin: &Skin, at: Vec3) -> bool {
         .is_none_or(|place| (at - place.point).dot(&place.normal) > 0.0)
 }
 
-/// Points of an arc round the body's long axis, at least `clear` (m) from every vertex of the skin.
+/// Points of an arc around the body's long axis, at least `clear` (m) from every vertex of the
+/// skin.
 fn round_the_body(skin: &Skin, from: Vec3, to: Vec3, clear: f64) -> Vec<Vec3> {
     const POINTS: i32 = 12;
     let axis = Unit::new_normalize(skin.axis);

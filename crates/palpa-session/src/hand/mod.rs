@@ -1,4 +1,4 @@
-//! The hand that holds the tool: who leads it, and where it goes.
+//! The hand that holds the tool: its leader and its goals.
 //!
 //! ```text
 //!          a page says where            the scene's motion is started
@@ -6,7 +6,7 @@
 //!     ▲ silent for 1 s, or lifts │                                over the motion's start
 //!     └──────────────────────────┘
 //! ```
-//! [`skin`] knows the places of the skin, [`driver`] the way from one to the next.
+//! [`skin`] knows the places of the skin, [`driver`] the path between them.
 
 mod driver;
 mod skin;
@@ -28,7 +28,7 @@ pub(crate) use skin::{Place, Skin};
 /// A page that presses sends the hand's place at least this often. After a longer silence the hand
 /// lifts.
 const SILENCE: Duration = Duration::from_secs(1);
-/// The hand goes to the start of the scene's motion first; after this long the motion starts
+/// The hand first goes to the start of the scene's motion; after this time the motion starts
 /// anyway.
 const HOMING: Duration = Duration::from_secs(5);
 /// Distance from the start of the motion at which the hand has arrived, m.
@@ -36,10 +36,10 @@ const ARRIVED: f64 = 1e-4;
 /// Largest coordinate that a page may send, m: no body is larger.
 const FAR: f64 = 100.0;
 
-/// Who leads the hand.
+/// The leader of the hand.
 #[derive(Debug, Default)]
 pub(crate) enum Lead {
-    /// Nobody: it lifts, or is lifted.
+    /// No leader: the hand lifts, or is lifted.
     #[default]
     Nobody,
     /// A page.
@@ -47,14 +47,14 @@ pub(crate) enum Lead {
         /// When the page last sent a place.
         heard: Instant,
     },
-    /// The scene's motion: on the way to its start.
+    /// The scene's motion, while the hand is on its way to the start.
     Homing {
-        /// When the motion was asked for.
+        /// Time of the request.
         since: Instant,
     },
     /// The scene's motion.
     Moving {
-        /// The way of the tip in the device's frame.
+        /// Path of the tip in the device's frame.
         path: Path,
         /// Time along the path, s.
         time: f64,
@@ -90,7 +90,7 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// A hand that moves as `driver` and is led by `lead`.
+    /// A hand that `driver` moves and `lead` leads.
     pub(crate) fn new(driver: HandDriver, lead: Lead) -> Self {
         Self { driver, lead }
     }
@@ -101,14 +101,14 @@ impl Hand {
     /// While the scene's motion runs.
     pub(crate) fn put(&mut self, goal: Goal, now: Instant) -> anyhow::Result<()> {
         if self.lead.is_motion() {
-            bail!("the scene's motion is running; stop it to take the hand");
+            bail!("the motion of the scene is running; stop it before you move the hand");
         }
         self.driver.set_goal(Some(goal));
         self.lead = Lead::Page { heard: now };
         Ok(())
     }
 
-    /// Lifts the tool off the skin. The scene's motion, if it runs, goes on.
+    /// Lifts the tool off the skin. A running motion of the scene goes on.
     pub(crate) fn lift(&mut self) {
         if !self.lead.is_motion() {
             self.lead = Lead::Nobody;
@@ -116,7 +116,7 @@ impl Hand {
         self.driver.set_goal(None);
     }
 
-    /// Starts the scene's motion: first the hand goes over `home`.
+    /// Starts the scene's motion. First the hand goes to a point over `home`.
     pub(crate) fn run_motion(&mut self, home: Place, now: Instant) {
         let goal = Goal {
             place: home,
@@ -150,8 +150,8 @@ impl Hand {
         self.driver.place()
     }
 
-    /// The place from which the depth of a tip counts: the hand's own, or the nearest on the skin
-    /// while the hand travels or the scene's motion leads it.
+    /// The place from which the depth of a tip is measured: the hand's own, or the nearest on the
+    /// skin while the hand travels or the scene's motion leads it.
     pub(crate) fn place_under(&self, tip: Vec3, skin: &Skin, home: Place) -> Place {
         if matches!(self.lead, Lead::Moving { .. }) || self.driver.is_travelling() {
             skin.nearest(tip).unwrap_or(home)
@@ -160,13 +160,12 @@ impl Hand {
         }
     }
 
-    /// The hand that goes on after the engine was started again, and who leads it.
+    /// The leader that continues after a restart of the engine.
     pub(crate) fn into_lead(self) -> Lead {
         self.lead
     }
 
-    /// Moves the hand on by `dt` seconds. Returns the commanded pose of the tool in the scene's
-    /// frame.
+    /// Moves the hand by `dt` seconds. Returns the commanded pose of the tool in the scene's frame.
     pub(crate) fn advance(&mut self, ground: &Ground<'_>, dt: f64, now: Instant) -> Pose {
         let frame = ground.scene_from_device;
         match &mut self.lead {
@@ -203,7 +202,7 @@ impl Hand {
     }
 }
 
-/// The goal that a page asks for: the place of the skin nearest to its point, at most
+/// The goal of a page's request: the place of the skin nearest to its point, at most
 /// `greatest_depth` (m) deep.
 ///
 /// # Errors
@@ -220,7 +219,7 @@ pub(crate) fn goal_of(
     }
     let place = skin.nearest(point).context("there is no skin")?;
     let normal = normal.try_normalize(1e-6).unwrap_or(place.normal);
-    // A normal that points to another side than the skin's own is wrong.
+    // A page's normal far from the skin's own is wrong: use the skin's own.
     let normal = if normal.dot(&place.normal) > 0.5 {
         normal
     } else {
@@ -342,7 +341,7 @@ mod tests {
             depth: 1e-3,
         };
         let refused = bench.hand.put(goal, bench.now).unwrap_err().to_string();
-        assert!(refused.contains("motion is running"), "{refused}");
+        assert!(refused.contains("motion of the scene is running"), "{refused}");
         bench.run(rest + 1.0);
         assert!(!bench.hand.is_in_motion());
         let pose = bench.run(1.0);

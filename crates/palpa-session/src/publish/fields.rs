@@ -16,7 +16,7 @@ pub(super) struct NodeField {
     pub(super) mesh: u64,
     /// Which field.
     pub(super) field: Field,
-    /// Mean of the prisms around each node. `[n_nodes]`
+    /// Mean over the prisms around each node. `[n_nodes]`
     pub(super) values: Vec<f64>,
 }
 
@@ -39,7 +39,7 @@ pub(crate) struct Fields {
     asked: Option<(u64, Field, Arc<[Vec3]>)>,
 }
 
-/// Displacements that differ by less, m, give the same field to the eye.
+/// Displacements that differ by less than this, m, give a field that looks the same.
 const UNSEEN: f64 = 1e-7;
 
 impl Fields {
@@ -71,7 +71,7 @@ impl Fields {
                     if outbox.send(field).is_err() {
                         return;
                     }
-                    // Half of a core at most: tissue and browser need theirs.
+                    // Use at most half of a core: tissue and browser need the rest.
                     thread::sleep(took);
                 }
             })?;
@@ -131,7 +131,7 @@ impl Fields {
     }
 }
 
-/// A field at the nodes: the mean of the prisms that meet there. `[n_nodes]`
+/// A field at the nodes: the mean over the prisms that meet there. `[n_nodes]`
 fn at_nodes(model: &Model, displacements: &[Vec3], field: Field) -> Vec<f64> {
     let body = model.body();
     let value = |prism: &PrismField| match field {

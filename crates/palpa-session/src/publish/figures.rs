@@ -9,7 +9,7 @@ use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeLevel};
 /// Number of events that a page receives.
 const LATEST: usize = 30;
 
-/// Counts at the time of the last figures, and what ticks met since.
+/// Counts at the time of the last figures, and the limits and faults since then.
 #[derive(Debug)]
 pub(crate) struct Figures {
     at: Instant,
@@ -22,7 +22,7 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    /// The counts of an engine that starts.
+    /// The counts of an engine at its start.
     pub(crate) fn new() -> Self {
         Self {
             at: Instant::now(),
@@ -35,7 +35,7 @@ impl Figures {
         }
     }
 
-    /// Notes the limits and faults of a tick.
+    /// Records the limits and faults of a tick.
     pub(crate) fn note(&mut self, entry: &TickEntry) {
         self.limits |= Limits::from_bits(entry.tick.limits as u16);
         self.faults |= Faults::from_bits(entry.tick.faults as u16);

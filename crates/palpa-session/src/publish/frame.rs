@@ -9,7 +9,7 @@ use palpa_viewer::wire::{FrameSnapshot, MeshSnapshot};
 
 use super::fields::NodeField;
 
-/// Smallest unit of displacements, m: nobody sees less.
+/// Smallest unit of displacements, m: smaller ones are not visible.
 const LEAST_UNIT: f64 = 1e-8;
 
 /// The mesh of a body at rest. `stiffness` has a value for each prism, Pa. `[n_prisms]`
@@ -58,7 +58,7 @@ pub(super) fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3
 }
 
 /// Puts a tick of the loop into a frame. `over` is the place of the skin (point, outward normal)
-/// from which depth counts.
+/// from which depth is measured.
 pub(super) fn put_tick(
     frame: &mut FrameSnapshot,
     entry: &TickEntry,
@@ -67,7 +67,8 @@ pub(super) fn put_tick(
 ) {
     let (tick, device) = (&entry.tick, &entry.devices[0]);
     let at = Vec3::from(device.position);
-    // The coupling is isotropic: the tool stands off in the direction of the tissue's push.
+    // The coupling is isotropic: the tool is displaced from the device in the direction of the
+    // tissue's force.
     let push = Vec3::from(device.tissue_force).try_normalize(1e-9);
     let tool = at + push.unwrap_or_default() * device.stretch;
     let place = |p: Vec3| (scene_from_device * Point3::from(p)).coords;

@@ -1,4 +1,4 @@
-//! What pages are sent: the picture (meshes, frames, fields) and the words (state, figures,
+//! The data for pages: the picture (meshes, frames, fields) and the texts (state, figures,
 //! notices).
 //!
 //! ```text

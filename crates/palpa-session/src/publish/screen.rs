@@ -14,7 +14,7 @@ use crate::stage::Live;
 /// An encoded mesh snapshot.
 pub(crate) type MeshBytes = Arc<Vec<u8>>;
 
-/// What pages see.
+/// The picture that pages see.
 pub(crate) struct Screen {
     publisher: Publisher,
     fields: Fields,
@@ -45,7 +45,7 @@ impl Screen {
         }
     }
 
-    /// Whether anyone looks on.
+    /// Whether any page is connected.
     pub(crate) fn is_watched(&self) -> bool {
         self.publisher.n_clients() > 0
     }
@@ -119,7 +119,7 @@ impl Screen {
         Some((&self.frame, &self.mesh))
     }
 
-    /// Makes the body's mesh anew at the next frame.
+    /// Requests a new mesh with the next frame.
     pub(crate) fn renew_mesh(&mut self) {
         self.made_from = None;
     }
@@ -135,7 +135,7 @@ impl Screen {
     }
 }
 
-/// Sends a frame, and before it its mesh if pages have another one.
+/// Sends a frame, and its mesh first if pages have another one.
 fn send(publisher: &Publisher, shown: &mut Option<u32>, frame: &FrameSnapshot, mesh: &MeshBytes) {
     if *shown != Some(frame.mesh) {
         *shown = Some(frame.mesh);

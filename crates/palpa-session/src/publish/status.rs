@@ -1,4 +1,4 @@
-//! The words: the state of the session, its problem, and notices.
+//! The texts: the state of the session, its problem, and notices.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,10 +12,10 @@ use crate::veil::Veil;
 use crate::world::World;
 use crate::{edit, gallery};
 
-/// The parts of the state that change by themselves.
+/// The parts of the state that change without a request.
 #[derive(Debug)]
 pub(crate) struct Told {
-    /// What the engine does.
+    /// Phase of the engine.
     pub(crate) phase: Phase,
     /// Whether the scene's motion runs.
     pub(crate) is_motion_running: bool,
@@ -25,12 +25,12 @@ pub(crate) struct Told {
     pub(crate) game: Option<GameInfo>,
 }
 
-/// The state as pages know it.
+/// The state as last sent to pages.
 pub(crate) struct Status {
     publisher: Publisher,
     state: State,
     is_changed: bool,
-    /// The problem as the server knows it: only while nothing runs.
+    /// The problem as the server sees it: set only while nothing runs.
     problem: Arc<Mutex<Option<String>>>,
 }
 
@@ -53,7 +53,7 @@ impl Status {
         }
     }
 
-    /// Something of the state has changed: it is sent with the next frame.
+    /// Marks the state as changed: it is sent with the next frame.
     pub(crate) fn change(&mut self) {
         self.is_changed = true;
     }
@@ -74,12 +74,12 @@ impl Status {
         self.state.gallery_key.as_deref()
     }
 
-    /// Describes the body that is there.
+    /// Describes the present body in the state.
     pub(crate) fn describe(&mut self, world: &World, key: Option<&str>, veil: Veil<'_>) {
         self.is_changed = true;
         let scene: Scene = veil.scene(&world.scene);
         let state = &mut self.state;
-        // A scene that was read can be written.
+        // A scene that was read can also be written.
         state.scene = edit::to_json(&scene).unwrap_or_default();
         state.gallery_key = key.map(str::to_owned);
         state.layers.clone_from(&world.layers);
@@ -96,14 +96,14 @@ impl Status {
         state.n_nodes = world.n_nodes() as u32;
     }
 
-    /// Tells a problem, which stays until all is well. `is_running` says whether a body is there
-    /// all the same.
+    /// Reports a problem, which stays until [`Self::well`] is called. `is_running` says whether a
+    /// body is running nevertheless.
     pub(crate) fn fail(&mut self, problem: String, is_running: bool) {
         self.notice(NoticeLevel::Error, problem.clone());
         self.set_problem(Some(problem), is_running);
     }
 
-    /// All is well.
+    /// Clears the problem.
     pub(crate) fn well(&mut self) {
         self.set_problem(None, true);
     }
@@ -111,7 +111,7 @@ impl Status {
     fn set_problem(&mut self, problem: Option<String>, is_running: bool) {
         self.is_changed = true;
         self.state.problem.clone_from(&problem);
-        // The session is well as long as something runs.
+        // For the server, the session works as long as a body is running.
         let shown = problem.filter(|_| !is_running);
         *self.problem.lock().unwrap_or_else(PoisonError::into_inner) = shown;
     }

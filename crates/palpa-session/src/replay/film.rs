@@ -10,12 +10,12 @@ use palpa_viewer::wire::FrameSnapshot;
 
 use crate::publish::MeshBytes;
 
-/// Most memory that a film takes, bytes. Past it every other frame is dropped, so that the film
-/// still covers the whole recording.
+/// Largest memory of a film, bytes. Above it, every other frame is dropped, so that the film still
+/// covers the whole recording.
 const MOST_BYTES: usize = 200 << 20;
 
-/// Makes the file for a log: the first free number in `folder`, which is made if need be. Other
-/// sessions may record into the same folder.
+/// Creates the file for a log, with the first free number in `folder`. The folder is created if
+/// necessary. Other sessions may record into the same folder.
 ///
 /// # Errors
 /// When the folder or the file cannot be made.
@@ -30,7 +30,7 @@ pub(crate) fn new_log(folder: &Path) -> anyhow::Result<PathBuf> {
             Err(error) => return Err(error).with_context(advice),
         }
     }
-    bail!("{} is full of recordings", folder.display())
+    bail!("{} has no room for another recording", folder.display())
 }
 
 /// The frames of a recording, with their meshes.
@@ -40,7 +40,7 @@ pub(crate) struct Film {
     frames: Vec<FrameSnapshot>,
     meshes: Vec<(u32, MeshBytes)>,
     bytes: usize,
-    /// One in `every` frames is kept.
+    /// One of `every` frames is kept.
     every: usize,
     n_seen: usize,
 }

@@ -19,7 +19,7 @@ use crate::publish::MeshBytes;
 
 pub(crate) use film::new_log;
 
-/// Longest recording, s: the log of an hour is some gigabytes.
+/// Longest recording, s: the log of one hour has some gigabytes.
 const LONGEST: f64 = 3600.0;
 
 /// The one recording of a session.
@@ -39,14 +39,14 @@ pub(crate) enum Tape {
 /// A place on the film.
 #[derive(Debug, Default)]
 pub(crate) struct Player {
-    /// The moment, s since the beginning.
+    /// Its time, s since the start of the recording.
     at: f64,
-    /// Whether it moves on by itself.
+    /// Whether it plays by itself.
     is_playing: bool,
 }
 
 impl Tape {
-    /// Begins a recording whose log is at `log`. The one before is forgotten.
+    /// Begins a recording whose log is at `log`. The previous recording is dropped.
     pub(crate) fn begin(&mut self, log: PathBuf) {
         *self = Self::UnderWay(Film::new(log));
     }
@@ -56,8 +56,8 @@ impl Tape {
         matches!(self, Self::UnderWay(_))
     }
 
-    /// Whether the recording under way has lasted as long as one may; `now` is the engine's clock,
-    /// s.
+    /// Whether the recording under way has reached the maximum duration; `now` is the engine's
+    /// clock, s.
     pub(crate) fn is_full(&self, now: f64) -> bool {
         self.is_under_way() && now > LONGEST
     }
@@ -117,7 +117,7 @@ impl Tape {
         };
     }
 
-    /// Goes to a moment, s since the beginning.
+    /// Goes to a moment, s since the start of the recording.
     ///
     /// # Errors
     /// When there is no recording, or the time is not a number.
@@ -130,7 +130,7 @@ impl Tape {
         Ok(())
     }
 
-    /// Lets the replay move on by itself, from the beginning if it stands at the end; or stops it.
+    /// Plays the replay, from the start if it is at the end; or pauses it.
     ///
     /// # Errors
     /// When there is no recording.
@@ -151,7 +151,7 @@ impl Tape {
         .context("there is no recording to be shown; make one first")
     }
 
-    /// Moves a replay on by `dt` seconds. Returns whether it has come to its end.
+    /// Moves a replay on by `dt` seconds. Returns whether it has just reached its end.
     pub(crate) fn advance(&mut self, dt: f64) -> bool {
         let Ok((film, player)) = self.over() else {
             return false;
@@ -168,7 +168,7 @@ impl Tape {
         true
     }
 
-    /// The frame that pages see instead of the body's, and its mesh, while the recording is shown.
+    /// While the recording is shown, its present frame and mesh.
     pub(crate) fn shown(&self) -> Option<(&FrameSnapshot, &MeshBytes)> {
         match self {
             Self::Shown(film, player) => film.at(player.at),

@@ -11,10 +11,10 @@ use crate::hand::{HandDriver, Place};
 
 /// Time between two looks at the body, s: the period of a screen.
 const LOOK_PERIOD: f64 = 1.0 / 60.0;
-/// Least time between two steps of the tissue, s: the browser needs the processor as well.
+/// Least time between two steps of the tissue, s, because the browser needs the processor too.
 const STEP_PERIOD: f64 = 2e-3;
-/// Wish of the threads that make the force. A browser without a graphics card takes every core it
-/// gets; the force comes first, where the system grants it.
+/// Requested priority of the threads that compute the force. A browser without a graphics card
+/// takes every core it gets; the force has priority if the system grants it.
 pub(crate) const BEFORE_THE_BROWSER: Wish = Wish {
     priority: Priority::Nice(-10),
     core: None,
@@ -41,7 +41,8 @@ impl World {
     /// Starts the engine on the body at rest, with the tool's tip at `tip` (scene's frame, m).
     ///
     /// # Errors
-    /// When the device cannot be opened, the body not be factored, or the system gives no thread.
+    /// When the device cannot be opened, the body cannot be factored, or the system gives no
+    /// thread.
     pub(crate) fn start(&self, tip: Vec3, recorder: &RecorderParams) -> anyhow::Result<Running> {
         let in_device = self
             .scene_from_device

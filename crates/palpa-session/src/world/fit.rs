@@ -1,18 +1,18 @@
-//! Fits a scene for touch: a tool that presses by contact, and a mesh that is fine where the hand
+//! Adapts a scene for touch: a tool that presses by contact, and a mesh that is fine where the hand
 //! goes.
 
 use palpa::Note;
 use palpa_scene::{ContactShape, ContactTool, ModelKind, Scene, Tool};
 
-/// Shortest edge under the tool where the scene gives none, m: the engine keeps pace with a hand at
-/// this many nodes.
+/// Least edge length under the tool if the scene gives none, m. With finer meshes the engine would
+/// not keep pace with a hand.
 const LEAST_EDGE: f64 = 3e-3;
-/// Edge length in lumps where the scene gives none, m.
+/// Edge length in lumps if the scene gives none, m.
 const NEAR_LUMPS: f64 = 6e-3;
 /// Radius of the sphere that replaces a single held node, m.
 const LEAST_TOOL: f64 = 5e-3;
 
-/// The scene made fit for touch. `notes` receives each change that a user should know.
+/// The scene adapted for touch. `notes` receives each change that a user should know of.
 pub(super) fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
     let mut scene = scene.clone();
     if scene.model.kind == ModelKind::Reference {

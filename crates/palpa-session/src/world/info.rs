@@ -8,7 +8,7 @@ use palpa_viewer::control::{LayerInfo, LumpForm, LumpInfo, ToolInfo};
 use super::World;
 
 impl World {
-    /// Largest extent of the tool from its axis, m.
+    /// Largest distance of the tool's surface from its axis, m.
     pub(crate) fn tool_size(&self) -> f64 {
         self.tool.shape.map_or(0.0, |shape| shape.half_width())
     }

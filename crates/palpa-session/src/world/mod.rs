@@ -1,7 +1,7 @@
 //! A world: a scene with its body built, ready to be pressed and shown.
 //!
-//! [`fit`] makes a scene fit for touch before its body is built, [`info`] describes the world to a
-//! page, [`engine`] starts the engine on it.
+//! [`fit`] adapts a scene for touch before its body is built, [`info`] describes the world to a
+//! page, and [`engine`] starts the engine on it.
 
 mod engine;
 mod fit;
@@ -34,9 +34,9 @@ const DEEPEST: f64 = 1.6;
 /// A scene with its body built.
 #[derive(Debug)]
 pub(crate) struct World {
-    /// The scene, fit for touch.
+    /// The scene, adapted for touch.
     pub(crate) scene: Scene,
-    /// The method by which the body answers.
+    /// The model of the body.
     pub(crate) method: Method,
     /// The skin at rest.
     pub(crate) skin: Skin,
@@ -70,7 +70,7 @@ impl World {
     /// Builds the scene's body.
     ///
     /// # Errors
-    /// When the scene does not fit together or is not fit for real time.
+    /// When the scene is not consistent, or not suitable for real time.
     pub(crate) fn build(scene: &Scene) -> anyhow::Result<Self> {
         let mut notes = Vec::new();
         let scene = fit_for_touch(scene, &mut notes);
@@ -98,7 +98,7 @@ impl World {
         Self::around(scene, &built, frame, notes, Kind::Springs(springs))
     }
 
-    /// The world without its lumps.
+    /// Builds the world except for its lumps.
     fn around(
         scene: Scene,
         built: &BuiltBody,
@@ -145,7 +145,7 @@ impl World {
         }
     }
 
-    /// The lumps as the mechanics has them, in the order of `lumps`.
+    /// The lumps as the model has them, in the order of `lumps`.
     pub(crate) fn placed(&self) -> &[PlacedLump] {
         match &self.kind {
             Kind::Tissue(live) => live.prepared.lumps(),
@@ -169,7 +169,7 @@ impl World {
         }
     }
 
-    /// The body of a network of bars. The body of finite elements comes with every look at it.
+    /// The body of a network of bars. A body of finite elements comes with every look instead.
     pub(crate) fn spring_body(&self) -> Option<&LayeredBody> {
         match &self.kind {
             Kind::Tissue(_) => None,

@@ -1,7 +1,8 @@
-//! What the body answers to a few forces: `W = S K⁻¹ Sᵀ = Yᵀ Y` with `Y = L⁻¹ Sᵀ`, a column of `Sᵀ` for each force.
+//! The compliance of the body under a few forces: `W = S K⁻¹ Sᵀ = Yᵀ Y` with `Y = L⁻¹ Sᵀ`. `Sᵀ` has
+//! one column for each force.
 //!
-//! Only the fronts between those nodes and the root are visited, and only forwards. `Y` is kept: with it a solution under other
-//! forces needs no further forward substitution.
+//! Only forward substitution is needed, and only in the fronts between the loaded nodes and the
+//! root. `Y` is kept: with it, a solution under other forces needs no further forward substitution.
 
 use std::ops::Range;
 
@@ -15,35 +16,35 @@ use super::Number;
 use super::factor::Zone;
 use super::tree::{Half, Tree};
 
-/// A force of 1 on a node.
+/// A unit force on a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Push<T> {
     /// The node's column.
     pub column: u32,
-    /// Which of its nodes with unknowns.
+    /// Index of the node among the column's nodes that have unknowns.
     pub level: u32,
-    /// Components of a unit vector.
+    /// Direction of the force, a unit vector.
     pub direction: [T; 3],
 }
 
-/// Memory for the compliance under at most so many forces on a zone.
+/// Memory for the compliance under at most `most` forces on a zone.
 #[derive(Debug)]
 pub struct Compliance<T> {
     most: usize,
-    /// First row of each visited front, of the zone's.
+    /// First row in `Y` of each front of the zone; `usize::MAX` if the front is not visited.
     rows: Vec<usize>,
     n_rows: usize,
-    /// Forces in the order of their columns' elimination.
+    /// Indices of the forces, in the order in which their columns are eliminated.
     sorted: Vec<u32>,
     y: Vec<T>,
     product: Vec<T>,
-    /// One vector of the visited rows.
+    /// One vector, with a number for each visited row.
     rows_of_z: Vec<T>,
     w: Vec<T>,
 }
 
 impl<T: Number> Compliance<T> {
-    /// Room for `most` forces.
+    /// Memory for at most `most` forces.
     pub fn new(tree: &Tree, most: usize) -> Self {
         let range = tree.range(Half::Zone);
         let fronts = &tree.fronts[range];
@@ -61,10 +62,11 @@ impl<T: Number> Compliance<T> {
         }
     }
 
-    /// The compliance under forces on the zone: `n × n`, column by column, both triangles, m/N for a stiffness in N/m.
+    /// The compliance under forces on the zone: `n × n`, column-major, both triangles, in m/N if
+    /// the stiffness is in N/m.
     ///
     /// # Panics
-    /// When there are more forces than there is room for, or one is not on the zone.
+    /// When there are more forces than the memory was made for, or a force is not on the zone.
     pub fn compute(&mut self, tree: &Tree, zone: &Zone<T>, pushes: &[Push<T>], out: &mut [T]) {
         assert!(
             pushes.len() <= self.most,
@@ -76,7 +78,7 @@ impl<T: Number> Compliance<T> {
         self.sorted.clear();
         self.sorted.extend(0..pushes.len() as u32);
         self.sorted.sort_unstable_by_key(|&u| (place(u), u));
-        // Rows for the fronts on the way from a node to the root.
+        // Rows for the fronts on the path from a loaded node to the root.
         self.rows.fill(usize::MAX);
         for &u in &self.sorted {
             let mut front = Some(tree.front_of[place(u) as usize]);
@@ -115,7 +117,7 @@ impl<T: Number> Compliance<T> {
                 continue;
             }
             let front = &tree.fronts[f];
-            // A subtree's columns are consecutive in the order, and so are the nodes under it.
+            // The columns of a subtree are consecutive in the order, and so are the forces on them.
             let first_place = subtree_start(tree, f, range.start);
             let from = self.sorted.partition_point(|&u| place(u) < first_place);
             let to = self.sorted.partition_point(|&u| place(u) < front.own.end);
@@ -169,7 +171,8 @@ impl<T: Number> Compliance<T> {
         }
     }
 
-    /// Displacements along the forces, `Yᵀ z`, of the solution whose forward substitution is `z`.
+    /// Displacements in the directions of the forces, `Yᵀ z`, for the solution whose forward
+    /// substitution is `z`.
     pub fn project(&mut self, tree: &Tree, z: &[T], out: &mut [T]) {
         let (n, n_rows) = (self.sorted.len(), self.n_rows);
         self.each_front(tree, |product, rows, places| {
@@ -191,7 +194,7 @@ impl<T: Number> Compliance<T> {
         }
     }
 
-    /// Adds these forces to a right side that has been substituted forwards: `z ← z + Y f`.
+    /// Adds these forces to a right side after its forward substitution: `z ← z + Y f`.
     pub fn add(&mut self, tree: &Tree, forces: &[T], z: &mut [T]) {
         let (n, n_rows) = (self.sorted.len(), self.n_rows);
         for (f, &u) in self.w.iter_mut().zip(&self.sorted) {
@@ -208,7 +211,8 @@ impl<T: Number> Compliance<T> {
         });
     }
 
-    /// Calls with one vector of rows, and the rows of every visited front in it and in vectors ordered by elimination.
+    /// Calls `of` for every visited front with a vector over the visited rows, the range of the
+    /// front in that vector, and its range in vectors ordered by elimination.
     fn each_front(
         &mut self,
         tree: &Tree,
@@ -224,7 +228,7 @@ impl<T: Number> Compliance<T> {
     }
 }
 
-/// First place of the columns under a front.
+/// Place of the first column in the subtree of a front.
 fn subtree_start(tree: &Tree, mut f: usize, first: usize) -> u32 {
     while let Some(&child) = tree.fronts[f].children.first() {
         f = child as usize;

@@ -1,23 +1,27 @@
-//! Nested dissection: a graph in the plane or on a surface is cut in two by a line of its columns, again and again.
+//! Nested dissection: a graph in the plane or on a surface is cut in two along a line of its
+//! columns, recursively.
 
 use crate::blocks::ColumnPattern;
 
-/// Sets of columns of at most this many are not cut further.
+/// A set with at most this many columns is not cut further.
 const LEAF: usize = 2;
-/// A cut may leave the middle by so many steps of this share, if the line of columns there is shorter.
+/// A cut may be up to this many steps away from the middle, if the line of columns is shorter
+/// there. `STEP` is the length of a step, as a share of the columns in the set.
 const STEPS: i32 = 4;
 const STEP: f64 = 0.02;
-/// Directions whose extent is below this share of the largest are not cut across.
+/// No cut is made across a direction in which the set's extent is below this share of its largest
+/// extent.
 const SLENDER: f64 = 0.75;
 
-/// A set of columns that are eliminated together, after its children.
+/// A set of columns that are eliminated together, after the columns of its children.
 #[derive(Debug)]
 pub(super) struct Part {
     pub(super) columns: Vec<u32>,
     pub(super) children: Vec<usize>,
 }
 
-/// Cuts `set`; parts are appended in the order of elimination. Returns the last.
+/// Cuts `set` and appends its parts in the order of elimination. Returns the index of the last
+/// part.
 pub(super) fn dissect(
     pattern: &ColumnPattern,
     places: &[[f64; 3]],
@@ -82,7 +86,7 @@ fn best_cut(
                 continue;
             }
             mark(&sorted, half, side);
-            // The line may be taken from either half.
+            // The line of columns may be taken from either half.
             for from_first in [true, false] {
                 let (own, across) = if from_first { (1, 2) } else { (2, 1) };
                 let from = if from_first {
@@ -125,11 +129,11 @@ fn best_cut(
         side[c as usize] = 0;
     }
     if one.is_empty() {
-        // Everything of one half is in the line: nothing is gained by a cut.
+        // All columns of one half are in the line, so a cut gains nothing.
         return None;
     }
     if separator.is_empty() {
-        // The halves do not touch; a part needs columns.
+        // The halves do not touch, but a part needs at least one column.
         separator.extend(other.pop());
     }
     Some(Cut {

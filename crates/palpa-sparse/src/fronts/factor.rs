@@ -1,4 +1,5 @@
-//! The numbers of a factor: every front is assembled, eliminated, and leaves an update to its parent.
+//! The numbers of a factor. Every front is assembled and eliminated, and leaves an update for its
+//! parent.
 
 #![expect(
     clippy::inline_always,
@@ -18,7 +19,7 @@ use super::tree::{Front, FrontPair, Half, Tree};
 use crate::Singular;
 use crate::blocks::Block;
 
-/// Memory that factoring needs and leaves nothing in.
+/// Scratch memory for factoring; its contents do not matter between calls.
 pub struct FactorScratch<T> {
     updates: Vec<T>,
     memory: MemBuffer,
@@ -33,7 +34,7 @@ impl<T> std::fmt::Debug for FactorScratch<T> {
 }
 
 impl<T: Number> FactorScratch<T> {
-    /// Scratch for a half of a tree.
+    /// Scratch memory for one half of a tree.
     pub fn new(tree: &Tree, half: Half) -> Self {
         let b = tree.width;
         let most = tree.fronts[tree.range(half)]
@@ -50,7 +51,7 @@ impl<T: Number> FactorScratch<T> {
     }
 }
 
-/// The factor of the columns outside the zone, and what they leave on its ring.
+/// The factor of the columns outside the zone, and their Schur complement on the ring.
 #[derive(Debug, Clone)]
 pub struct Exterior<T> {
     pub(super) panels: Vec<T>,
@@ -59,7 +60,7 @@ pub struct Exterior<T> {
 }
 
 impl<T: Number> Exterior<T> {
-    /// Room for a tree's exterior; a zone cannot be factored with it before it is.
+    /// Memory for a tree's exterior. It must be factored before a zone can be factored with it.
     pub fn new(tree: &Tree) -> Self {
         let ring = tree.ring.len() * tree.width;
         Self {
@@ -68,11 +69,11 @@ impl<T: Number> Exterior<T> {
         }
     }
 
-    /// Factors the exterior of the matrix of these blocks, which must not have the zone's own part in them. Ring blocks
-    /// are the exterior's share of them.
+    /// Factors the exterior of the matrix made of `blocks`. The blocks must not contain the zone's
+    /// own part: a ring block holds only the exterior's share.
     ///
     /// # Errors
-    /// When the matrix is not positive definite; the factor is then of no use.
+    /// When the matrix is not positive definite; the factor must then not be used.
     pub fn factor(
         &mut self,
         tree: &Tree,
@@ -94,7 +95,7 @@ impl<T: Number> Exterior<T> {
         Ok(())
     }
 
-    /// What the exterior leaves on the ring: the lower triangle of its Schur complement, column by column.
+    /// The exterior's Schur complement on the ring: its lower triangle, column-major.
     pub fn schur(&self) -> &[T] {
         &self.schur
     }
@@ -107,17 +108,18 @@ pub struct Zone<T> {
 }
 
 impl<T: Number> Zone<T> {
-    /// Room for a tree's zone.
+    /// Memory for a tree's zone.
     pub fn new(tree: &Tree) -> Self {
         Self {
             panels: vec![T::default(); tree.panels[Half::Zone as usize]],
         }
     }
 
-    /// Factors the zone of the matrix of these blocks, on top of a factored exterior if the tree has one.
+    /// Factors the zone of the matrix made of `blocks`, on top of a factored exterior if the tree
+    /// has one.
     ///
     /// # Errors
-    /// When the matrix is not positive definite; the factor is then of no use.
+    /// When the matrix is not positive definite; the factor must then not be used.
     pub fn factor(
         &mut self,
         tree: &Tree,
@@ -149,7 +151,7 @@ fn eliminate<T: Number>(
     let height = own + border;
     let panel = &mut panels[front.panel..][..height * own];
     match schur {
-        // The ring has no border: its panel is as large as the complement.
+        // The ring has no border, so its panel is as large as the Schur complement.
         Some(schur) => panel.copy_from_slice(schur),
         None => panel.fill(T::default()),
     }
@@ -205,8 +207,8 @@ fn children<'a>(tree: &'a Tree, front: &'a Front) -> impl Iterator<Item = &'a Fr
     front.children.iter().map(|&c| &tree.fronts[c as usize])
 }
 
-/// Adds the part of a child's update whose columns are, in the parent's counting, from `first` on (and, for a panel, end
-/// where it ends).
+/// Adds the columns of a child's update from the parent's column `first` on. When the target is a
+/// panel, columns beyond its end are left out.
 fn add_update<T: Number>(
     b: usize,
     to_parent: &[u32],
@@ -225,8 +227,8 @@ fn add_update<T: Number>(
     });
 }
 
-// A struct, not a closure: `FnOnce::call_once` of a closure is not always inlined, and then not compiled for the machine's
-// vectors.
+// A struct, not a closure: `FnOnce::call_once` of a closure is not always inlined, and is then not
+// compiled for the machine's vector instructions.
 struct AddUpdate<'a, T> {
     b: usize,
     to_parent: &'a [u32],
@@ -273,7 +275,7 @@ fn add_update_wide<T: Number>(
         for jj in 0..b {
             let from = &update[(j * b + jj) * size..][..size];
             let into = &mut into[(column * b + jj) * height..][..height];
-            // Columns that follow each other here and there are added in one go.
+            // Columns that are consecutive both here and in the parent are added together.
             let mut i = j;
             while i < to_parent.len() {
                 let start = to_parent[i] as usize;
@@ -293,7 +295,7 @@ fn add_update_wide<T: Number>(
     }
 }
 
-/// Adds blocks to a front.
+/// Adds the blocks of some pairs to a front.
 fn put_pairs<T: Number>(
     tree: &Tree,
     pairs: &[FrontPair],

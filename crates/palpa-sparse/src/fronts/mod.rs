@@ -1,14 +1,17 @@
-//! A block multifrontal Cholesky factor on columns, of which only the part that changes is made anew.
+//! A block multifrontal Cholesky factor on columns. After a change, only the affected part is
+//! computed again.
 //!
 //! ```text
 //!            ring               fronts of the zone are factored when the tissue there has moved;
-//!          /      \             those of the exterior seldom: what they leave on the ring is kept
+//!          /      \             those of the exterior seldom: their Schur complement on the ring is kept
 //!    exterior    within the zone
 //! ```
-//! [`Tree`] is made once for a zone; [`Exterior`] and [`Zone`] hold the numbers of the two halves of a factor, in single or
-//! double precision. A tree without a zone has all fronts in the zone's half. Nothing is allocated after construction.
+//! A [`Tree`] is built once for a zone. [`Exterior`] and [`Zone`] hold the numbers of the two
+//! halves of a factor, in single or double precision. In a tree without a zone, all fronts are in
+//! the zone's half. Nothing is allocated after construction.
 //!
-//! Fill grows as n log n · width² for n columns of a surface and `width` unknowns each, work as 15 n^1.5 · width³.
+//! For n columns of a surface with `width` unknowns each, the fill grows as n log n · width², and
+//! the work as 15 n^1.5 · width³.
 
 mod compliance;
 mod dissect;
@@ -40,18 +43,18 @@ pub trait Number:
     + DivAssign
     + PartialOrd
 {
-    /// The nearest number of this precision.
+    /// The nearest number in this precision.
     fn nearest(x: f64) -> Self;
     /// The same number in double precision.
     fn wide(self) -> f64;
-    /// `y −= Σ columns · factors`, in the machine's vectors. All slices have one length.
+    /// `y −= Σ columns · factors`, with vector instructions. All slices have the same length.
     fn subtract_columns<S: Simd>(
         simd: S,
         columns: [&[Self]; 4],
         factors: [Self; 4],
         y: &mut [Self],
     );
-    /// The products of four columns with a vector. All slices have one length.
+    /// The dot products of four columns with a vector. All slices have the same length.
     fn dot_columns<S: Simd>(simd: S, columns: [&[Self]; 4], x: &[Self]) -> [Self; 4];
 }
 

@@ -1,4 +1,4 @@
-//! Substitution with a factor, for one right side.
+//! Forward and back substitution with a factor, for one right side.
 
 #![expect(
     clippy::inline_always,
@@ -10,15 +10,15 @@ use pulp::{Simd, WithSimd};
 use super::Number;
 use super::tree::{Half, Tree};
 
-/// Memory that substitution needs and leaves nothing in.
+/// Scratch memory for substitution; its contents do not matter between calls.
 #[derive(Debug)]
 pub struct SolveScratch<T> {
-    /// A front's part of the vector: of its own columns, then of its border.
+    /// A front's part of the vector: its own columns, then its border.
     part: Vec<T>,
 }
 
 impl<T: Number> SolveScratch<T> {
-    /// Scratch for a tree.
+    /// Scratch memory for a tree.
     pub fn new(tree: &Tree) -> Self {
         let height = |f: &super::tree::Front| f.own.len() + f.border.len();
         let most = tree.fronts.iter().map(height).max().unwrap_or(0);
@@ -28,8 +28,8 @@ impl<T: Number> SolveScratch<T> {
     }
 }
 
-/// Forward substitution through the fronts of a half: `x ← L⁻¹ x` there, and the later right sides are reduced. `x` is
-/// ordered by elimination, for the whole body.
+/// Forward substitution through the fronts of a half: `x ← L⁻¹ x` there. It also reduces the right
+/// sides of later columns. `x` covers the whole body, ordered by elimination.
 pub fn substitute<T: Number>(
     tree: &Tree,
     half: Half,
@@ -47,7 +47,8 @@ pub fn substitute<T: Number>(
     });
 }
 
-/// Back substitution through the fronts of a half: `x ← L⁻ᵀ x` there, given the solution of the later columns.
+/// Back substitution through the fronts of a half: `x ← L⁻ᵀ x` there. The solution of the later
+/// columns must be in `x` already.
 pub fn back_substitute<T: Number>(
     tree: &Tree,
     half: Half,
@@ -58,7 +59,8 @@ pub fn back_substitute<T: Number>(
     back_substitute_to(tree, half, None, panels, x, scratch);
 }
 
-/// The fronts of a half that a solution on these columns depends on: what [`back_substitute_to`] needs to visit.
+/// Flags for the fronts of a half: true if the solution on `columns` depends on the front.
+/// [`back_substitute_to`] needs to visit only these.
 pub fn fronts_above(tree: &Tree, half: Half, columns: impl Iterator<Item = u32>) -> Vec<bool> {
     let range = tree.range(half);
     let mut is_above = vec![false; range.len()];
@@ -75,7 +77,8 @@ pub fn fronts_above(tree: &Tree, half: Half, columns: impl Iterator<Item = u32>)
     is_above
 }
 
-/// [`back_substitute`] through some of the fronts only, those of [`fronts_above`]: `x` is the solution there alone.
+/// Like [`back_substitute`], but only through the fronts that [`fronts_above`] marks. The result in
+/// `x` is valid only there.
 pub fn back_substitute_to<T: Number>(
     tree: &Tree,
     half: Half,
@@ -97,7 +100,7 @@ pub fn back_substitute_to<T: Number>(
 struct Pass<'a, T, const FORWARD: bool> {
     tree: &'a Tree,
     half: Half,
-    /// Which fronts of the half; all if not given.
+    /// Flags for the fronts of the half to visit; all if `None`.
     wanted: Option<&'a [bool]>,
     panels: &'a [T],
     x: &'a mut [T],
@@ -139,8 +142,8 @@ impl<T: Number, const FORWARD: bool> WithSimd for Pass<'_, T, FORWARD> {
     }
 }
 
-/// Columns that are taken together, so that vectors are read and written once for all. A column of nodes has three unknowns
-/// a node, so the last may be fewer.
+/// Matrix columns that are processed together, so that vectors are read and written once for all of
+/// them. A column of nodes has three unknowns per node, so the last group may be smaller.
 const TOGETHER: usize = 4;
 
 #[inline(always)]
@@ -156,7 +159,7 @@ fn forward<T: Number, S: Simd>(simd: S, panel: &[T], own: usize, x: &mut [T]) {
                 x[k] -= product;
             }
         }
-        // Fewer than four are filled up with one of them, times nothing.
+        // If fewer than four columns remain, the last one is repeated with the factor 0.
         let columns = std::array::from_fn(|a| {
             &panel[(j + a.min(n - 1)) * height + j + n..][..height - j - n]
         });

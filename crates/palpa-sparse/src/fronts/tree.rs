@@ -1,4 +1,5 @@
-//! Which columns are eliminated together, in which order, and what that fills.
+//! The order in which columns are eliminated, which of them are eliminated together, and the fill
+//! that results.
 
 use std::ops::Range;
 
@@ -6,77 +7,82 @@ use super::dissect::{Part, dissect};
 use crate::TooLarge;
 use crate::blocks::ColumnPattern;
 
-/// A factor may take at most so many numbers.
+/// Largest number of entries that a factor may have.
 const MOST_NUMBERS: usize = 1 << 30;
 
-/// Which half of a tree.
+/// One half of a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Half {
     /// The columns outside the zone, eliminated first.
     Exterior,
-    /// The columns of the zone; of a tree without a zone, all.
+    /// The columns of the zone. In a tree without a zone, all columns.
     Zone,
 }
 
-/// Columns that are eliminated together, and the later ones that this fills.
+/// Columns that are eliminated together, and the later columns that they touch or fill.
 #[derive(Debug)]
 pub(super) struct Front {
-    /// Its own columns, by their place in the order of elimination.
+    /// Its own columns, as places in the order of elimination.
     pub(super) own: Range<u32>,
-    /// Later columns that it touches, ascending.
+    /// The later columns that it touches or fills, as places in the order of elimination,
+    /// ascending.
     pub(super) border: Vec<u32>,
-    /// In the same half; the exterior's last fronts have none.
+    /// The parent, in the same half. The last front of each half has none.
     pub(super) parent: Option<u32>,
     pub(super) children: Vec<u32>,
-    /// For each border column the place among the parent's columns, own first; of a last front of the exterior among
-    /// the ring.
+    /// For each border column, its index among the parent's columns (own columns first). For a
+    /// front of the exterior without a parent, its index in the ring.
     pub(super) to_parent: Vec<u32>,
-    /// Pairs of neighbours that are assembled here.
+    /// Pairs of neighbours that are assembled in this front.
     pub(super) pairs: Vec<FrontPair>,
-    /// First number of its panel, `(own + border) × own` blocks of columns, among those of its half.
+    /// Index of the first number of its panel, among those of its half. A panel has
+    /// `(own + border) × own` blocks of columns.
     pub(super) panel: usize,
-    /// First number of its update, `border × border`, among the scratch of its half.
+    /// Index of the first number of its update, in the scratch memory of its half. An update has
+    /// `border × border` blocks of columns.
     pub(super) update: usize,
 }
 
 /// A pair of neighbours in a front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrontPair {
-    /// First block of the pair.
+    /// Index of the pair's first block.
     pub(super) blocks: u32,
-    /// Row and column among the front's columns.
+    /// Row and column, as indices among the front's columns.
     pub(super) row: u32,
     pub(super) column: u32,
-    /// Whether rows and columns of its blocks change places.
+    /// Whether the blocks are transposed.
     pub(super) is_turned: bool,
 }
 
-/// An order of elimination of columns, and everything about it that does not depend on numbers.
+/// An order of elimination of columns, with everything that depends on it but not on the matrix
+/// entries.
 #[derive(Debug)]
 pub struct Tree {
     pub(super) fronts: Vec<Front>,
-    /// How many of the fronts are the exterior's.
+    /// Number of fronts in the exterior.
     pub(super) n_exterior: usize,
-    /// Columns in the order of elimination, and the place of each in it.
+    /// Columns in the order of elimination, and the place of each column in that order.
     pub(super) order: Vec<u32>,
     pub(super) place: Vec<u32>,
-    /// Front of each place.
+    /// Front of each place in the order.
     pub(super) front_of: Vec<u32>,
-    /// Places of the ring: the columns of the zone that touch the exterior, which are last.
+    /// Places of the ring: the columns of the zone that touch the exterior. They come last.
     pub(super) ring: Range<u32>,
-    /// Pairs of the ring that the exterior has a part in.
+    /// Pairs of the ring that the exterior contributes to.
     pub(super) ring_pairs: Vec<FrontPair>,
-    /// Unknowns of a column.
+    /// Number of unknowns in a column.
     pub(super) width: usize,
     pub(super) n_levels: usize,
-    /// Numbers of panels and scratch of the exterior, then of the zone.
+    /// Sizes of panels and scratch memory, in numbers: exterior, then zone.
     pub(super) panels: [usize; 2],
     pub(super) scratch: [usize; 2],
     flops: [f64; 2],
 }
 
 impl Tree {
-    /// Orders all columns by nested dissection. `places` is where they are (in any unit).
+    /// Orders all columns by nested dissection. `places` are the positions of the columns (in any
+    /// unit).
     ///
     /// # Errors
     /// When the factor would take more than 8 GiB.
@@ -84,8 +90,9 @@ impl Tree {
         Self::zone_last(pattern, places, &vec![true; pattern.n_columns()])
     }
 
-    /// Orders the columns outside `zone` first, then those within, then the ring: the columns of the zone that touch the
-    /// exterior. When only what is in the zone changes, only its half has to be factored again.
+    /// Orders the columns outside `zone` first, then those inside it, then the ring: the columns of
+    /// the zone that touch the exterior. If a change affects only the zone, only the zone's half
+    /// must be factored again.
     ///
     /// # Errors
     /// When the factor would take more than 8 GiB.
@@ -229,7 +236,8 @@ impl Tree {
         }
     }
 
-    /// Gives every front its place in memory. Scratch is used again as soon as a parent has taken it up.
+    /// Gives every front its place in memory. Scratch memory is reused as soon as a parent has
+    /// added the update.
     fn lay_out(&mut self) -> Result<(), TooLarge> {
         let b = self.width;
         for half in [Half::Exterior, Half::Zone] {
@@ -271,7 +279,7 @@ impl Tree {
         self.order.len()
     }
 
-    /// Columns of the zone, with its ring.
+    /// Number of columns in the zone, including its ring.
     pub fn n_zone_columns(&self) -> usize {
         self.fronts[self.range(Half::Zone)]
             .iter()
@@ -279,17 +287,18 @@ impl Tree {
             .sum()
     }
 
-    /// Columns of the ring between zone and exterior.
+    /// Number of columns in the ring between zone and exterior.
     pub fn n_ring_columns(&self) -> usize {
         self.ring.len()
     }
 
-    /// Floating-point operations (multiplication and addition count as one) that factor a half.
+    /// Floating-point operations for factoring a half. A multiplication with its addition counts as
+    /// one.
     pub fn flops(&self, half: Half) -> f64 {
         self.flops[half as usize]
     }
 
-    /// Numbers that the factor of a half takes.
+    /// Number of entries in the factor of a half.
     pub fn n_numbers(&self, half: Half) -> usize {
         self.panels[half as usize]
     }
@@ -299,7 +308,7 @@ impl Tree {
         self.place[column] as usize * self.width
     }
 
-    /// Where the zone's unknowns begin in vectors that are ordered by elimination.
+    /// Index of the zone's first unknown in vectors that are ordered by elimination.
     pub fn first_zone_dof(&self) -> usize {
         self.fronts[..self.n_exterior]
             .iter()
@@ -309,7 +318,7 @@ impl Tree {
     }
 }
 
-/// Place of a column, given by its place in the order, among those of a front.
+/// Index of a column among the columns of a front. The column is given by its place in the order.
 fn local(front: &Front, place: u32) -> u32 {
     if front.own.contains(&place) {
         return place - front.own.start;
@@ -319,7 +328,7 @@ fn local(front: &Front, place: u32) -> u32 {
     (front.own.len() + at) as u32
 }
 
-/// Finds room of a size: the first hole that is large enough, or the end.
+/// Allocates `size` numbers in the first hole that is large enough, or at the end.
 fn take(free: &mut Vec<Range<usize>>, size: usize, end: &mut usize) -> usize {
     if size == 0 {
         return 0;
@@ -340,7 +349,7 @@ fn take(free: &mut Vec<Range<usize>>, size: usize, end: &mut usize) -> usize {
     start
 }
 
-/// Gives room back, joined with the holes beside it.
+/// Frees memory and joins it with the neighbouring holes.
 fn give(free: &mut Vec<Range<usize>>, room: Range<usize>) {
     if room.is_empty() {
         return;

@@ -1,4 +1,5 @@
-//! The multifrontal factor: whole and by zones, in both precisions, against a dense Cholesky factor.
+//! The multifrontal factor: whole and by zones, in both precisions, against a dense Cholesky
+//! factor.
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use faer::linalg::solvers::Solve;
@@ -79,7 +80,8 @@ fn case(nx: usize, ny: usize, n_levels: usize, is_tube: bool, zone_radius: f64) 
     }
 }
 
-/// Blocks of what is inside the zone, then of the rest: springs of random stiffness between nodes, and to the ground.
+/// Blocks of what is inside the zone, then of the rest: springs of random stiffness between nodes,
+/// and to the ground.
 fn blocks(case: &Case, seed: u64) -> [Vec<Block<f64>>; 2] {
     let pattern = &case.pattern;
     let n = pattern.n_levels();
@@ -193,7 +195,8 @@ fn assert_same<T: Number>(tree: &Tree, pattern: &ColumnPattern, columns: &[u32],
     }
 }
 
-/// Everything that a factor is asked for, against the dense one: the largest relative errors of a solution and of W.
+/// Everything that a factor is asked for, against the dense one: the largest relative errors of a
+/// solution and of W.
 fn errors<T: Number>(case: &Case, tree: &Tree) -> [f64; 2] {
     let pattern = &case.pattern;
     let n = pattern.n_dofs();

@@ -1,8 +1,10 @@
-//! The dense inverse of the whole system, as the method was run in 2009. Kept for comparison of speed and result.
+//! The dense inverse of the whole system, as the method was run in 2009. Kept for comparison of
+//! speed and result.
 //!
-//! `M2` is the `3N × 3N` matrix `M1` with the rows and columns of constrained directions zeroed and their diagonal set
-//! to 1 (3.15). It is inverted by Gauss–Jordan elimination with row pivoting, and `U' = −M2⁻¹ F2` (3.19, with the sign
-//! of equilibrium). `O(N³)` each time, whatever its zeros.
+//! `M2` is the `3N × 3N` matrix `M1` with the rows and columns of constrained directions set to
+//! zero and their diagonal set to 1 (3.15). It is inverted by Gauss–Jordan elimination with row
+//! pivoting, and `U' = −M2⁻¹ F2` (3.19, with the sign of equilibrium). Each inversion costs
+//! `O(N³)`, even though many entries are zero.
 
 use palpa_mesh::Vec3;
 
@@ -15,7 +17,7 @@ use crate::network::Bar;
 #[derive(Debug)]
 pub(crate) struct HistoricalInverse {
     n: usize,
-    /// `M2`, row-major, turned into the unit matrix by the elimination.
+    /// `M2`, row-major. The elimination turns it into the unit matrix.
     matrix: Vec<f64>,
     /// Its inverse, row-major.
     inverse: Vec<f64>,
@@ -33,7 +35,7 @@ impl HistoricalInverse {
         }
     }
 
-    /// Forms `M2` from the bars' directions and inverts it.
+    /// Forms `M2` from the directions of the bars and inverts it.
     pub(crate) fn update(
         &mut self,
         bars: &[Bar],
@@ -100,7 +102,7 @@ impl HistoricalInverse {
         Ok(())
     }
 
-    /// `U' = −M2⁻¹ F2`, written over the free directions of `increments`.
+    /// Writes `U' = −M2⁻¹ F2` to the free directions of `increments`.
     pub(crate) fn solve(&mut self, freedoms: &[Freedom], forces: &[Vec3], increments: &mut [Vec3]) {
         for (node, freedom) in freedoms.iter().enumerate() {
             let local = freedom.local(&forces[node]);

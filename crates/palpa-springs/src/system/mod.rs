@@ -1,8 +1,9 @@
-//! The linear system of a step, `K_ff u_f = −K_fc u_c`: numbered, assembled from the current positions, and factored.
+//! The linear system of a step, `K_ff u_f = −K_fc u_c`: numbering, assembly from the current
+//! positions, and factorization.
 //!
-//! [`Structure`] is what the topology decides (ordering, pattern, where each bar's entries go); [`System`] is the
-//! numbers. Free directions are numbered column by column of the body, in the fill-reducing order of the columns, and
-//! only the lower triangle is kept.
+//! [`Structure`] depends only on the topology: ordering, pattern, and the places of each bar's
+//! entries. [`System`] holds the numbers. Free directions are numbered column by column of the
+//! body, in the fill-reducing order of the columns. Only the lower triangle is stored.
 
 mod inverse;
 mod ordering;
@@ -17,14 +18,15 @@ use inverse::HistoricalInverse;
 use ordering::{column_order, node_pattern};
 use palpa_sparse::{Factor, NodePattern, Pattern, Singular};
 
-/// A pivot smaller than this, relative to the diagonal entry that it came from, is taken for zero: the node can move
-/// without stretching a bar. Rounding leaves about 1e-14 where exact arithmetic leaves 0.
+/// A pivot smaller than this, relative to the diagonal entry that it came from, counts as zero: the
+/// node can move without stretching a bar. Rounding leaves about 1e-14 where exact arithmetic
+/// leaves 0.
 const SINGULAR_PIVOT: f64 = 1e-11;
 
 /// Marks a node without unknowns.
 const NONE: usize = usize::MAX;
 
-/// What the topology decides about the linear system.
+/// The parts of the linear system that depend only on the topology.
 #[derive(Debug)]
 pub(crate) struct Structure {
     /// The first unknown of each node, or [`NONE`].
@@ -32,9 +34,10 @@ pub(crate) struct Structure {
     n_dofs: usize,
     solver: Solver,
     pattern: Pattern,
-    /// Index of the entry on the diagonal for each unknown.
+    /// Index of the diagonal entry of each unknown.
     diagonal: Vec<usize>,
-    /// For each bar between two free nodes the indices of the first entry of each column of their block.
+    /// For each bar between two free nodes: the indices of the first entry in each column of its
+    /// block.
     blocks: Vec<[usize; 3]>,
 }
 
@@ -52,7 +55,8 @@ impl Structure {
             n_dofs += freedoms[node].n_free;
         }
         let solver = match solver {
-            // Measured: faster than dense at every size, by a quarter at 51 unknowns and 40 times at 1,200.
+            // Measured: faster than dense at every size, by a quarter at 51 unknowns and 40 times
+            // at 1,200.
             Solver::Auto => Solver::Sparse,
             chosen => chosen,
         };
@@ -61,7 +65,7 @@ impl Structure {
             Solver::Sparse => {
                 Pattern::sparse(&nodes, n_dofs, |node| (start[node], freedoms[node].n_free))?
             }
-            // The historical inverse forms its own matrix and only borrows the numbering.
+            // The historical inverse forms its own matrix and uses only the numbering from here.
             _ => Pattern::dense(if solver == Solver::HistoricalInverse {
                 0
             } else {
@@ -82,7 +86,8 @@ impl Structure {
         Ok(structure)
     }
 
-    /// Finds where the entries of every node and bar go, so that assembly need not search.
+    /// Finds the places of the entries of every node and bar, so that assembly does not need to
+    /// search.
     fn locate(&mut self, network: &Network, freedoms: &[Freedom], nodes: &NodePattern) {
         self.diagonal = (0..self.n_dofs).map(|i| self.pattern.diagonal(i)).collect();
         self.blocks = network
@@ -128,12 +133,12 @@ impl Structure {
     }
 }
 
-/// The numbers of the linear system, in memory that is kept from step to step.
+/// The numbers of the linear system, in memory that is reused from step to step.
 #[derive(Debug)]
 pub(crate) struct System {
     /// The lower triangle of `K_ff`, in the order of the pattern.
     values: Vec<f64>,
-    /// The diagonal of `K_ff`, kept for judging the pivots.
+    /// A copy of the diagonal of `K_ff`; pivots are compared with it.
     scale: Vec<f64>,
     right_side: Vec<f64>,
     factor: Factor,
@@ -155,7 +160,7 @@ impl System {
         }
     }
 
-    /// Points every bar from its end `a` to its end `b` at the given positions.
+    /// Computes the unit direction of every bar from `a` to `b` at the given positions.
     pub(crate) fn update_directions(&mut self, bars: &[crate::Bar], positions: &[Vec3]) {
         for (c, bar) in self.directions.iter_mut().zip(bars) {
             *c = direction(positions[bar.b as usize] - positions[bar.a as usize]);
@@ -221,8 +226,9 @@ impl System {
         }
     }
 
-    /// Solves for the free nodes: `increments` holds `u_c` at held nodes and zero elsewhere, and `forces` the nodal
-    /// forces `M1 u_c` of that. On return free nodes have their `u_f` in `increments`.
+    /// Solves for the free nodes. On entry, `increments` holds `u_c` at held nodes and zero
+    /// elsewhere, and `forces` holds the nodal forces `M1 u_c`. On return, `increments` holds `u_f`
+    /// at free nodes.
     pub(crate) fn solve(
         &mut self,
         structure: &Structure,

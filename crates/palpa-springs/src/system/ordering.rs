@@ -1,4 +1,5 @@
-//! The order of elimination: columns of the body by approximate minimum degree, the nodes of a column together.
+//! The order of elimination: approximate minimum degree for the columns of the body; the nodes of a
+//! column stay together.
 
 use palpa_sparse::{NodePattern, minimum_degree};
 
@@ -6,8 +7,8 @@ use crate::constraints::Freedom;
 use crate::error::SpringError;
 use crate::network::Network;
 
-/// Nodes with unknowns in the order of elimination. The graph that is ordered has the columns that hold such nodes
-/// for vertices, as all the structure of a layered body is in its skin.
+/// Nodes with unknowns, in the order of elimination. The ordering works on a graph of columns with
+/// such nodes, because the connectivity of a layered body is that of its skin.
 pub(crate) fn column_order(
     network: &Network,
     freedoms: &[Freedom],
@@ -19,7 +20,7 @@ pub(crate) fn column_order(
             members[network.column[node] as usize].push(node);
         }
     }
-    // Number the columns that take part.
+    // Numbers only the columns that have unknowns.
     let mut rank = vec![usize::MAX; n_columns];
     let taking_part: Vec<usize> = (0..n_columns).filter(|&c| !members[c].is_empty()).collect();
     for (r, &c) in taking_part.iter().enumerate() {
@@ -44,7 +45,7 @@ pub(crate) fn column_order(
         .collect())
 }
 
-/// Which free nodes share a bar.
+/// The pattern of free nodes that share a bar.
 pub(crate) fn node_pattern(network: &Network, order: &[usize]) -> NodePattern {
     let mut place = vec![usize::MAX; network.n_nodes()];
     for (p, &node) in order.iter().enumerate() {

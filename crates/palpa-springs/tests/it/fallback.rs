@@ -7,7 +7,8 @@ use palpa_springs::{
     Workspace, step,
 };
 
-/// A flat net: the skin of a 5 × 5 patch, its rim fixed. Every inner node can leave the plane without force.
+/// A flat net: the skin of a 5 × 5 patch, its rim fixed. Every inner node can leave the plane
+/// without force.
 fn flat_net() -> (Network, Constraints) {
     let skin = patch(5, 5, 0.04, &[0.0, 0.01], &[0]).skin;
     let bars = skin.edges().into_iter().map(|[a, b]| Bar {

@@ -18,7 +18,8 @@ use palpa_springs::{
 pub(crate) const SOFT: f64 = 1.0e-3;
 pub(crate) const HARD: f64 = 90.0e-3;
 
-/// The thesis's patch of `n × n` columns, 40 mm apart in all directions, one layer in each interval.
+/// The thesis's patch of `n × n` columns, 40 mm apart in all directions, one layer in each
+/// interval.
 pub(crate) fn thesis_body(n: usize, n_levels: usize) -> LayeredBody {
     let depths: Vec<f64> = (0..n_levels).map(|l| 0.04 * l as f64).collect();
     let layers: Vec<usize> = (0..n_levels - 1).collect();

@@ -87,7 +87,8 @@ fn steps_do_not_allocate_after_the_first() {
     }
 }
 
-/// The work of the solver in use against that of the inverse of 2009. `palpa bench` measures the times.
+/// The work of the solver in use against that of the inverse of 2009. `palpa bench` measures the
+/// times.
 #[test]
 fn the_solver_in_use_multiplies_fewer_numbers_the_larger_the_body() {
     let share = |n: usize| {

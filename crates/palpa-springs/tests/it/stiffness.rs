@@ -12,8 +12,8 @@ const MODULUS: f64 = 10.0e3;
 const N: usize = 7;
 const SPACING: f64 = 0.01;
 
-/// A block of 7 × 7 columns and as many intervals as there are moduli, its columns moved sideways by up to `jitter`
-/// spacings (those on the rim along it).
+/// A block of 7 × 7 columns and as many intervals as there are moduli, its columns moved sideways
+/// by up to `jitter` spacings (those on the rim along it).
 fn block(n_intervals: usize, height: f64, jitter: f64) -> LayeredBody {
     let depths: Vec<f64> = (0..=n_intervals).map(|l| height * l as f64).collect();
     let layers: Vec<usize> = (0..n_intervals).collect();
@@ -32,8 +32,8 @@ fn block(n_intervals: usize, height: f64, jitter: f64) -> LayeredBody {
     body
 }
 
-/// Presses a block between smooth plates (the upper one holds it sideways) and returns its apparent modulus. Its sides
-/// are planes of symmetry (`confined`) or free.
+/// Presses a block between smooth plates (the upper one holds it sideways) and returns its apparent
+/// modulus. Its sides are planes of symmetry (`confined`) or free.
 fn apparent_modulus(body: &LayeredBody, moduli: &[f64], confined: bool) -> f64 {
     let mut constraints = Constraints::default();
     for (v, p) in body.skin.points.iter().enumerate() {
@@ -69,7 +69,8 @@ fn apparent_modulus(body: &LayeredBody, moduli: &[f64], confined: bool) -> f64 {
     state.force.z / area / 1e-6
 }
 
-/// Confined, the block is stiffer by (1 − ν)/((1 + ν)(1 − 2ν)) = 6/5, as an isotropic body with ν = ¼.
+/// Confined, the block is stiffer by (1 − ν)/((1 + ν)(1 − 2ν)) = 6/5, as an isotropic body with ν =
+/// ¼.
 #[test]
 fn a_confined_block_shows_six_fifths_of_its_modulus_at_any_shape_of_prism() {
     let mut worst = (0.0_f64, 0.0_f64);
@@ -96,8 +97,9 @@ fn a_confined_layered_block_shows_the_harmonic_mean() {
     );
 }
 
-/// With free sides (and a top plate that holds them, which stiffens a low block a little) it is near its modulus while its
-/// prisms are about as high as wide; in flat ones the bars hardly feel Poisson's ratio, and 6/5 is the limit.
+/// With free sides (and a top plate that holds them, which stiffens a low block a little) it is
+/// near its modulus while its prisms are about as high as wide; in flat ones the bars hardly feel
+/// Poisson's ratio, and 6/5 is the limit.
 #[test]
 fn a_block_with_free_sides_shows_its_modulus_if_its_prisms_are_not_flat() {
     for (height, n, within) in [

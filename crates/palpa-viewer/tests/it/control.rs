@@ -66,7 +66,8 @@ async fn one_controls_the_others_watch_and_hand_over() {
     assert_eq!(second.ask(Request::Lift).await, None);
     assert!(first.ask(Request::Lift).await.is_some());
 
-    // Who controls leaves; of two that are left nobody controls, and of one that is left it does after a while.
+    // Who controls leaves; of two that are left nobody controls, and of one that is left it does
+    // after a while.
     let mut third = Page::open(&server).await;
     drop(second);
     let state = first

@@ -75,7 +75,8 @@ fn the_page_or_how_to_have_it() {
     }
 }
 
-/// The files of the page that are in the binary: their kinds, how long they are kept, and that they are not sent twice.
+/// The files of the page that are in the binary: their kinds, how long they are kept, and that they
+/// are not sent twice.
 #[test]
 fn files_of_the_page() {
     let (_session, server) = Session::start(None);

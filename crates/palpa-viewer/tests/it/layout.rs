@@ -1,4 +1,5 @@
-//! Snapshots are read back as the page reads them: little-endian, each thing at a multiple of its size.
+//! Snapshots are read back as the page reads them: little-endian, each thing at a multiple of its
+//! size.
 
 use palpa_viewer::wire::{FrameSnapshot, MeshSnapshot, SNAPSHOT_VERSION};
 use proptest::{array::uniform3, array::uniform4, collection::vec, prelude::*};

@@ -176,8 +176,8 @@ async fn thirty_two_pages_and_no_more() {
     assert!(again.is_ok(), "its place was kept");
 }
 
-/// A page takes silence for a lost connection. While the session says nothing, it hears the state again. How soon,
-/// the limits' own tests say.
+/// A page takes silence for a lost connection. While the session says nothing, it hears the state
+/// again. How soon, the limits' own tests say.
 #[tokio::test]
 async fn a_page_hears_something_though_the_session_is_silent_slow() {
     let (_session, server) = Session::start(None);
@@ -188,8 +188,8 @@ async fn a_page_hears_something_though_the_session_is_silent_slow() {
     }
 }
 
-/// A page that answers pings stays though it says nothing; one that does not goes, after three pings. Takes as long
-/// as the patience.
+/// A page that answers pings stays though it says nothing; one that does not goes, after three
+/// pings. Takes as long as the patience.
 #[tokio::test]
 async fn who_is_silent_is_let_go_slow() {
     let (session, server) = Session::start(None);

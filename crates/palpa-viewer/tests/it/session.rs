@@ -1,5 +1,5 @@
-//! A little session: a block of one layer under a punch, which is a spring. It has a state, meshes, frames and files as the
-//! real one has, so that what the server does with them can be seen.
+//! A little session: a block of one layer under a punch, which is a spring. It has a state, meshes,
+//! frames and files as the real one has, so that what the server does with them can be seen.
 
 use palpa_scene::ContactShape;
 use palpa_viewer::{

@@ -94,9 +94,9 @@ async fn each_change_of_the_state_is_told_and_the_revision_grows() {
     assert_eq!(second.n_clients, 2);
 }
 
-/// A page that reads nothing holds neither the publisher nor other pages, and is let go. Takes as long as its
-/// patience: what the sleeper has not read fills the system's buffers within a few dozen frames, and from
-/// then on it would hold up whoever waits for it.
+/// A page that reads nothing holds neither the publisher nor other pages, and is let go. Takes as
+/// long as its patience: what the sleeper has not read fills the system's buffers within a few
+/// dozen frames, and from then on it would hold up whoever waits for it.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_page_that_does_not_read_is_left_behind_slow() {
     let (session, server) = Session::start(None);

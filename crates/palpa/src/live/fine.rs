@@ -1,4 +1,4 @@
-//! The scene's body, fine where the tool is.
+//! Meshes of the scene's body that are fine where the tool is.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,17 +14,18 @@ use crate::continuum;
 use crate::prepare::Prepared;
 use crate::press::mesh::CoarseBody;
 
-/// The fine part holds a zone, and so much round it, m.
+/// The fine part of the mesh is larger than a zone by this margin, m.
 const MARGIN: f64 = 15e-3;
-/// Meshes that are kept to be used again.
+/// Largest number of meshes that are kept for reuse.
 const MOST_KEPT: usize = 24;
 
-/// Meshes of the scene's body, each fine round a vertex of the body as it was grown.
+/// Meshes of the scene's body, each fine around one vertex of the body as it was grown.
 pub struct FineScene {
     prepared: Arc<Prepared>,
     coarse: CoarseBody,
     radius: f64,
-    /// The latest last. Only the background takes it.
+    /// Meshes kept for reuse, with the place around which each is fine; the latest is last. Only
+    /// the background thread locks it.
     kept: Mutex<VecDeque<(Vec3, Arc<Model>)>>,
 }
 
@@ -37,7 +38,7 @@ impl fmt::Debug for FineScene {
 }
 
 impl FineScene {
-    /// Of a prepared scene.
+    /// Sets up the meshes of a prepared scene.
     ///
     /// # Errors
     /// When the scene does not fit the body.
@@ -73,7 +74,7 @@ impl FineBodies for FineScene {
     }
 
     fn model(&self, place: Vec3) -> Result<Arc<Model>, FemError> {
-        // Whoever panicked with it left whole meshes behind.
+        // After a panic the list still holds complete meshes only.
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let found = kept.iter().position(|(at, _)| *at == place);
         let model = match found.and_then(|i| kept.remove(i)) {

@@ -1,4 +1,4 @@
-//! The scene's device, and the way of the hand that holds it.
+//! The scene's device, and the path of the hand that holds it.
 
 use palpa_device::{
     DeviceFault, DeviceModel, DeviceSetup, Driver, Grip, HandTarget, HapticDevice, Path,
@@ -8,21 +8,22 @@ use palpa_servo::{Pose, ServoParams, Vec3};
 
 /// Rest over the skin between two motions, s.
 const PAUSE: f64 = 0.3;
-/// Rest at the beginning, s, while the force is let in.
+/// Rest at the beginning, s, while the force ramps up.
 const BEGIN: f64 = 0.7;
-/// The hand ends pressed and still for so long, s, so that a force that does not come to rest shows.
+/// At the end the hand presses and stands still for this long, s, so that a force that does not
+/// settle becomes visible.
 const STILL: f64 = 3.5;
-/// Circles of a palpation: radius, m, and per second.
+/// Circles of a palpation: radius in m, and circles per second.
 const CIRCLE: f64 = 2e-3;
 const CIRCLES: f64 = 2.0;
 /// Seed of the hand's tremor.
 const SEED: u64 = 7;
 
-/// Least step of a position sensor that the law reckons with, m; simulated sensors can be exact.
+/// Smallest sensor step that the law assumes, m; simulated sensors can be exact.
 const LEAST_RESOLUTION: f64 = 1e-6;
 
-/// Opens the device that a scene asks for. `target` is the motion of a simulated hand in the device's
-/// frame; a person's hand does not need it.
+/// Opens the device that a scene asks for. `target` is the motion of a simulated hand in the
+/// device's frame; a person's hand does not need it.
 ///
 /// # Errors
 /// If a real device is not connected or does not answer. A simulated one always opens.
@@ -49,7 +50,7 @@ pub fn servo_params(device: &dyn HapticDevice) -> ServoParams {
     }
 }
 
-/// The figures of the scene's device.
+/// Data of the scene's device.
 pub fn device_model(preset: DevicePreset) -> DeviceModel {
     match preset {
         DevicePreset::Falcon => DeviceModel::FALCON,
@@ -59,7 +60,7 @@ pub fn device_model(preset: DevicePreset) -> DeviceModel {
     }
 }
 
-/// The figures of the hand that holds it.
+/// Data of the hand that holds the device.
 pub fn grip(grip: palpa_scene::Grip) -> Grip {
     match grip {
         palpa_scene::Grip::Soft => Grip::SOFT,
@@ -68,8 +69,8 @@ pub fn grip(grip: palpa_scene::Grip) -> Grip {
     }
 }
 
-/// The way of the hand in the device's frame: the scene's motion over and over for `seconds`, and at the end pressed and
-/// still.
+/// Path of the hand in the device's frame: the scene's motion, repeated for `seconds`, and at the
+/// end a press held still.
 pub fn path(scene: &Scene, scene_from_device: &Pose, seconds: f64) -> Path {
     let motion = &scene.motion;
     let across = across(motion, scene_from_device);
@@ -97,7 +98,8 @@ pub fn path(scene: &Scene, scene_from_device: &Pose, seconds: f64) -> Path {
     path
 }
 
-/// The scene's motion once, from where the hand is (m, in the device's frame) to where it begins, and back there.
+/// One performance of the scene's motion: from the hand's position `at` (device's frame, m) to the
+/// start of the motion, and back there at the end.
 pub fn once_from(at: Vec3, scene: &Scene, scene_from_device: &Pose) -> Path {
     let across = across(&scene.motion, scene_from_device);
     let begin = start(&scene.motion, &across);
@@ -105,7 +107,7 @@ pub fn once_from(at: Vec3, scene: &Scene, scene_from_device: &Pose) -> Path {
     once(path, &scene.motion, &across)
 }
 
-/// The unit vector in the device's plane along which the hand goes across.
+/// Unit vector in the device's plane along which the hand moves across the skin.
 fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
     let along = motion.along.map_or(Vec3::x(), |along| {
         scene_from_device
@@ -117,7 +119,7 @@ fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
         .unwrap_or_else(Vec3::x)
 }
 
-/// Where the hand begins, in the device's frame, m.
+/// Start of the hand, in the device's frame, m.
 pub(super) fn beginning(scene: &Scene, scene_from_device: &Pose) -> Vec3 {
     start(&scene.motion, &across(&scene.motion, scene_from_device))
 }
@@ -130,7 +132,7 @@ fn start(motion: &Motion, across: &Vec3) -> Vec3 {
     }
 }
 
-/// The motion once, from the end of the path on and back over the skin.
+/// Appends the motion once, and the way back over the skin.
 fn once(mut path: Path, motion: &Motion, across: &Vec3) -> Path {
     let (from, speed) = (start(motion, across), motion.speed);
     let down = Vec3::z() * -(motion.above + motion.depth);

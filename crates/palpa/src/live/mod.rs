@@ -1,10 +1,12 @@
-//! A scene in real time: the moving step behind the engine's [`palpa_rt::Tissue`], in the frame of a device.
+//! A scene in real time: the finite elements behind the engine's [`palpa_rt::Tissue`], in the frame
+//! of a device.
 //!
 //! ```text
 //! scene ─► body, fine along the hand's way or where the tool is ─► LiveTissue ─► palpa_rt::Engine ◄─ device in a simulated hand
 //! ```
-//! The device's frame is that of the tool where it presses: z out of the tissue, x along the tool's length. Its origin is
-//! where the tool's tip hangs, [`palpa_scene::Motion::above`] over the first touch.
+//! The device's frame is the tool's frame where it presses: z points out of the tissue, x along the
+//! tool's length. Its origin is the rest position of the tool's tip, [`palpa_scene::Motion::above`]
+//! over the first touch.
 
 mod fine;
 mod hand;
@@ -39,16 +41,17 @@ use crate::press::column_length;
 use crate::press::mesh::along_skin;
 use crate::press::tissue::{note_mesh, note_tension};
 
-/// The zone is to hold the contact and the tissue that gives way beside it: so many times contact radius and depth, and at
-/// least so much, m.
+/// Radius of the zone as a multiple of contact radius plus depth, and its least value, m. The zone
+/// should contain the contact and the tissue beside it that deforms.
 const ZONE_RADII: f64 = 1.2;
 const LEAST_ZONE: f64 = 12e-3;
-/// How far a tool may go in a step of the tissue with the force at the device within about 2 % of the converged one, m: see
-/// "Force while moving" in docs/realtime.md.
+/// Distance that a tool may move in one step of the tissue, m, so that the force at the device
+/// stays within about 2 % of the converged one: see "Force while moving" in docs/realtime.md.
 pub const GOOD_TRAVEL: f64 = 0.2e-3;
-/// A body of more nodes takes gigabytes, and a step of it longer than a patch may be old.
+/// Largest number of nodes. A larger body needs gigabytes, and one step of it takes longer than the
+/// age limit of a patch.
 const MOST_NODES: usize = 80_000;
-/// Distance of the points along the hand's way at which the body is made fine, m.
+/// Distance between the points along the hand's way at which the body is refined, m.
 const WAY_STEP: f64 = 4e-3;
 
 /// A scene set up for real time.
@@ -56,26 +59,27 @@ const WAY_STEP: f64 = 4e-3;
 pub struct LiveScene {
     /// The body with its materials.
     pub model: Arc<Model>,
-    /// What presses.
+    /// The tool.
     pub tool: RigidTool,
-    /// Where the device's frame is: its origin is where the tool's tip hangs at rest.
+    /// Pose of the device's frame in the scene: its origin is the rest position of the tool's tip.
     pub scene_from_device: Pose,
-    /// Meshes for where the tool goes, if what is fine moves with it; the model is the first then.
+    /// Meshes for any place of the tool, if the fine part moves with it; then `model` is the first
+    /// of them.
     pub meshes: Option<Arc<FineScene>>,
-    /// The scene that is touched, with its body, lumps and materials.
+    /// The scene, with its body, lumps and materials.
     pub prepared: Arc<Prepared>,
-    /// Where the hand begins, in the device's frame, m.
+    /// Start of the hand, in the device's frame, m.
     pub start: Vec3,
-    /// How the moving step goes about its work.
+    /// Parameters of the real-time step.
     pub params: LiveParams,
     /// Mean length of the skin's edges near the tool, m.
     pub mesh_size: f64,
-    /// What a user should know.
+    /// Remarks for the user.
     pub notes: Vec<Note>,
 }
 
 impl LiveScene {
-    /// Grows the scene's body and makes it fine along the way of the hand.
+    /// Grows the scene's body and refines it along the way of the hand.
     ///
     /// # Errors
     /// When the scene does not fit together, or its tool is bonded to the skin.
@@ -92,12 +96,13 @@ impl LiveScene {
         let moves = scene.mesh.moves;
         if moves && !scene.mesh.refine {
             bail!(
-                "[mesh] moves = true needs refine = true: with refine = false nothing is fine that could move"
+                "[mesh] moves = true needs refine = true: with refine = false there is no fine mesh to move"
             );
         }
         let way = if moves { Vec::new() } else { way(scene) };
         let prepared = Arc::new(Prepared::on(scene, grown, &way)?);
-        // The body that the loop begins with; where the mesh moves, a body without tension needs no other.
+        // The body's state when the loop begins. Without tension it is the undeformed mesh, so
+        // there is nothing to solve.
         let rest = if prepared.is_tense() {
             Some(prepared.rest()?)
         } else {
@@ -153,7 +158,7 @@ impl LiveScene {
         })
     }
 
-    /// The tissue, untouched.
+    /// The tissue at rest.
     ///
     /// # Errors
     /// When the body cannot be factored.
@@ -161,7 +166,8 @@ impl LiveScene {
         self.tissue_at(self.start)
     }
 
-    /// The tissue, untouched, with the device at another place than where the scene's hand begins, in its own frame, m.
+    /// The tissue at rest, with the device at `start` (in its own frame, m) instead of the start of
+    /// the scene's hand.
     ///
     /// # Errors
     /// When the body cannot be factored.
@@ -182,7 +188,7 @@ impl LiveScene {
         ))
     }
 
-    /// The tool where the device is at `position` in its own frame, m.
+    /// The tool at its pose if the device is at `position`, in the device's frame, m.
     pub fn posed(&self, position: Vec3) -> PosedTool {
         PosedTool {
             tool: self.tool,
@@ -191,27 +197,27 @@ impl LiveScene {
     }
 }
 
-/// Where nothing is said of the mesh near the tool: a third of the radius that presses, where a press by script that may take its
-/// time has a quarter.
+/// The scene with a coarser mesh, if it gives no edge length near the tool: a third of the contact
+/// radius. A scripted press, which may take its time, uses a quarter.
 fn coarser(scene: &Scene) -> Scene {
     const COARSER: f64 = 4.0 / 3.0;
     let mut scene = scene.clone();
     let usual = scene.mesh.near_tool_of(&scene.tool);
     scene.mesh.near_tool = scene.mesh.near_tool.or(usual.map(|h| COARSER * h));
-    // One more than there may be: what is too fine is refused, and not made a little coarser.
+    // One vertex more than allowed, so that a mesh that is too fine is refused rather than silently
+    // coarsened.
     let n_levels = 1 + scene.layers.iter().map(|l| l.levels).sum::<usize>();
     scene.mesh.max_vertices = scene.mesh.max_vertices.min(MOST_NODES / n_levels + 1);
     scene
 }
 
-/// A radius that holds the contact at the depth of the hand.
+/// Radius of a zone that contains the contact at the hand's depth, m.
 fn zone_radius(scene: &Scene) -> f64 {
     let radius = scene.tool.contact_radius();
     (ZONE_RADII * (radius + scene.motion.depth)).max(LEAST_ZONE)
 }
 
-/// Where along its way across the skin the hand's tool will be, from the place pressed, in shares of the tool's own frame:
-/// x along and y across. m
+/// Positions of the tool along its way across the skin, relative to the pressed place, m.
 fn way(scene: &Scene) -> Vec<f64> {
     if !scene.motion.kind.goes_across() {
         return vec![0.0];
@@ -223,7 +229,7 @@ fn way(scene: &Scene) -> Vec<f64> {
         .collect()
 }
 
-/// Whether the hand's way lies on the body, and is not deeper than it.
+/// Adds a note if the hand's way leaves the skin, and fails if the way goes deeper than the tissue.
 fn check_way(scene: &Scene, prepared: &Prepared, notes: &mut Vec<Note>) -> anyhow::Result<()> {
     let (body, place) = (&prepared.grown.growth.body, prepared.place());
     let along = along_skin(scene, &place.direction);

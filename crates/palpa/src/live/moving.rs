@@ -1,4 +1,4 @@
-//! The moving step as the engine's tissue.
+//! Real-time finite elements as the engine's tissue.
 
 use super::Watch;
 use palpa_fem::PosedTool;
@@ -9,15 +9,15 @@ use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
 
-/// The finite elements of [`Roaming`] under tools whose poses come in a device's frame.
+/// The finite elements of [`Roaming`], with tools whose poses arrive in a device's frame.
 #[derive(Debug)]
 pub struct LiveTissue {
     body: Roaming,
-    /// Their frames are those of the devices' hand-pieces.
+    /// The tools, in the frames of the devices' hand-pieces.
     tools: Vec<RigidTool>,
     scene_from_device: Pose,
     tolerance: f64,
-    /// Of the last step; its memory is kept.
+    /// The tools with their poses at the last step; kept to reuse its memory.
     posed: Vec<PosedTool>,
     local: LocalModel,
     last: Option<LiveReport>,
@@ -25,7 +25,7 @@ pub struct LiveTissue {
 }
 
 impl LiveTissue {
-    /// A body under tools that hang at the device's origin; residuals are judged by `tolerance`.
+    /// A body with its tools at the device's origin. `tolerance` is the tolerance of the residuals.
     pub fn new(
         body: Roaming,
         mut tools: Vec<RigidTool>,
@@ -56,29 +56,29 @@ impl LiveTissue {
         }
     }
 
-    /// Lets a viewer look on: nothing depends on it.
+    /// Lets a viewer see the displacements. It has no influence on the results.
     #[must_use]
     pub fn watched(mut self, watch: Watch) -> Self {
         self.watch = Some(watch);
         self
     }
 
-    /// The moving step.
+    /// The real-time finite elements.
     pub fn live(&self) -> &Live {
         self.body.live()
     }
 
-    /// How many meshes there were, and how many could not be taken up.
+    /// Number of meshes used so far, and of meshes that could not be taken up.
     pub fn n_meshes(&self) -> [u64; 2] {
         self.body.n_meshes()
     }
 
-    /// What the last step said of itself.
+    /// Report of the last step.
     pub fn last(&self) -> Option<&LiveReport> {
         self.last.as_ref()
     }
 
-    /// Force of the tissue on a tool after the last step, N, in the device's frame.
+    /// Force of the tissue on a tool after the last step, in the device's frame, N.
     pub fn force(&self, tool: usize) -> Vec3 {
         self.scene_from_device
             .rotation
@@ -103,7 +103,7 @@ impl LiveTissue {
         patch.n_tools = self.local.tools.len().min(MAX_TOOLS);
         for (out, tool) in patch.tools.iter_mut().zip(&self.local.tools) {
             *out = ToolContact {
-                // Where the tool has been followed to, which may be short of where it is.
+                // The pose that the step reached, which may lag behind the device.
                 pose: frame.inverse() * tool.pose,
                 friction: tool.friction,
                 is_bonded: false,
@@ -111,7 +111,7 @@ impl LiveTissue {
                 stiffness: back * tool.stiffness * turn,
             };
         }
-        // Vertices of another mesh are others, whatever their numbers.
+        // Marks the vertices with their mesh: the same number in another mesh is another vertex.
         let mesh = ((self.body.n_meshes()[0] % 16) as u32) << 27;
         let n = self.local.contacts.len().min(MAX_CONTACTS);
         patch.n_contacts = n;
@@ -143,7 +143,8 @@ impl Tissue for LiveTissue {
     type Job = RoamJob;
     type Done = RoamDone;
 
-    /// A step in the air: memory is there and touched before anything presses.
+    /// Takes a step in the air, so that all memory is allocated and touched before the first
+    /// contact.
     fn prepare(&mut self) {
         let posed = std::mem::take(&mut self.posed);
         self.body.step(&posed, 0.0);
@@ -177,7 +178,7 @@ impl Tissue for LiveTissue {
             factor: report.factor,
             zone: report.zone,
             mesh: self.body.n_meshes()[0],
-            // The moving step works with forces alone.
+            // The finite elements work with forces only.
             energy: 0.0,
         }
     }

@@ -1,4 +1,4 @@
-//! What a log keeps of the scene, and the scene of a log.
+//! The scene's part of a log: the notes written into it, and the scene read back.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,16 +10,17 @@ use palpa_scene::{LumpShape, Scene, Skin, Thickness};
 const BASE: &str = "scene_dir";
 const FILE: &str = "file ";
 
-/// How a file of a scene stands to what it was.
+/// A file of the scene that has changed since the log was made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileState {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The difference to the file at the time of the log.
     pub problem: String,
 }
 
-/// The notes for a log that let its scene be made again: the folder that its paths start from, and what its files were.
+/// Notes for a log, from which its scene can be restored: the folder that its paths are relative
+/// to, and a fingerprint of each of its files.
 ///
 /// # Errors
 /// When a file cannot be read.
@@ -32,10 +33,10 @@ pub fn notes_of(scene: &Scene) -> anyhow::Result<BTreeMap<String, String>> {
     Ok(notes)
 }
 
-/// The scene that a log was made with.
+/// The scene that a log was recorded with.
 ///
 /// # Errors
-/// When the log has none, or this version does not read it.
+/// When the log has no scene, or this version cannot read it.
 pub fn scene_of(header: &Header) -> anyhow::Result<Scene> {
     if header.scene.is_empty() {
         anyhow::bail!(
@@ -46,7 +47,7 @@ pub fn scene_of(header: &Header) -> anyhow::Result<Scene> {
     Scene::parse(&header.scene, Path::new(base)).context("the scene in the log")
 }
 
-/// The files that are not what they were when the log was made.
+/// The files that have changed since the log was made.
 pub fn changed_files(header: &Header, scene: &Scene) -> Vec<FileState> {
     let mut changed = Vec::new();
     for path in files(scene) {
@@ -82,7 +83,7 @@ fn files(scene: &Scene) -> Vec<PathBuf> {
     files
 }
 
-/// Length and a hash (FNV-1a) of a file: against mix-ups, not against malice.
+/// Length and a hash (FNV-1a) of a file: protects against mix-ups, not against manipulation.
 fn fingerprint(path: &Path) -> anyhow::Result<String> {
     let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {

@@ -1,10 +1,12 @@
-//! The loop in simulated time: law, tissue and device as in the engine, with steps that take a fixed time.
+//! The loop in simulated time: law, tissue and device as in the engine, with steps that take a
+//! fixed time.
 //!
 //! ```text
 //! tick   0 1 2 3 4 5 6 7 8 …           1 kHz
 //! step   |--- 1 --|--- 2 --|           begun with the pose of its first tick, its patch offered where the next begins
 //! ```
-//! No wall time enters: the same input gives the same forces to the bit, on a busy machine too.
+//! No wall-clock time enters: the same input gives the same forces bit for bit, even on a busy
+//! machine.
 
 use palpa_device::{HapticDevice, Latest};
 use palpa_rt::{Tissue, TissueInput};
@@ -12,16 +14,16 @@ use palpa_servo::{
     DeviceState, ForceCommand, MAX_TOOLS, Pose, Servo, ServoParams, TickReport, Vec3,
 };
 
-/// How a rehearsal runs.
+/// Parameters of a rehearsal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RehearsalParams {
-    /// Time that a step of the tissue takes, s; rounded to ticks.
+    /// Duration of a step of the tissue, s; rounded to ticks.
     pub step_time: f64,
-    /// Steps that a background job takes.
+    /// Number of steps that a background job takes.
     pub job_steps: u32,
-    /// How long, s.
+    /// Simulated time, s.
     pub duration: f64,
-    /// The law's settings.
+    /// Settings of the control law.
     pub servo: ServoParams,
 }
 
@@ -36,20 +38,20 @@ impl Default for RehearsalParams {
     }
 }
 
-/// One tick.
+/// The results of one tick.
 #[derive(Debug, Clone, Copy)]
 pub struct RehearsalTick {
-    /// Clock, s.
+    /// Simulated time, s.
     pub time: f64,
-    /// What the device said of its position, m, in its own frame; the last that it said.
+    /// Position last reported by the device, in its own frame, m.
     pub position: Vec3,
-    /// Force that was commanded, N.
+    /// Commanded force, N.
     pub force: Vec3,
-    /// What the law says.
+    /// The law's report.
     pub report: TickReport,
 }
 
-/// Runs law and tissue with a device; `each_step` sees the tissue after every step.
+/// Runs law and tissue with a device. `each_step` is called with the tissue after every step.
 pub fn rehearse<T: Tissue>(
     tissue: &mut T,
     device: &mut dyn HapticDevice,
@@ -71,7 +73,7 @@ pub fn rehearse<T: Tissue>(
     tissue.prepare();
     for tick in 0..n_ticks {
         let now = tick as f64 * period;
-        // A device that is away leaves the tissue its last pose; the law is told that there is none.
+        // If the device is away, the tissue keeps its last pose and the law gets no reading.
         let state: Option<DeviceState> = device.read(now).ok();
         if let Some(state) = state {
             position = state.pose.translation.vector;
@@ -109,7 +111,7 @@ pub fn rehearse<T: Tissue>(
         let mut command = [ForceCommand::ZERO];
         let report = servo.tick(now, &[state], &mut patches, &mut command);
         stretch = report.tools[0].stretch;
-        // A device that is away cannot be told.
+        // A device that is away cannot receive the command.
         let _ = device.write(now, &command[0]);
         ticks.push(RehearsalTick {
             time: now,

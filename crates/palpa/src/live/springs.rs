@@ -1,4 +1,5 @@
-//! The reference method in real time: a node of the skin is operated, as in 2009, while the tool's tip presses it.
+//! The reference method in real time: as in 2009, one node of the skin is operated while the tool's
+//! tip presses it.
 
 use palpa_mesh::{LayeredBody, Vec3};
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
@@ -12,11 +13,11 @@ use crate::build::{BuiltBody, build_within, nearest};
 use crate::continuum;
 use crate::press::{Place, reference};
 
-/// The tip holds the node as a point that hardly slips.
+/// Coefficient of friction between tip and node: so high that the node hardly slips.
 const FRICTION: f64 = 5.0;
-/// The point that the tip is has a frame as any tool, m.
+/// The tip is a point; its frame is that of a sphere of this radius, m.
 const POINT: f64 = 5e-3;
-/// Way of the node by which its stiffness is measured, as a share of the mean edge.
+/// Displacement used to measure a node's stiffness, as a share of the mean edge length.
 const PROBE: f64 = 1e-3;
 
 /// A scene of the reference method, set up for real time.
@@ -24,9 +25,10 @@ const PROBE: f64 = 1e-3;
 pub struct SpringScene {
     scene: Arc<Scene>,
     built: Arc<BuiltBody>,
-    /// How far from the node the tip may be and still press it, m.
+    /// Largest distance from the node at which the tip still presses it, m.
     reach: f64,
-    /// Where the device's frame is: z out of the tissue where the scene presses, its origin over the skin.
+    /// Pose of the device's frame in the scene: z points out of the tissue where the scene presses,
+    /// and the origin lies above the skin.
     pub scene_from_device: Pose,
 }
 
@@ -46,7 +48,7 @@ impl SpringScene {
     /// Builds the body of a scene whose model is the reference method.
     ///
     /// # Errors
-    /// When the scene has what the reference method has not, or its body cannot be grown.
+    /// When the scene uses features that the reference method lacks, or its body cannot be grown.
     pub fn build(scene: &Scene) -> anyhow::Result<Self> {
         reference::check_reference(scene)?;
         let built = Arc::new(build_within(scene, MOST_NODES)?);
@@ -71,7 +73,7 @@ impl SpringScene {
         &self.built
     }
 
-    /// Where the hand begins, in the scene's frame, m.
+    /// Start of the hand, scene's frame, m.
     pub fn beginning(&self) -> Vec3 {
         self.scene_from_device.translation.vector
     }
@@ -81,7 +83,7 @@ impl SpringScene {
         &self.built.growth.body
     }
 
-    /// The body with a vertex of its skin operated.
+    /// The body with one vertex of its skin operated.
     ///
     /// # Errors
     /// When its network cannot be built.
@@ -105,7 +107,7 @@ impl SpringScene {
         })
     }
 
-    /// The tissue, untouched, in the frame of a device.
+    /// The tissue at rest, with the tip at `tip`.
     ///
     /// # Errors
     /// When its network cannot be built.
@@ -124,7 +126,7 @@ impl SpringScene {
     }
 }
 
-/// How the force on the node resists, N/m: by small steps along each axis.
+/// Stiffness of the node, N/m, from a small step along each axis.
 fn stiffness(model: &SpringModel, params: &StepParams, probe: f64) -> Mat3 {
     let mut k = Mat3::zeros();
     for axis in 0..3 {
@@ -138,16 +140,17 @@ fn stiffness(model: &SpringModel, params: &StepParams, probe: f64) -> Mat3 {
     (k + k.transpose()) * 0.5
 }
 
-/// The network of bars under a tip that operates a node of its skin.
+/// The network of bars under a tip that operates one node of its skin.
 #[derive(Debug)]
 pub struct SpringTissue {
     scene: SpringScene,
     held: Held,
     state: SpringState,
     workspace: Workspace,
-    /// Where the tip took the node, off the node's place at rest along the skin, m; none while it presses nothing.
+    /// Point where the tip took hold of the node, relative to the node at rest and along the skin,
+    /// m; `None` while the tip presses nothing.
     grip: Option<Vec3>,
-    /// The vertex that the tip is over, where it is another.
+    /// The vertex under the tip, if it is not the operated one.
     wanted: Option<usize>,
     n_held: u64,
     watch: Option<Watch>,
@@ -221,7 +224,7 @@ impl SpringTissue {
     }
 }
 
-/// A vertex that is to be operated, and the scene that it is of.
+/// A job: make this vertex of the scene the operated one.
 #[derive(Debug)]
 pub struct Take(SpringScene, usize);
 
@@ -265,7 +268,7 @@ impl Tissue for SpringTissue {
 
     fn install(&mut self, done: Option<Held>) {
         let Some(held) = done else { return };
-        // A node that is operated by now is not let go for another.
+        // If the tip presses a node by now, that node stays operated.
         if self.grip.is_none() {
             self.state = SpringState::new(&held.model);
             self.workspace = Workspace::new(&held.model);

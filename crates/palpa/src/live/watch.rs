@@ -1,23 +1,23 @@
-//! What a viewer sees of the tissue: the latest displacements, left where nobody has to wait for anybody.
+//! The viewer's copy of the tissue's displacements, passed on without waiting on either side.
 
 use palpa_fem::realtime::{Glance, Roaming};
 use palpa_mesh::Vec3;
 use palpa_rt::{Reader, Writer, mailbox};
 
-/// The body at one step of the tissue.
+/// The body at one step of the tissue, for a viewer.
 #[derive(Debug, Default)]
 pub struct Look {
-    /// The step.
+    /// Number of the step.
     pub step: u64,
-    /// Which mesh it was, counted from 1.
+    /// Number of the mesh, from 1.
     pub mesh: u64,
-    /// Round which place (at rest, m) it was fine, and up to which distance, m; none where what is fine does not move.
+    /// Centre (at rest, m) and radius (m) of the fine part of the mesh; `None` if it does not move.
     pub fine: Option<(Vec3, f64)>,
-    /// What it was.
+    /// The displacements; `None` before the first look.
     pub body: Option<Seen>,
 }
 
-/// The body that was looked at.
+/// The displacements of a body.
 #[derive(Debug)]
 pub enum Seen {
     /// Finite elements.
@@ -26,7 +26,7 @@ pub enum Seen {
     Springs(Vec<Vec3>),
 }
 
-/// The tissue's end.
+/// The tissue's end: makes the looks.
 #[derive(Debug)]
 pub struct Watch {
     writer: Writer<Look>,
@@ -35,7 +35,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Looks at most once in a period, s, and where they are read.
+    /// Makes at most one look per `period`, s. Returns the end that reads them, too.
     pub fn new(period: f64) -> (Self, Reader<Look>) {
         let (writer, reader) = mailbox([(); 3].map(|()| Box::<Look>::default()));
         let due = f64::NEG_INFINITY;
@@ -47,7 +47,7 @@ impl Watch {
         (watch, reader)
     }
 
-    /// Leaves a look at a body of finite elements, if one is due. Cost: a copy of the displacements.
+    /// Makes a look at a body of finite elements, if one is due. Cost: a copy of the displacements.
     pub(super) fn look(&mut self, step: u64, now: f64, body: &Roaming) {
         let [mesh, _] = body.n_meshes();
         self.leave(step, now, mesh, body.fine(), |old| {
@@ -59,7 +59,7 @@ impl Watch {
         });
     }
 
-    /// Leaves a look at displacements, if one is due.
+    /// Makes a look at displacements, if one is due.
     pub(super) fn look_at(
         &mut self,
         step: u64,

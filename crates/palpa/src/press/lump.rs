@@ -1,23 +1,24 @@
-//! Lumps as they are looked at: their share of every prism, and their surface as it moves with the tissue.
+//! Lumps for display: their share of every prism, and their surface as it moves with the tissue.
 
 use palpa_fem::lump::Lump;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 
-/// Samples along each side of a triangle, and over the height of a prism.
+/// Number of sample points along each side of a triangle, and over the height of a prism.
 const IN_PLANE: usize = 4;
 const IN_DEPTH: usize = 4;
-/// Fewest points in a lump that tell how much of it lies in the tissue, cells across it at first, and at most.
+/// To compute a lump's share in the tissue: least number of points inside it, and the number of
+/// grid cells across it at first and at most.
 const FEWEST_POINTS: usize = 500;
 const FIRST_CELLS: usize = 12;
 const MOST_CELLS: usize = 48;
-/// A point this far outside a tetrahedron, as a share of its height, is in it: neighbouring prisms may be cut along the
-/// other diagonal of a bent side.
+/// Tolerance of the point-in-tetrahedron test, as a share of the tetrahedron's height. Neighbouring
+/// prisms may be cut along different diagonals of a bent side, which leaves gaps.
 const OUTSIDE: f64 = 0.02;
-/// Corners round the surface of a lump of a simple shape, and from pole to pole.
+/// Number of corners around the surface of a lump of a simple shape, and from pole to pole.
 const AROUND: usize = 48;
 const UPWARD: usize = 24;
 
-/// Share of every prism that is lump, by volume, sampled; empty without lumps. `[n_prisms]`
+/// Share of each prism's volume that belongs to lumps, sampled; empty without lumps. `[n_prisms]`
 pub fn lump_shares(body: &LayeredBody, lumps: &[Lump]) -> Vec<f64> {
     if lumps.is_empty() {
         return Vec::new();
@@ -40,7 +41,7 @@ pub fn lump_shares(body: &LayeredBody, lumps: &[Lump]) -> Vec<f64> {
             }
             let (mut sum, mut n) = (0.0, 0.0);
             for x in samples(&corners) {
-                // Where lumps overlap there is no more than one.
+                // Where lumps overlap, the share stays at most 1.
                 let left: f64 = nearby.iter().map(|lump| 1.0 - lump.fraction(&x)).product();
                 sum += 1.0 - left;
                 n += 1.0;
@@ -82,7 +83,7 @@ pub fn share_inside(body: &LayeredBody, lump: &Lump) -> f64 {
     n_in_body.count() as f64 / points.len() as f64
 }
 
-/// Points spread evenly over the inside of a lump. m
+/// Points spread evenly over the inside of a lump, m.
 fn points_inside(lump: &Lump) -> Vec<Vec3> {
     let (middle, reach) = lump.bounding_sphere();
     let mut n = FIRST_CELLS;
@@ -100,7 +101,7 @@ fn points_inside(lump: &Lump) -> Vec<Vec3> {
     }
 }
 
-/// The surface of a lump of a simple convex shape at rest. m
+/// The surface at rest of a lump of a simple convex shape, m.
 pub(crate) fn surface_of_shape(lump: &Lump) -> Surface {
     let (middle, reach) = lump.bounding_sphere();
     let axes = lump.pose().rotation;
@@ -137,7 +138,7 @@ pub(crate) fn surface_of_shape(lump: &Lump) -> Surface {
     Surface { points, triangles }
 }
 
-/// How far a convex lump reaches from its middle in a direction. m
+/// Distance from the middle of a convex lump to its surface in a direction, m.
 fn border(lump: &Lump, middle: &Vec3, direction: &Vec3, most: f64) -> f64 {
     let (mut inside, mut outside) = (0.0, most);
     for _ in 0..50 {
@@ -154,14 +155,14 @@ fn border(lump: &Lump, middle: &Vec3, direction: &Vec3, most: f64) -> f64 {
 /// Points inside a body that move with it.
 #[derive(Debug)]
 pub struct Embedded {
-    /// For each point four nodes and their weights.
+    /// For each point, four nodes and their weights.
     nodes: Vec<[usize; 4]>,
     weights: Vec<[f64; 4]>,
 }
 
 impl Embedded {
-    /// Finds each of the points (m, at rest) among the tetrahedra that prisms divide into; one outside the body goes with the
-    /// nearest.
+    /// Finds for each point (m, at rest) the tetrahedron that contains it; each prism is divided
+    /// into tetrahedra. A point outside the body uses the nearest one.
     pub fn new(body: &LayeredBody, points: &[Vec3]) -> Self {
         let found = nearest_tetrahedra(body, points);
         Self {
@@ -177,7 +178,7 @@ impl Embedded {
         }
     }
 
-    /// How far each point moves with the nodes. m
+    /// Displacement of each point from those of the nodes, m.
     pub fn displacements(&self, of_nodes: &[Vec3]) -> Vec<Vec3> {
         (self.nodes.iter().zip(&self.weights))
             .map(|(nodes, weights)| {
@@ -189,8 +190,9 @@ impl Embedded {
     }
 }
 
-/// For each of the points (m, at rest) the four nodes of the tetrahedron that it lies in or nearest to, of those that
-/// prisms divide into, and their weights there: one is negative outside. Without any nearby, all weights are.
+/// For each point (m, at rest), four nodes and their weights: of the tetrahedron that contains the
+/// point, or of the nearest one. Outside a tetrahedron one weight is negative. If no tetrahedron is
+/// near the points, all weights are negative.
 fn nearest_tetrahedra(body: &LayeredBody, points: &[Vec3]) -> Vec<([usize; 4], [f64; 4])> {
     let far = f64::NEG_INFINITY;
     let mut found = vec![([0; 4], [far; 4]); points.len()];
@@ -219,7 +221,8 @@ fn nearest_tetrahedra(body: &LayeredBody, points: &[Vec3]) -> Vec<([usize; 4], [
                 {
                     let w = inverse * (point - corners[tet[0]]);
                     let weights = [1.0 - w.sum(), w.x, w.y, w.z];
-                    // Inside, the least weight is positive; the greatest least is the nearest.
+                    // Inside, the least weight is positive. Outside, the tetrahedron with the
+                    // largest least weight is the nearest.
                     let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
                     if least > *best_least {
                         (*best_least, *best) = (least, (tet.map(|k| prism[k]), weights));

@@ -1,4 +1,4 @@
-//! The body made fine where it is pressed and where lumps lie, and the skin under a bonded disc.
+//! Refines the body where it is pressed and around lumps, and finds the skin under a bonded disc.
 
 use nalgebra::Unit;
 use palpa_fem::lump::{Lump, LumpShape};
@@ -14,40 +14,46 @@ use super::{Place, nodes_under_disc};
 use crate::build::{BuiltBody, nearest};
 use crate::note::{Note, xyz};
 
-/// Most levels that splitting leads to: the cost grows with their cube.
+/// Largest number of levels that splitting may lead to: the cost grows with the cube of the number.
 const MOST_LEVELS: usize = 24;
-/// How near the radius of the circle with the patch's area comes to the disc's, and how often that is tried.
+/// Relative tolerance of the radius of the circle with the patch's area, compared to the disc's,
+/// and the number of attempts.
 const RADIUS_TOLERANCE: f64 = 1e-4;
 const TRIES: usize = 5;
-/// Columns draw together towards a bone: for a lump there the skin is refined more widely, and less finely, by up to this.
+/// Columns converge towards a bone. For a lump near the bone, the skin above is therefore refined
+/// over a wider area and less finely, by up to this factor.
 const MOST_CONVERGENCE: f64 = 4.0;
 
-/// Halving leaves triangles whose longest edge is from half to the whole of what was asked for; of this multiple, the edges
-/// have the wanted length in the mean.
+/// Halving leaves triangles whose longest edge is between half and the whole of the requested
+/// length. With this multiple of the wanted length as the request, the mean edge has the wanted
+/// length.
 const SLACK: f64 = 1.4;
 
-/// An interval that is too high by less than this factor is not worth another level in the whole body.
+/// An interval that is too high by less than this factor is not split: a new level would run
+/// through the whole body.
 const SPARED: f64 = 1.05;
 
-/// The greatest height wanted between two places of an interval, as shares of it.
+/// Arguments: index of an interval, and two places in it as shares of its height. Returns the
+/// largest wanted height between them, m.
 type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
 
-/// A body fit to be pressed.
+/// A body that is refined for a press.
 #[derive(Debug)]
 pub struct PressedBody {
-    /// The refined body. Its first vertices are those of the body as it was grown.
+    /// The refined body. Its first vertices are those of the body before refinement.
     pub body: LayeredBody,
-    /// Where it is pressed: at the vertex nearest to where the scene says.
+    /// The place that is pressed: the vertex nearest to the scene's target.
     pub place: Place,
-    /// For each vertex to which share of their thickness the layers were thinned. `[n_vertices]`
+    /// For each vertex, the thickness of the layers relative to the thickness that the scene asks
+    /// for. `[n_vertices]`
     pub thinning: Vec<f64>,
-    /// How far the base stands off the bone, m; empty without bones. `[n_vertices]`
+    /// Stand-off of the base from the bone, m; empty without bones. `[n_vertices]`
     pub stand_off: Vec<f64>,
-    /// The skin that is bonded to a disc.
+    /// The skin that is bonded to a disc, if the tool is one.
     pub patch: Option<Patch>,
     /// Mean length of the skin's edges near the tool. m
     pub mesh_size: f64,
-    /// Whether everything is as fine as it is wanted to be.
+    /// Whether the mesh is as fine everywhere as it should be.
     pub is_resolved: bool,
 }
 
@@ -56,17 +62,18 @@ pub struct PressedBody {
 pub struct Patch {
     /// Its skin vertices, ascending.
     pub vertices: Vec<usize>,
-    /// For each of them the area of the patch that it stands for. m²
+    /// For each vertex, the area of the patch that it stands for, m².
     pub areas: Vec<f64>,
-    /// Radius of the circle with the patch's area, seen along the press. m
+    /// Radius of the circle with the patch's area, seen along the press, m.
     pub radius: f64,
 }
 
 impl PressedBody {
-    /// Refines the scene's body as its `[mesh]` says, also so far from the place along the motion (m) as `way` says.
+    /// Refines the scene's body as its `[mesh]` says. `way` holds distances from the place along
+    /// the motion, m, at which the body is refined too.
     ///
     /// # Errors
-    /// When direction or depth do not fit the place.
+    /// When the direction or the depth does not fit the place.
     pub fn build(
         scene: &Scene,
         built: &BuiltBody,
@@ -75,7 +82,7 @@ impl PressedBody {
         notes: &mut Vec<Note>,
     ) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
-        // What is wrong with the place is said before any work, and once.
+        // Check the place first, before any work, and only once.
         let mut vertex = built.press_vertex;
         let coarse = Place::find(scene, grown, vertex, &mut Vec::new())?;
         let mut refined = refine_near(scene, built, &coarse, lumps, way, notes);
@@ -114,7 +121,8 @@ impl PressedBody {
     }
 }
 
-/// Where the skin is to be fine: edges of `h` within `radius` of the points, all in metres.
+/// A region of the skin that should be fine: edges of length `h` within `radius` of the points. All
+/// in m.
 #[derive(Debug, Clone)]
 struct Fine {
     points: Vec<Vec3>,
@@ -122,7 +130,7 @@ struct Fine {
     h: f64,
 }
 
-/// More columns near the tool and above lumps.
+/// Adds columns near the tool and above lumps.
 fn refine_near(
     scene: &Scene,
     built: &BuiltBody,
@@ -148,7 +156,7 @@ fn refine_near(
     refined(scene, body, &fine)
 }
 
-/// As fine as it is wanted, if the scene lets it be refined.
+/// The body refined as requested, if the scene allows refinement.
 fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
     let params = RefineParams {
         max_vertices: scene.mesh.max_vertices,
@@ -165,7 +173,7 @@ fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
     })
 }
 
-/// The skin over lumps.
+/// Adds the regions of the skin above lumps.
 fn over_lumps(
     scene: &Scene,
     body: &LayeredBody,
@@ -198,25 +206,26 @@ fn over_lumps(
     fine
 }
 
-/// A body that can be made fine round any place of its skin. Its levels are those that the scene's own place wants.
+/// A body that can be refined around any place of its skin. Its levels are those for the scene's
+/// own place.
 #[derive(Debug)]
 pub struct CoarseBody {
-    /// As it was grown, with these levels.
+    /// The body as it was grown, with the split levels.
     pub body: LayeredBody,
-    /// Where it is fine in any case.
+    /// Regions that are always fine.
     fine: Vec<Fine>,
-    /// Length of edges near the tool, m; none of a tool that asks for none.
+    /// Edge length near the tool, m; `None` for a tool that needs no refinement.
     h: Option<f64>,
 }
 
 impl CoarseBody {
-    /// The scene's body.
+    /// Builds the coarse body of a scene.
     ///
     /// # Errors
-    /// When direction or depth do not fit the place.
+    /// When the direction or the depth does not fit the place.
     pub fn build(scene: &Scene, built: &BuiltBody, lumps: &[Lump]) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
-        // What there is to say is said of the body that is pressed first.
+        // The notes are dropped: those of the first pressed body say the same.
         let mut notes = Vec::new();
         let place = Place::find(scene, grown, built.press_vertex, &mut notes)?;
         let (body, _) = split_near(scene, grown.clone(), &place, lumps);
@@ -228,7 +237,7 @@ impl CoarseBody {
         })
     }
 
-    /// Made fine within a radius round a point of the skin, m.
+    /// The body refined within `radius` of a point of the skin, m.
     pub fn fine_round(&self, scene: &Scene, point: Vec3, radius: f64) -> LayeredBody {
         let mut fine = self.fine.clone();
         fine.extend(self.h.map(|h| Fine {
@@ -240,7 +249,7 @@ impl CoarseBody {
     }
 }
 
-/// Points of the skin that the tool presses on, and how far round them it reaches. m
+/// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
 fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
     let (reach, radius) = match scene.tool {
         Tool::Disc { radius } => ([0.0; 2], radius),
@@ -263,7 +272,8 @@ fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64
     (points, radius)
 }
 
-/// The unit vector along which the scene's hand goes across the skin that is pressed in this direction.
+/// Unit vector along which the scene's hand moves across the skin, if the skin is pressed in
+/// `direction`.
 pub fn along_skin(scene: &Scene, direction: &Unit<Vec3>) -> Vec3 {
     let first = scene.tool.contact().map_or(Vec3::x(), |tool| {
         Vec3::from(tool.axes(direction.into_inner().into())[0])
@@ -273,13 +283,14 @@ pub fn along_skin(scene: &Scene, direction: &Unit<Vec3>) -> Vec3 {
     flat.try_normalize(1e-6).unwrap_or(first)
 }
 
-/// Points along a lump, and the radius of balls round them that hold it. m
+/// Points along the axis of a lump, and the radius of balls around them that together contain it,
+/// m.
 fn backbone(lump: &Lump) -> (Vec<Vec3>, f64) {
     let (middle, bound) = lump.bounding_sphere();
     let (half_length, radius) = match lump.shape() {
         LumpShape::Capsule(shape) => (shape.length() / 2.0, shape.radius()),
         LumpShape::Ellipsoid(shape) => {
-            // Its first axis is the one that is usually long; the others are held by the radius.
+            // The first axis is usually the long one; the radius covers the other two.
             let across = shape.radii().y.max(shape.radii().z);
             ((shape.radii().x - across).max(0.0), across)
         }
@@ -291,18 +302,18 @@ fn backbone(lump: &Lump) -> (Vec<Vec3>, f64) {
     ((-n..=n).map(at).collect(), radius + lump.transition() / 2.0)
 }
 
-/// Finds the skin above a place inside.
+/// Finds the skin above a point inside the body.
 struct Shadows<'a> {
     body: &'a LayeredBody,
     levels: Vec<(Surface, SurfaceIndex)>,
 }
 
-/// The skin above a place inside.
+/// The skin above a point inside the body.
 struct Shadow {
     on_skin: Vec3,
-    /// The triangle of the skin whose columns hold the place.
+    /// The triangle of the skin whose columns contain the point.
     triangle: usize,
-    /// How much wider the columns are at the skin than at the place.
+    /// Width of the columns at the skin relative to their width at the point.
     convergence: f64,
 }
 
@@ -353,7 +364,7 @@ impl<'a> Shadows<'a> {
     }
 }
 
-/// Splits levels under the tool and round lumps; says whether they are as low as wanted now.
+/// Splits levels under the tool and around lumps. Returns whether they are now as low as wanted.
 fn split_near(
     scene: &Scene,
     body: LayeredBody,
@@ -403,8 +414,8 @@ fn split_near(
     (split_levels(&body, &parts).body, is_met)
 }
 
-/// The skin that a disc holds. On a body that may be refined the disc's edge becomes a ring of vertices, on a circle that
-/// gives the patch the disc's area.
+/// The skin that a disc holds. If the body may be refined, the disc's edge becomes a ring of
+/// vertices. They lie on a circle that gives the patch the disc's area.
 fn bond(
     scene: &Scene,
     refined: &mut Refined,
@@ -447,7 +458,7 @@ fn bond(
         .collect();
     let area = seen_area(body, &triangles, &place.direction);
     let patch = Patch {
-        // Vertices that hang on edges or stand alone have no area.
+        // Hanging vertices and isolated vertices have no area.
         areas: areas_of(
             body,
             &triangles,
@@ -465,7 +476,8 @@ fn bond(
     patch
 }
 
-/// The refined body with the disc's edge in its skin, the triangles inside, and the radius of their area.
+/// The refined body with the disc's edge in its skin, the triangles inside the edge, and the radius
+/// of the circle with their area.
 fn imprinted(
     refined: &Refined,
     place: &Place,
@@ -493,7 +505,7 @@ fn imprinted(
     }
 }
 
-/// The area of the triangles that each of the vertices stands for. m²
+/// The area of the triangles that each vertex stands for, m².
 fn areas_of(
     body: &LayeredBody,
     triangles: &[u32],
@@ -511,6 +523,6 @@ fn areas_of(
 
 fn seen_area(body: &LayeredBody, triangles: &[u32], direction: &Unit<Vec3>) -> f64 {
     let seen = |&t: &u32| body.skin.area_vector(t as usize).dot(direction).abs();
-    // Plus zero: the sum of nothing is "minus nothing".
+    // Adding zero turns -0 (an empty sum) into 0.
     triangles.iter().map(seen).sum::<f64>() + 0.0
 }

@@ -1,4 +1,4 @@
-//! Where a scene presses, and which way.
+//! The place that a scene presses, and the direction.
 
 use anyhow::bail;
 use nalgebra::Unit;
@@ -8,29 +8,30 @@ use palpa_scene::Scene;
 use crate::build::in_mm;
 use crate::note::Note;
 
-/// Edges within this many tool radii of the press point make the mesh size near the tool.
+/// The mesh size near the tool is the mean of the edges within this many tool radii of the press
+/// point.
 const NEAR_TOOL: f64 = 2.0;
-/// Beyond this angle from the inward normal (60°) a press direction is worth a note.
+/// A press direction further than this angle from the inward normal (60°) gives a note.
 const OBLIQUE_COS: f64 = 0.5;
 
 /// The place that is pressed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// The skin vertex pressed on.
+    /// The skin vertex that is pressed.
     pub vertex: usize,
-    /// Its place at rest. m
+    /// Its position at rest, m.
     pub at: Vec3,
-    /// The way the tool goes.
+    /// Unit vector along which the tool moves.
     pub direction: Unit<Vec3>,
-    /// Depth of the tissue below the vertex. m
+    /// Depth of the tissue below the vertex, m.
     pub tissue_depth: f64,
 }
 
 impl Place {
-    /// The place at a skin vertex of the body, as `scene` presses it.
+    /// The place of `scene`'s press at a skin vertex of the body.
     ///
     /// # Errors
-    /// When the direction leads out of the body, or the depth through it.
+    /// When the direction leads out of the body, or the depth leads through it.
     pub fn find(
         scene: &Scene,
         body: &LayeredBody,
@@ -85,13 +86,14 @@ impl Place {
     }
 }
 
-/// How much tissue there is under a skin vertex, m.
+/// Length of the column under a skin vertex, m.
 pub fn column_length(body: &LayeredBody, v: usize) -> f64 {
     let p = |l: usize| body.positions[body.node(v, l)];
     (1..body.n_levels).map(|l| (p(l) - p(l - 1)).norm()).sum()
 }
 
-/// Mean length of the skin's edges near a place; of those at its vertex where the tool is smaller than the mesh.
+/// Mean length of the skin's edges near a place, m; if the tool is smaller than the mesh, of the
+/// edges at the nearest vertex.
 pub(super) fn mesh_size_near(body: &LayeredBody, at: Vec3, radius: f64) -> f64 {
     let skin = &body.skin;
     let edges: Vec<(f64, f64)> = skin

@@ -1,39 +1,40 @@
-//! When the tool is where.
+//! The movement of the tool over time.
 
 use palpa_scene::Press;
 use serde::Serialize;
 
-/// The parts of an indentation.
+/// The phases of an indentation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// Going down.
+    /// The tool goes down.
     Load,
-    /// Resting at the depth.
+    /// The tool rests at its depth.
     Hold,
-    /// Coming back.
+    /// The tool comes back.
     Retract,
 }
 
-/// Where the tool is at one sample.
+/// The tool's depth at one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
-    /// Part of the indentation.
+    /// Phase of the indentation.
     pub phase: Phase,
-    /// How often it has gone down before.
+    /// Number of cycles completed before.
     pub cycle: u32,
-    /// Time since the start. s
+    /// Time since the start, s.
     pub time: f64,
-    /// How far it has gone. m
+    /// Depth of the tool, m.
     pub depth: f64,
 }
 
-/// Number of equal steps down, of which none is larger than asked for.
+/// Number of equal steps down; none is larger than the scene asks for.
 pub fn n_steps(press: &Press) -> usize {
     (press.depth / press.step - 1e-9).ceil().max(1.0) as usize
 }
 
-/// Down in equal steps at this speed (m/s), a rest sampled at these shares of its duration, and back; and again.
+/// The waypoints of a press: equal steps down at `speed` (m/s), a rest sampled at these shares of
+/// its duration, and back; repeated for each cycle.
 pub fn waypoints(press: &Press, speed: f64, rests: &[f64]) -> Vec<Waypoint> {
     let n = n_steps(press);
     let depth_at = |i: usize| press.depth * i as f64 / n as f64;
@@ -49,7 +50,7 @@ pub fn waypoints(press: &Press, speed: f64, rests: &[f64]) -> Vec<Waypoint> {
                 depth,
             });
         };
-        // Where a cycle ends, the next one begins.
+        // The last waypoint of a cycle is the first of the next.
         for i in usize::from(cycle > 0)..=n {
             push(Phase::Load, depth_at(i) / speed, depth_at(i));
         }

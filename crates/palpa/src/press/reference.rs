@@ -1,4 +1,5 @@
-//! The indentation with the reference method: bars between nodes, and a tool whose nodes are bonded to it.
+//! The scripted indentation with the reference method: bars between nodes, and a tool bonded to its
+//! nodes.
 
 use anyhow::bail;
 use palpa_mesh::quality::prism_shapes;
@@ -15,74 +16,78 @@ use super::{Phase, Place, Waypoint, tidy, waypoints};
 use crate::build::BuiltBody;
 use crate::note::{LayerAspect, Note, xyz};
 
-/// Samples of a rest, evenly spread: springs do not relax, so that it is all the same.
+/// Times of the samples of a rest, as shares of its duration. They are evenly spaced, because
+/// springs do not relax.
 const HOLD_SAMPLES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
-/// Fewer skin nodes under a disc are worth a note: from 7 to 35 nodes the force on a real forearm changed by a quarter.
+/// Fewer skin nodes under a disc than this give a note: between 7 and 35 nodes the force on a real
+/// forearm changed by a quarter.
 const ENOUGH_NODES: usize = 20;
-/// Heights of a level over the length of its edges within which bars stand for a Young's modulus
+/// Ratio of a level's height to its edge length within which bars represent a Young's modulus
 /// (`docs/theory/spring_stiffness.md`).
 const SOUND_ASPECT: std::ops::RangeInclusive<f64> = 0.5..=1.2;
 
-/// An indentation that is set up: what does not change while it runs.
+/// An indentation that is set up: the data that stays constant while it runs.
 #[derive(Debug)]
 pub struct BarIndentation {
     /// The spring model of the body under the tool.
     pub model: SpringModel,
-    /// Where it is pressed.
+    /// The place that is pressed.
     pub place: Place,
     /// Mean length of the skin's edges near the tool. m
     pub mesh_size: f64,
-    /// What a user should know beside the result.
+    /// Remarks for the user.
     pub notes: Vec<Note>,
     params: StepParams,
     path: Vec<Waypoint>,
 }
 
-/// One line of the result. Forces act on the tool.
+/// One row of the result. Forces act on the tool.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BarSample {
-    /// Part of the indentation.
+    /// Phase of the indentation.
     pub phase: Phase,
-    /// Time since the start. s
+    /// Time since the start, s.
     pub time_s: f64,
-    /// Depth of the tool along its direction. mm
+    /// Depth of the tool along its direction, mm.
     pub depth_mm: f64,
-    /// Force against the tool's direction: what pushes back. N
+    /// Force on the tool against its direction, N; positive when the body pushes back.
     pub force_n: f64,
-    /// Components of the force on the tool. N
+    /// x component of the force on the tool, N.
     pub force_x_n: f64,
-    /// See `force_x_n`.
+    /// y component of the force on the tool, N.
     pub force_y_n: f64,
-    /// See `force_x_n`.
+    /// z component of the force on the tool, N.
     pub force_z_n: f64,
-    /// Pushing back by the bars as they are stretched now; its difference to `force_n` is what the increments leave out.
+    /// The same force computed from the present stretch of the bars, N. Its difference to `force_n`
+    /// is the error of the incremental solution.
     pub bar_force_n: f64,
-    /// (3.18) to the letter, along the direction: the reaction before the free nodes moved over the step's duration. It
-    /// depends on the step; for comparison only, never sent to a device. N/ms
+    /// Equation (3.18) taken literally, along the direction, N/ms: the reaction before the free
+    /// nodes moved, divided by the step's duration. It depends on the step size. For comparison
+    /// only, never sent to a device.
     pub literal_n_per_ms: f64,
-    /// Largest force on a free node that is not in equilibrium, over the largest nodal force.
+    /// Largest unbalanced force on a free node, divided by the largest nodal force.
     pub imbalance: f64,
-    /// Prisms that are turned over: bars have no volume and do not prevent it. From the first one on the force is that
-    /// of the bars alone, no longer of a body.
+    /// Number of prisms that are turned inside out: bars have no volume and do not prevent it. From
+    /// the first one on, the force is that of the bars only and no longer that of a body.
     pub n_inverted: usize,
-    /// How the step ended. If it diverged, the state is the one before, the forces are those of the sample before, and the
-    /// run ends.
+    /// Result of the step. If it diverged, the state and the forces are those of the previous
+    /// sample, and the run ends.
     pub outcome: BarOutcome,
 }
 
-/// How the step to a sample ended.
+/// Result of the step to a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BarOutcome {
-    /// By incremental finite elements.
+    /// Solved by incremental finite elements.
     Converged,
-    /// The step was singular and was done by explicit Euler.
+    /// The step was singular and was solved by explicit Euler.
     EulerFallback,
-    /// The body was lost.
+    /// The body diverged.
     Diverged,
 }
 
-/// What moves while an indentation runs.
+/// The state of a running indentation.
 #[derive(Debug)]
 pub struct BarRun<'a> {
     indentation: &'a BarIndentation,
@@ -96,7 +101,7 @@ pub struct BarRun<'a> {
 }
 
 impl BarIndentation {
-    /// Sets up the indentation that `scene` asks for on its body.
+    /// Sets up the scene's indentation on its body.
     ///
     /// # Errors
     /// When the place, the depth or the constraints do not fit the body.
@@ -152,7 +157,7 @@ impl BarIndentation {
         self.path.len()
     }
 
-    /// The index of the deepest sample, where loading ends.
+    /// Index of the deepest sample, at the end of loading.
     pub fn deepest(&self) -> usize {
         self.path
             .iter()
@@ -160,7 +165,7 @@ impl BarIndentation {
             .unwrap_or(0)
     }
 
-    /// Begins a run at rest. `body` is the one that this was built on.
+    /// Starts a run at rest. `body` must be the body that this was built on.
     pub fn start<'a>(&'a self, body: &'a LayeredBody) -> BarRun<'a> {
         BarRun {
             indentation: self,
@@ -175,7 +180,7 @@ impl BarIndentation {
 }
 
 impl BarRun<'_> {
-    /// Goes on to the next sample; `None` at the end. A sample that diverged is the last.
+    /// Computes the next sample; `None` at the end. A sample that diverged is the last.
     pub fn advance(&mut self) -> Option<BarSample> {
         let BarIndentation {
             model,
@@ -186,7 +191,7 @@ impl BarRun<'_> {
         } = self.indentation;
         let waypoint = *path.get(self.next)?;
         let displacement = direction.into_inner() * (waypoint.depth - self.depth);
-        // Springs do not relax with time: at rest nothing happens, whatever the number of samples.
+        // Springs do not relax, so nothing changes during a rest, whatever the number of samples.
         let corrections = match waypoint.phase {
             Phase::Hold => Corrections::OFF,
             Phase::Load | Phase::Retract => params.corrections,
@@ -220,7 +225,7 @@ impl BarRun<'_> {
             phase: waypoint.phase,
             time_s: tidy(waypoint.time),
             depth_mm: tidy(waypoint.depth * 1e3),
-            // Plus zero: no sample is "minus nothing".
+            // Adding zero turns -0 into 0.
             force_n: -report.force.dot(direction) + 0.0,
             force_x_n: report.force.x,
             force_y_n: report.force.y,
@@ -234,7 +239,7 @@ impl BarRun<'_> {
     }
 }
 
-/// Refuses what bars between nodes cannot do.
+/// Refuses a scene with features that the reference method does not have.
 pub(crate) fn check_reference(scene: &Scene) -> anyhow::Result<()> {
     if !scene.tool.is_bonded() {
         bail!(
@@ -279,7 +284,8 @@ pub(crate) fn spring_params(scene: &Scene) -> SpringParams {
     }
 }
 
-/// Share of the largest stable step size that Euler alone takes: half of it bears moderate loads and still gets on.
+/// Step size of pure Euler as a share of the largest stable one: half of it stays stable under
+/// moderate loads and is still fast enough.
 const EULER_FRACTION: f64 = 0.5;
 
 pub(crate) fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
@@ -300,7 +306,8 @@ pub(crate) fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
     }
 }
 
-/// The base is fixed, the tool holds `operated`, cut faces as the scene says.
+/// The constraints: the base is fixed, the tool holds `operated`, and cut faces are held as the
+/// scene says.
 pub(crate) fn constraints(
     scene: &Scene,
     body: &LayeredBody,
@@ -323,7 +330,7 @@ pub(crate) fn constraints(
                     at: xyz(face.point),
                 });
             }
-            // What the tool holds, it holds.
+            // Nodes that the tool holds stay held by the tool.
             CutFaces::Fixed => {
                 let held = &constraints.operated;
                 let fixed: Vec<usize> = rim.flat_map(nodes).filter(|n| !held.contains(n)).collect();
@@ -336,7 +343,8 @@ pub(crate) fn constraints(
     constraints
 }
 
-/// Skin nodes of the side pressed on within `radius` of the tool's axis, and connected with the vertex in the middle.
+/// Skin nodes within `radius` of the tool's axis, on the pressed side, and connected with the
+/// vertex in the middle.
 pub(crate) fn nodes_under_disc(
     body: &LayeredBody,
     vertex: usize,
@@ -348,7 +356,7 @@ pub(crate) fn nodes_under_disc(
     let is_under = |v: usize| {
         let r = body.skin.points[v] - at;
         let off_axis = (r - direction * r.dot(direction)).norm();
-        // A far side of the body, or another finger, is not under the tool.
+        // The far side of the body, or another finger, is not under the tool.
         off_axis <= radius && r.norm() <= 2.0 * radius && normals[v].dot(direction) < 0.0
     };
     let mut is_in = vec![false; body.n_vertices()];
@@ -372,7 +380,8 @@ pub(crate) fn nodes_under_disc(
         .collect()
 }
 
-/// Says which layers have levels too flat or too tall for bars to stand for their modulus.
+/// Adds a note for layers whose levels are too flat or too tall for bars to represent their
+/// modulus.
 fn note_aspects(built: &BuiltBody, scene: &Scene, mesh_size: f64, notes: &mut Vec<Note>) {
     let unsound: Vec<LayerAspect> = (built.growth.report.layers.iter().zip(&scene.layers))
         .filter(|(_, layer)| layer.tissue.elastic().is_some())

@@ -1,4 +1,5 @@
-//! The committed JSON Schema of notes, from which the page's types are made, is the one that the types give.
+//! The committed JSON Schema of notes, from which the page's types are made, is the one that the
+//! types give.
 
 use palpa::note_schema;
 

@@ -6,10 +6,10 @@ use palpa_mesh::{RepairReport, Verdict};
 use super::{FileResult, SurfaceResult};
 use crate::cli::Context;
 
-/// Places named of each finding; `--json` lists more.
+/// Number of places printed for each finding; `--json` lists more.
 const N_NAMED: usize = 3;
 
-/// Tells about one file. One that could not be read is told about when the command ends.
+/// Prints the report on one file. Unreadable files are reported when the command ends.
 pub(super) fn say(result: &FileResult, context: &Context) -> anyhow::Result<()> {
     let Some(verdict) = result.verdict else {
         return context.say(format_args!("{}: cannot be read", result.file.display()));
@@ -100,7 +100,7 @@ fn say_surface(result: &SurfaceResult, context: &Context) -> anyhow::Result<()> 
     }
 }
 
-/// Size, area, and volume where there is one.
+/// Prints size and area, and the volume if there is one.
 fn say_shape(report: &SurfaceReport, context: &Context) -> anyhow::Result<()> {
     let Some(part) = report.parts.first() else {
         return Ok(());

@@ -8,19 +8,22 @@ use crate::cli::Context;
 use crate::table::Table;
 use palpa::live::{GOOD_TRAVEL, LiveScene};
 
-/// What a run must keep, as the project promises it: thread-CPU time of a tick, s; change of force where a patch comes,
-/// N; and force between 20 and 400 Hz with the hand still, N.
+/// Guarantee of the project: largest thread-CPU time of a tick, s.
 const MOST_TICK: f64 = 200e-6;
+/// Guarantee of the project: largest change of force where a patch arrives, N.
 const MOST_ARRIVAL: f64 = 0.02;
+/// Guarantee of the project: largest RMS of the force between 20 and 400 Hz, hand still, N.
 const MOST_RMS: f64 = 0.02;
-/// Share of the steps with contact in which the tissue may be behind the tool.
+/// Largest share of the steps with contact in which the tissue may be behind the tool.
 const MOST_BEHIND: f64 = 0.01;
-/// Ticks without a force because the tissue was late: as many as one hiccup of the machine makes.
+/// Largest share of ticks without a force because the tissue was late: as many as one hiccup of the
+/// machine causes.
 const MOST_STALE: f64 = 1e-3;
-/// The hand is still where the tool goes no farther than this in the last seconds, m and s.
+/// The hand counts as still if the tool moves no farther than the first value, m, within the last
+/// seconds, second value, s.
 const STILL: [f64; 2] = [0.5e-3, 2.0];
 
-/// What is written to loop.json.
+/// Content of loop.json.
 #[derive(Debug, Serialize)]
 pub(super) struct Figures {
     seconds: f64,
@@ -28,7 +31,7 @@ pub(super) struct Figures {
     mesh_size_mm: f64,
     zone_radius_mm: f64,
     ticks: u64,
-    /// Ticks left out because the one before was too late.
+    /// Ticks skipped because the previous one was too late.
     misses: u64,
     tick_cpu_us: Times,
     wake_up_lateness_us: Times,
@@ -38,8 +41,9 @@ pub(super) struct Figures {
     pub(super) lateness_histogram: Vec<(f64, f64, u64)>,
     tissue: TissueFigures,
     devices: Vec<ForceFigures>,
-    /// Ticks with each fault and each limit.
+    /// Number of ticks with each fault.
     faults: Vec<(String, u64)>,
+    /// Number of ticks with each limit.
     limits: Vec<(String, u64)>,
     n_active_max: u32,
     lost_ticks: u64,
@@ -77,47 +81,52 @@ impl From<Quantiles> for Times {
 struct TissueFigures {
     steps: u64,
     steps_per_s: f64,
-    /// Up to which speed of the tool the force keeps its accuracy: steps are short enough, and zones are there in time.
+    /// Largest speed of the tool at which the force keeps its accuracy: steps are short enough, and
+    /// zones arrive in time.
     fastest_tool_mm_per_s: f64,
-    /// The same by steps alone.
+    /// Largest such speed by the steps alone.
     fastest_by_steps_mm_per_s: f64,
-    /// How fast the hand goes.
+    /// Speed of the hand.
     motion_mm_per_s: f64,
     step_cpu_us: Times,
     step_wall_us: Times,
     held_back: u64,
     unfinished: u64,
-    /// Steps that did not come as far as the tool, and their share of those with contact.
+    /// Number of steps that did not reach the tool.
     behind: u64,
+    /// Share of the steps with contact that did not reach the tool.
     behind_share: f64,
     /// Share of the ticks without a force because the tissue was late.
     stale_share: f64,
     jobs: u64,
     job_cpu_us: Times,
-    /// From where a zone is asked for to where it is taken over, ms: 90 of 100 are shorter.
+    /// Wall time from the request of a zone until it is taken over, ms: 90th percentile.
     zone_wall_p90_ms: Option<f64>,
     background_cpu_share: f64,
     zones: u64,
-    /// Meshes that the body was on.
+    /// Number of meshes that the body used.
     meshes: u64,
 }
 
 #[derive(Debug, Serialize)]
 struct ForceFigures {
     max_force_n: f64,
-    /// 20 to 400 Hz, last 2 s; none where the tool was not still then.
+    /// RMS of the force between 20 and 400 Hz over the last 2 s; `None` if the tool was not still
+    /// then.
     rms_still_n: Option<f64>,
     rms_worst_n: f64,
     arrival_max_n: f64,
     arrival_p999_n: f64,
-    /// Beyond what the device's own displacement makes with the tissue's stiffness.
+    /// Largest change of force where a patch arrives, beyond the change that the device's own
+    /// displacement causes through the tissue's stiffness.
     arrival_alone_max_n: f64,
     other_p999_n: f64,
     other_max_n: f64,
-    /// By the law's own count.
+    /// Energy taken from the hand, as counted by the law.
     energy_in_mj: f64,
+    /// Energy given to the hand, as counted by the law.
     energy_out_mj: f64,
-    /// The most that was ever given out beyond what was taken in, since the last fault.
+    /// Largest energy given out beyond the energy taken in, since the last fault.
     energy_deficit_mj: f64,
     energy_budget_mj: f64,
     softening_max: f64,
@@ -175,7 +184,7 @@ impl Figures {
         });
         let by_steps = fastest_by_steps(report);
         let zone_wall = zone_wall(log);
-        // It leaves the middle of a zone while the next is being made.
+        // The tool moves away from the middle of a zone while the next zone is computed.
         let by_zones = zone_wall.map(|time| live.params.longest_way() / time);
         Self {
             seconds: report.duration,
@@ -228,7 +237,7 @@ impl Figures {
         }
     }
 
-    /// What is not as it must be; nothing of this speaks of the machine's own lateness.
+    /// The violated guarantees. Lateness of the machine itself does not count.
     fn failures(&self) -> Vec<String> {
         let mut failures = Vec::new();
         if self.tick_cpu_us.p999 > MOST_TICK * 1e6 {
@@ -258,7 +267,7 @@ impl Figures {
                 t.held_back, t.steps
             ));
         }
-        // Zones that come too late are seen above.
+        // Zones that arrive too late are reported above.
         if t.motion_mm_per_s > t.fastest_by_steps_mm_per_s {
             failures.push(format!(
                 "the hand goes at {:.0} mm/s, and steps are short enough for {:.0} mm/s: move more slowly, or make the \
@@ -273,7 +282,8 @@ impl Figures {
                         .to_owned(),
                 );
             }
-            // A device that goes by 45 µm from tick to tick changes the force by 0.02 N wherever it is.
+            // The change caused by the device itself is excluded: steps of 45 µm from tick to tick
+            // change the force by 0.02 N everywhere.
             if d.arrival_alone_max_n > MOST_ARRIVAL {
                 failures.push(format!(
                     "force changes by {:.4} N more than by the device's own displacement where a patch arrives, which is more \
@@ -428,7 +438,8 @@ fn is_still(log: &Log, device: usize, end: f64) -> bool {
     (0..3).all(|c| high[c] - low[c] < most) && end > time
 }
 
-/// From the end of the step that asks for a zone to the step that takes it over, s: 90 of 100 are shorter.
+/// Time from the end of the step that requests a zone to the step that takes it over, s: 90th
+/// percentile.
 fn zone_wall(log: &Log) -> Option<f64> {
     let (mut asked, mut times) = (None, Vec::new());
     let mut last: Option<&StepRecord> = None;
@@ -448,7 +459,7 @@ fn zone_wall(log: &Log) -> Option<f64> {
     times.get(times.len() * 9 / 10).copied()
 }
 
-/// Speed at which a tool goes [`GOOD_TRAVEL`] in a step, m/s.
+/// Speed at which a tool moves by [`GOOD_TRAVEL`] in a step, m/s.
 fn fastest_by_steps(report: &Report) -> f64 {
     GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50)
 }

@@ -1,4 +1,4 @@
-//! `palpa loop-report`: the whole engine in real time, and how it fared.
+//! `palpa loop-report`: runs the whole engine in real time and reports on it.
 
 mod figures;
 mod picture;
@@ -16,22 +16,24 @@ use crate::cli::Context;
 use palpa::live::{LiveScene, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
-/// The scene that is pressed when none is named.
+/// The scene that is used if none is given.
 const EMBEDDED: &str = include_str!("../../../scenes/forearm_lump.toml");
-/// Shorter runs say nothing of rare ticks, and the RMS of the force needs two seconds. s
+/// Shortest duration of a run, s. Shorter runs do not show rare ticks, and the RMS of the force
+/// needs two seconds.
 const LEAST_SECONDS: f64 = 5.0;
 const MOST_SECONDS: f64 = 3600.0;
 
 /// Run the engine in real time and report deadlines, smoothness and energy
 ///
-/// A simulated hand holds the scene's haptic device and moves it as its motion section says; the tissue answers with finite elements,
-/// the force comes at 1 kHz. Without a SCENE, a forearm with a lump is stroked. Writes the log (log.mcap, for `palpa replay`),
-/// the figures (loop.json), histograms of the tick's times, and force against time and depth (SVG and PNG).
+/// A simulated hand holds the haptic device of the scene and moves it as the scene's motion says.
+/// The tissue is computed with finite elements, the force at 1 kHz. Without a SCENE, the hand
+/// strokes a forearm with a lump. Writes the log (log.mcap, for `palpa replay`), the figures
+/// (loop.json), histograms of the times of ticks, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Scene file (TOML); a forearm with a lump if none is given
     scene: Option<PathBuf>,
-    /// How long, in seconds: 5 to 3600
+    /// Duration in seconds, 5 to 3600
     #[arg(
         long,
         default_value_t = 60.0,
@@ -39,7 +41,8 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     seconds: f64,
-    /// Spin so many µs before each tick instead of sleeping, 0 to 1000: less lateness for more CPU
+    /// Spin for this many µs before each tick instead of sleeping, 0 to 1000: ticks are less late,
+    /// but the CPU load rises
     #[arg(
         long,
         default_value_t = 0.0,
@@ -47,7 +50,7 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     spin_us: f64,
-    /// Print the scene, to be changed and run, and run nothing
+    /// Print the scene as a start for your own, and run nothing
     #[arg(long)]
     print_scene: bool,
 }
@@ -55,7 +58,8 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// On a scene that is not fit for real time, when a thread cannot be started, and when a result cannot be written.
+/// If the scene is not fit for real time, a thread cannot be started, or a result cannot be
+/// written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     anyhow::ensure!(
         (LEAST_SECONDS..=MOST_SECONDS).contains(&args.seconds),
@@ -117,7 +121,8 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Runs for the time asked for, or until Ctrl-C; the forces' report from before the ramp down at the end.
+/// Runs for the requested time or until Ctrl-C. The report of the forces is taken before the ramp
+/// down at the end.
 fn run_engine(
     args: &Args,
     context: &Context,
@@ -146,7 +151,7 @@ fn run_engine(
         bar.set_position(engine.now() as u64);
     }
     bar.finish_and_clear();
-    // The ramp down at the end is no force that was asked for.
+    // Taken before the stop, so that the ramp down does not count.
     let forces = engine.report().forces;
     Ok((forces, engine.stop()))
 }

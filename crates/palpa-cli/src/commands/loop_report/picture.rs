@@ -1,4 +1,4 @@
-//! The pictures of a run.
+//! The plots of a run.
 
 use palpa_rt::{Log, StepStatus, TickEntry};
 use palpa_servo::Faults;
@@ -6,16 +6,16 @@ use palpa_servo::Faults;
 use super::figures::Figures;
 use palpa_plot::{Axis, Band, Chart, Color, Guide, Picture, Series, panels};
 
-/// Most points of a curve: more than there are pixels.
+/// Largest number of points of a curve: more than there are pixels.
 const MOST_POINTS: usize = 6000;
-/// Buckets of a histogram in a doubling of time.
+/// Buckets of a histogram per doubling of time.
 const PER_DOUBLING: f64 = 4.0;
-/// Of what is less to the point.
+/// Colour of secondary curves.
 const FAINT: Color = Color::rgb(0xc4, 0xc8, 0xcc);
 
 /// Histograms of a tick's CPU time and of its lateness.
 pub(super) fn times(figures: &Figures) -> Picture {
-    // Wide enough to show how far it is to the guide, µs.
+    // The time axis includes the guide, µs, to show the distance to it.
     let chart = |title: &str, label: &str, filled: &[(f64, f64, u64)], guide: f64| {
         let points = steps(filled);
         let ends = points.iter().map(|p| p[0]);
@@ -43,7 +43,8 @@ pub(super) fn times(figures: &Figures) -> Picture {
     panels("Ticks of the 1 kHz loop", &[cpu, late], 2)
 }
 
-/// The outline of a histogram, in µs and ticks; empty buckets count as a tenth of a tick, which a logarithm can show.
+/// The outline of a histogram, in µs and ticks. Empty buckets count as a tenth of a tick, so that a
+/// logarithmic axis can show them.
 fn steps(filled: &[(f64, f64, u64)]) -> Vec<[f64; 2]> {
     let bucket = |seconds: f64| ((seconds * 1e6).max(0.01).log2() * PER_DOUBLING).floor() as i32;
     let mut counts = std::collections::BTreeMap::new();
@@ -64,7 +65,8 @@ fn steps(filled: &[(f64, f64, u64)]) -> Vec<[f64; 2]> {
     points
 }
 
-/// Force and height against time; shaded where the tissue was behind the tool or gave no force.
+/// Plots force and height against time. Shaded where the tissue was behind the tool or gave no
+/// force.
 pub(super) fn forces(log: &Log, subtitle: &str) -> Picture {
     let force = Chart::new(Axis::linear("time [s]"), Axis::linear("force [N]"))
         .title("Force on the hand")
@@ -83,9 +85,9 @@ pub(super) fn forces(log: &Log, subtitle: &str) -> Picture {
     panels("Force while moving", &[force, place], 1)
 }
 
-/// Times in which patches were of a place that the tool had left, or none was fresh, s.
+/// Time spans, s, in which the patch belonged to a place that the tool had left, or was stale.
 fn missing(log: &Log) -> Vec<[f64; 2]> {
-    /// What is nearer to each other than this is one, s.
+    /// Spans closer together than this are merged, s.
     const GAP: f64 = 0.05;
     let behind = log
         .steps
@@ -110,7 +112,7 @@ fn missing(log: &Log) -> Vec<[f64; 2]> {
     merged
 }
 
-/// Force against depth below where the tool, which hangs `above` it (m), first touches.
+/// Plots force against depth below the first touch, which is `above` (m) under the device's origin.
 pub(super) fn depth(log: &Log, above: f64, subtitle: &str) -> Picture {
     let point = |t: &TickEntry| {
         let device = &t.devices[0];

@@ -1,12 +1,13 @@
-//! The cross-section through the place that is pressed.
+//! The cross-section through the pressed place.
 
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 
 use palpa::press::Place;
 use palpa_plot::section::{Plane, Point2, cut_surface};
 
-/// The plane through the place that holds the press direction, which points down in it: across the limb where it has an end;
-/// else along the longest way.
+/// The plane through the pressed place that contains the press direction, which points down in it.
+/// It is parallel to a flat cut face beside the press, so it cuts across a limb. Without such a
+/// face, its normal is x, or y if the press is nearly along x.
 pub(super) fn plane(body: &LayeredBody, place: &Place) -> Option<Plane> {
     let direction = place.direction.into_inner();
     let across = body
@@ -26,7 +27,7 @@ pub(super) fn plane(body: &LayeredBody, place: &Place) -> Option<Plane> {
     )
 }
 
-/// The lines in which the plane cuts surfaces.
+/// The lines in which the plane cuts the surfaces.
 pub(super) fn lines(surfaces: &[Surface], plane: &Plane) -> Vec<Vec<Point2>> {
     surfaces
         .iter()

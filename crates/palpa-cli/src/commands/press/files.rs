@@ -1,4 +1,4 @@
-//! The files of a press: which an earlier run has left, and the series for ParaView.
+//! The files of a press: removal of older files, and the series for ParaView.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,8 @@ use palpa_mesh::{LayeredBody, Surface};
 use palpa_plot::output::OutDir;
 use palpa_plot::vtu::{Grid, write_series};
 
-/// Removes the files of an earlier run into the same folder, of which this one might leave some standing.
+/// Removes the files of an earlier run from the folder, because this run might not replace all of
+/// them.
 pub(super) fn remove_older(folder: &Path) -> anyhow::Result<()> {
     let pictures = [
         "force_depth",
@@ -53,7 +54,8 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Picks `n` of the samples, evenly spread; from two on the first and the deepest are among them.
+    /// Picks `n` of the samples, evenly spread; with two or more, the first and the deepest are
+    /// included.
     pub(super) fn new(n: usize, n_samples: usize, deepest: usize) -> Self {
         let last = n_samples - 1;
         let n = n.min(last + 1);
@@ -83,7 +85,7 @@ impl Series {
         self.wanted.contains(&index)
     }
 
-    /// Adds the body at a time (s).
+    /// Adds the body at a time, s.
     pub(super) fn push(&mut self, out: &OutDir, time: f64, grid: &Grid) -> anyhow::Result<()> {
         let name = format!("series/body_{:03}.vtu", self.frames.len());
         out.write_with(&name, |w| grid.write(w))?;
@@ -113,8 +115,9 @@ pub(super) fn per_column(body: &LayeredBody, values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What every frame shows of how the body was made: its base, its cut faces (numbered from 1), where layers were thinned and
-/// how far the base stands off the bone (both per skin vertex).
+/// Adds the fields that show how the body was made to a frame: its base, its cut faces (numbered
+/// from 1), the thinning of the layers, and the stand-off of the base from the bone (both per skin
+/// vertex).
 pub(super) fn with_making(
     grid: Grid,
     body: &LayeredBody,

@@ -6,7 +6,7 @@ mod report;
 
 use self::pictures::draw_pictures;
 use self::record::record;
-use self::report::{PressReport, announce, conclude, facts, result_of};
+use self::report::{BarReport, announce, conclude, facts, result_of};
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
@@ -37,7 +37,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     remove_older(out.path())?;
     let recorded = record(args, context, out, &built, &indentation)?;
     let result = result_of(&recorded.samples, &materials, context.is_interrupted());
-    let report = PressReport {
+    let report = BarReport {
         model: "reference",
         scene: scene_name.to_owned(),
         body: &built.growth.report,

@@ -73,7 +73,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     })
 }
 
-/// What the layers and then the lumps are made of.
+/// Materials of the layers, then of the lumps.
 fn materials_of(scene: &Scene) -> Vec<palpa_scene::MaterialStatus> {
     let mut materials = scene.material_status();
     materials.extend(scene.lump_status());

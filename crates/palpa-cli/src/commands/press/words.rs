@@ -1,4 +1,4 @@
-//! What is said of a press whatever the model.
+//! Text for a press with either model.
 
 use palpa_mesh::growth::GrowthReport;
 use palpa_scene::{MaterialStatus, Scene, Status};
@@ -30,12 +30,12 @@ pub(super) fn status_line(materials: &[MaterialStatus]) -> String {
     format!("stiffness {}", parts.join("; "))
 }
 
-/// How far a number is to be trusted, in a word.
+/// How far a number can be trusted, in a word.
 pub(super) fn status_word(status: Status) -> String {
     format!("{status:?}").to_lowercase()
 }
 
-/// The layers as they were grown, and what growth had to give up.
+/// Prints the layers as grown, and the compromises that growth had to make.
 pub(super) fn say_layers(
     context: &Context,
     scene: &Scene,

@@ -1,4 +1,4 @@
-//! What people see of a case: its figures, long rows of alike ones by their worst.
+//! The report of a case for people: its figures; many similar figures are shown by the worst one.
 
 use palpa_lab::verify::{Case, Findings, Row};
 
@@ -6,9 +6,9 @@ use crate::cli::Context;
 use crate::table::Table;
 use palpa_lab::verify::tolerance::share;
 
-/// Up to this many figures a case is shown in full.
+/// Largest number of figures of a case that is shown in full.
 const SHOWN_IN_FULL: usize = 24;
-/// More figures than this that differ in numbers only are shown as one.
+/// Figures that differ in numbers only are shown as one if there are more than this.
 const MOST_ALIKE: usize = 3;
 
 /// Prints a case.
@@ -47,17 +47,18 @@ fn table(rows: &[Row]) -> Table<7> {
     table
 }
 
-/// A figure, or several that are alike by the worst of them.
+/// A figure, or several similar figures shown by the worst of them.
 struct Line<'a> {
     name: String,
     worst: &'a Row,
 }
 
-/// The figures of a case; of a long one those that differ in numbers only, and pass, in one line.
+/// The lines of a case. In a long case, figures that pass and differ in numbers only share one
+/// line.
 fn condensed(rows: &[Row]) -> Vec<Line<'_>> {
     let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        // One that fails is shown by itself.
+        // A failed figure is shown by itself.
         let key = if rows.len() <= SHOWN_IN_FULL || !row.pass {
             row.quantity.clone()
         } else {
@@ -111,7 +112,7 @@ fn pattern(text: &str) -> String {
     pattern
 }
 
-/// Five digits that count.
+/// The number with five significant digits.
 fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {

@@ -1,4 +1,4 @@
-//! Memory of viscous pairs on its way from batch to batch.
+//! Memory of viscous pairs during the change from one set of batches to another.
 
 use super::super::kernel::N_POINTS;
 use super::Batches;
@@ -6,7 +6,7 @@ use crate::Material;
 use crate::law::Prony;
 use crate::model::Model;
 
-/// Memory of all pairs of a body, on its way from zone to zone.
+/// Memory of all pairs of a body, for the change from one zone to another.
 #[derive(Debug, Clone)]
 pub(in super::super) struct History {
     n_rows: usize,
@@ -16,7 +16,7 @@ pub(in super::super) struct History {
     is_known: Vec<bool>,
 }
 
-/// How many numbers a row of a pair has.
+/// Number of values in a row of a pair.
 const ROW: usize = 6 * N_POINTS + 1;
 
 impl History {
@@ -35,8 +35,8 @@ impl History {
         }
     }
 
-    /// Takes over the memory of the pairs of another body in which this pair's two wedges are;
-    /// `old` has for each wedge the pair, and which of its two wedges.
+    /// Takes over the memory of another mesh's pairs. `old` has, for each of this pair's two
+    /// wedges, the old pair and the index of the wedge in it.
     pub(in super::super) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
         if !old.iter().all(|&(old, _)| from.is_known[old]) {
             return;
@@ -80,7 +80,7 @@ impl Batches {
         }
     }
 
-    /// Takes the memory of these pairs from a history, as far as it has it.
+    /// Takes the memory of these pairs from a history, as far as it is known there.
     pub(in super::super) fn load(&mut self, history: &History) {
         for batch in &mut self.full {
             let Some(past) = &mut batch.past else {

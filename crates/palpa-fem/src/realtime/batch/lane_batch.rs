@@ -1,4 +1,4 @@
-//! One batch: sixteen pairs of one interval and one kind of law, as the kernel takes them.
+//! One batch: sixteen pairs of one interval and one kind of law, in the form that the kernel needs.
 
 #![expect(
     clippy::inline_always,
@@ -35,7 +35,7 @@ pub(super) struct LaneBatch {
     /// Nodes in the order of the kernel.
     pub(super) nodes: [[u32; WIDTH]; N_NODES],
     pub(super) double: Numbers<f64>,
-    /// In a body that has a memory.
+    /// Viscous memory; `None` in a body without memory.
     pub(super) past: Option<Box<Past>>,
     /// For stiffness: the numbers in single precision, and the places of the blocks.
     pub(super) tangent: Option<(Numbers<f32>, [[u32; WIDTH]; N_BLOCKS])>,
@@ -46,7 +46,7 @@ pub(super) struct LaneBatch {
 pub(super) struct Past {
     pub(super) material: usize,
     pub(super) relaxes_volume: bool,
-    /// Without the factors of a step.
+    /// Stiffness at rest, without the factors of a step.
     pub(super) rest: Stiffness<f64>,
     /// Tension in the plane of the layer, `xx, yy, zz, xy, yz, zx`, Pa.
     pub(super) tension: [Row<f64>; 6],
@@ -106,7 +106,7 @@ impl LaneBatch {
         }
     }
 
-    /// Gives the pair that was pushed last its stiffness.
+    /// Sets the stiffness of the last added pair.
     pub(super) fn stiffen(&mut self, slopes: [f64; N_POINTS], bulk: f64) {
         let lane = self.n - 1;
         if let Some(past) = &mut self.past {
@@ -146,7 +146,7 @@ impl LaneBatch {
         }
     }
 
-    /// Fills lanes that have no pair with the first.
+    /// Fills unused lanes with the first pair.
     pub(super) fn fill(&mut self) {
         for lane in self.n..WIDTH {
             self.pairs[lane] = self.pairs[0];
@@ -217,7 +217,7 @@ impl<E: Number> Numbers<E> {
         geometry.alpha[lane] = E::nearest(if is_pair { model.params.alpha } else { 0.0 });
     }
 
-    /// Takes over the numbers that a step has changed, in another precision.
+    /// Copies the numbers that a step has changed, in another precision.
     fn take_over(&mut self, from: &Numbers<f64>) {
         let row = |row: &Row<f64>| row.map(E::nearest);
         self.stiffness.slope = std::array::from_fn(|p| row(&from.stiffness.slope[p]));

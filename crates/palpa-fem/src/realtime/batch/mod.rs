@@ -1,5 +1,5 @@
-//! Pairs of prisms in batches of sixteen, of one interval and one kind of law, as the kernel takes
-//! them.
+//! Batches of sixteen pairs of prisms, of one interval and one kind of law, in the form that the
+//! kernel needs.
 //!
 //! | file | what it holds |
 //! | --- | --- |
@@ -34,7 +34,7 @@ use single_pair::{SinglePair, group_nodes, inverted};
 
 pub(super) use history::History;
 
-/// Set in the place of a block that is to be added turned.
+/// Flag on the place of a block that is to be added transposed.
 const TURNED: u32 = 1 << 31;
 
 /// The prisms of some part of a body.
@@ -48,7 +48,7 @@ pub(super) struct Batches {
 }
 
 /// Half the shear modulus of a group at rest at each point, Pa, its bulk modulus times its volume,
-/// J, and how it hardens; none if its law is not one of the kernel's.
+/// J, and its hardening; `None` if the kernel does not have its law.
 fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f64, Hardening)> {
     if has_memory && phases.len() > 1 {
         return None;
@@ -70,7 +70,7 @@ fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f6
 }
 
 impl Batches {
-    /// The prisms under the groups that `keep` names. With tangents they can be assembled into
+    /// The prisms under the groups that `keep` selects. With tangents they can be assembled into
     /// blocks of the pattern.
     pub(super) fn new(
         model: &Model,
@@ -130,8 +130,8 @@ impl Batches {
         }
     }
 
-    /// Begins a step: takes over stiffness and constant stresses of materials that remember.
-    /// `memory` has begun with the step's duration.
+    /// Starts a step: takes over stiffness and constant stresses of materials with memory. `memory`
+    /// must already be set up for the step's duration.
     pub(super) fn begin(&mut self, model: &Model, memory: &mut Memory, state: &State) {
         if !model.has_memory {
             return;
@@ -140,21 +140,21 @@ impl Batches {
         self.begin_lanes(memory);
     }
 
-    /// The same for the pairs that are not in lanes.
+    /// As [`Self::begin`], for the pairs that are not in lanes.
     pub(super) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
         for other in &self.others {
             memory.begin_group(model, state, other.pair as usize);
         }
     }
 
-    /// The same for the pairs in lanes.
+    /// As [`Self::begin`], for the pairs in lanes.
     pub(super) fn begin_lanes(&mut self, memory: &Memory) {
         for batch in &mut self.full {
             batch.begin(memory);
         }
     }
 
-    /// Ends a step: every point remembers.
+    /// Ends a step: updates the memory of every point.
     pub(super) fn commit(&mut self, model: &Model, memory: &Memory, state: &mut State) {
         if !model.has_memory {
             return;
@@ -163,14 +163,14 @@ impl Batches {
         self.commit_lanes(memory, &state.displacements);
     }
 
-    /// The same for the pairs that are not in lanes.
+    /// As [`Self::commit`], for the pairs that are not in lanes.
     pub(super) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
         for other in &self.others {
             memory.commit_group(model, state, other.pair as usize);
         }
     }
 
-    /// The same for those that are.
+    /// As [`Self::commit`], for the pairs in lanes.
     pub(super) fn commit_lanes(&mut self, memory: &Memory, displacements: &[Vec3]) {
         Arch::new().dispatch(Remember {
             full: &mut self.full,
@@ -209,8 +209,8 @@ impl Batches {
         Ok(())
     }
 
-    /// Adds the stiffness of these prisms to the blocks of the pattern, N/m. One block past the
-    /// pattern's end takes the blocks of nodes that cannot move.
+    /// Adds the stiffness of these prisms to the blocks of the pattern, N/m. An extra block past
+    /// the pattern's end receives the blocks of nodes that cannot move.
     pub(super) fn add_stiffness(
         &mut self,
         model: &Model,

@@ -17,7 +17,7 @@ use super::lane_batch::{LaneBatch, Numbers};
 use crate::law::Hardening;
 use crate::state::Memory;
 
-/// Moves the memories of all batches on.
+/// Updates the memories of all batches.
 pub(super) struct Remember<'a> {
     pub(super) full: &'a mut [Box<LaneBatch>],
     pub(super) local: &'a mut Local<f64>,
@@ -96,7 +96,7 @@ impl<E: Number> Local<E> {
     }
 }
 
-/// A batch in one precision; returns whether all its points are the right way out.
+/// Evaluates a batch in one precision. Returns false if a prism is inside out.
 #[inline(always)]
 fn run<R: Lanes, const TANGENT: bool>(
     token: R::Token,
@@ -121,7 +121,7 @@ fn run<R: Lanes, const TANGENT: bool>(
     least.iter().all(|&j| j > R::Element::default())
 }
 
-/// Adds the forces of all batches, N; the error is a pair of the batch with a prism inside out.
+/// Adds the forces of all batches, N. The error names a pair of the batch with a prism inside out.
 pub(super) struct Forces<'a> {
     pub(super) full: &'a [Box<LaneBatch>],
     pub(super) local: &'a mut Local<f64>,
@@ -152,7 +152,7 @@ impl WithSimd for Forces<'_> {
     }
 }
 
-/// Adds the stiffness of all batches, N/m; the error is as of [`Forces`].
+/// Adds the stiffness of all batches, N/m. Errors as in [`Forces`].
 pub(super) struct Tangents<'a> {
     pub(super) full: &'a [Box<LaneBatch>],
     pub(super) local: &'a mut Local<f32>,

@@ -1,4 +1,4 @@
-//! Where the nodes of a group are in the kernel, and its blocks in the matrix.
+//! The nodes of a group in the kernel's order, and the places of its blocks in the matrix.
 
 use palpa_sparse::ColumnPattern;
 
@@ -25,7 +25,7 @@ pub(super) fn kernel_columns(group: &SurfaceGroup) -> [usize; 4] {
 }
 
 /// The places of the blocks between the nodes of a group, each marked with [`TURNED`] if it is to
-/// be added turned. `columns` has the group's column of each of the kernel's.
+/// be added transposed. `columns` maps the kernel's columns to the group's.
 pub(super) fn places(
     model: &Model,
     pattern: &ColumnPattern,
@@ -39,7 +39,7 @@ pub(super) fn places(
     for a in 0..N_NODES {
         for b in 0..=a {
             let (ca, cb) = (a / 2, b / 2);
-            // In a single prism the fourth column is there for the form.
+            // A single prism has no fourth column.
             if ca.max(cb) >= group.n_columns() {
                 continue;
             }

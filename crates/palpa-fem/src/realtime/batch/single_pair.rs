@@ -1,4 +1,4 @@
-//! A pair whose law is not one of the kernel's: it is evaluated on its own.
+//! A pair whose law the kernel does not have; it is evaluated on its own.
 
 use palpa_mesh::Vec3;
 use palpa_sparse::Block;
@@ -11,7 +11,7 @@ use crate::element::{GroupResponse, PhaseAt};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// A pair whose law is not the kernel's.
+/// A pair whose law the kernel does not have.
 #[derive(Debug)]
 pub(super) struct SinglePair {
     /// Index of its geometry and phases.

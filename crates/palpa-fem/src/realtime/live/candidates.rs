@@ -1,4 +1,5 @@
-//! Which skin vertices may touch a tool in this step, and the contact forces on the skin.
+//! Finds the skin vertices that may touch a tool in this step, and keeps the contact forces on the
+//! skin.
 
 use palpa_mesh::Vec3;
 
@@ -8,23 +9,23 @@ use super::Live;
 use crate::posed_tool::PosedTool;
 use crate::shape::Distance;
 
-/// A tool may come this fast, m/s, for the vertices that it reaches to be candidates in time; and
-/// the least reach, m.
+/// Fastest approach of a tool, m/s, at which vertices become candidates in time; and the least
+/// reach, m.
 const FASTEST: f64 = 0.1;
 const LEAST_REACH: f64 = 0.2e-3;
-/// Most candidates beside those that press, and how many candidates are allowed in any case.
+/// Largest number of candidates that do not press, and a total number of candidates that is always
+/// allowed.
 const MOST_NEAR: usize = 24;
 const LEAST_CANDIDATES: usize = 60;
 
 /// Contact forces on the vertices of the skin.
 #[derive(Debug, Clone)]
 pub(super) struct SkinForces {
-    /// Pressing force, N; 0 where nothing presses. `[n_vertices]`
+    /// Pressing force, N; 0 without contact. `[n_vertices]`
     pub(super) pressures: Vec<f64>,
     /// Force of friction, N. `[n_vertices]`
     pub(super) frictions: Vec<Vec3>,
-    /// Where friction holds the vertex, in the tool's frame, m; meaningless where nothing presses.
-    /// `[n_vertices]`
+    /// Anchors, in the tool's frame, m; meaningless without contact. `[n_vertices]`
     pub(super) anchors: Vec<Vec3>,
 }
 
@@ -38,7 +39,7 @@ impl SkinForces {
         }
     }
 
-    /// A vertex at `start` as a candidate, with the forces that are on it.
+    /// Makes a vertex at `start` a candidate, with its present forces.
     fn candidate(
         &self,
         v: u32,
@@ -53,7 +54,7 @@ impl SkinForces {
         let anchor = if pressure > 0.0 {
             self.anchors[vertex]
         } else {
-            // Where it would touch.
+            // The point of the surface that it would touch.
             let surface = start - normal * distance.distance;
             tool.pose.inverse_transform_point(&surface.into()).coords
         };
@@ -71,7 +72,7 @@ impl SkinForces {
         }
     }
 
-    /// Leaves out the farthest where there are too many candidates, and their forces.
+    /// Removes the farthest candidates, and their forces, if there are too many.
     fn keep_nearest(&mut self, candidates: &mut Vec<Candidate>) {
         let n_pressing = candidates.iter().filter(|c| c.pressure > 0.0).count();
         let most = (n_pressing + MOST_NEAR).clamp(LEAST_CANDIDATES, MOST_CANDIDATES);
@@ -128,7 +129,8 @@ impl Live {
         candidates.sort_unstable_by_key(|c| c.vertex);
     }
 
-    /// Where candidates are now. Their normals stay, because the compliance is along them.
+    /// Updates the candidates' positions and gaps. Their normals stay, because the compliance
+    /// refers to them.
     pub(super) fn measure_gaps(&mut self) {
         for candidate in &mut self.problem.candidates {
             let vertex = candidate.vertex as usize;
@@ -142,8 +144,8 @@ impl Live {
         }
     }
 
-    /// Puts a share of the change of forces that the contact problem has found on the skin. Where
-    /// a vertex slides, its anchor follows.
+    /// Applies a share of the force changes that the contact problem has found. The anchor of a
+    /// sliding vertex follows it.
     pub(super) fn accept_contact(&mut self, share: f64) {
         let skin = &mut self.skin;
         for candidate in &mut self.problem.candidates {

@@ -1,4 +1,4 @@
-//! From one mesh of a body to another of the same body: displacements, contact forces and memory.
+//! Carries displacements, contact forces and memory of a body from one of its meshes to another.
 
 use palpa_mesh::{SurfaceIndex, Vec3};
 
@@ -8,19 +8,20 @@ use super::candidates::SkinForces;
 use crate::model::Model;
 use crate::state::State;
 
-/// Where the columns and prisms of a body are in another mesh of it, whose skin at rest and whose
-/// levels are the same.
+/// The places of a mesh's columns and prisms in another mesh of the same body. Both have the same
+/// skin at rest and the same levels.
 #[derive(Debug, Clone)]
 pub(super) struct Carry {
-    /// For each vertex those of the old triangle that it is in, and their weights.
+    /// For each vertex, the vertices of the old triangle that contains it, and their weights.
     parts: Vec<[(u32, f64); 3]>,
-    /// For each vertex the old one at the same place.
+    /// For each vertex, the old vertex at the same place, if any.
     same: Vec<Option<u32>>,
-    /// For each group of triangles, and each of its two, the old group and which of its two.
+    /// For each group and each of its two triangles, the old group and the index of the triangle in
+    /// it.
     wedges: Vec<[(u32, u8); 2]>,
 }
 
-/// The state of a body, to go on from on another mesh.
+/// The state of a body, to continue from on another mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Come {
     pub(super) state: State,
@@ -29,7 +30,7 @@ pub(super) struct Come {
 }
 
 impl Come {
-    /// At rest.
+    /// A body at rest.
     pub(super) fn rest(model: &Model) -> Self {
         Self {
             state: State::new(model),
@@ -38,7 +39,7 @@ impl Come {
         }
     }
 
-    /// The state of a body, all of it up to date except the memory of a linear exterior.
+    /// The state of a body, up to date except for the memory of a linear exterior.
     pub(super) fn of(live: &mut Live) -> Self {
         live.settle();
         let history = live.model.has_memory.then(|| {
@@ -58,9 +59,10 @@ impl Come {
 }
 
 impl Carry {
-    /// Cost: a search for each vertex and each triangle.
+    /// Relates two meshes. Cost: a search for each vertex and each triangle.
     pub(super) fn new(old: &Model, new: &Model) -> Self {
-        /// Vertices of two meshes are the same where all but this share is one's.
+        /// Vertices of two meshes coincide if all but this share of the weight belongs to one
+        /// vertex.
         const SAME: f64 = 1e-6;
         let skin = &old.body.skin;
         let index = SurfaceIndex::build(skin);
@@ -95,7 +97,7 @@ impl Carry {
         }
     }
 
-    /// The state on the old mesh, on the new one.
+    /// Carries a state on the old mesh over to the new one.
     pub(super) fn onto(&self, old: &Model, come: &Come, new: &Model) -> Come {
         let mut out = Come::rest(new);
         for v in 0..self.parts.len() {
@@ -116,7 +118,7 @@ impl Carry {
         out
     }
 
-    /// Displacement of the place of a new vertex in the old mesh, m.
+    /// Displacement at the place of a new vertex, interpolated in the old mesh, m.
     pub(super) fn displacement(&self, v: usize, level: usize, new: &Model, old: &[Vec3]) -> Vec3 {
         if let Some(u) = self.same[v] {
             return old[new.body.node(u as usize, level)];
@@ -161,7 +163,7 @@ impl Carry {
         }
     }
 
-    /// The new pairs, and for both of their wedges the old pair and which of its wedges.
+    /// The new pairs. For both wedges of each: the old pair, and the index of the wedge in it.
     fn pairs(
         &self,
         old: &Model,

@@ -1,24 +1,24 @@
-//! Where the tools are, and how far they may go in a step.
+//! The poses of the tools, and the limits of their movement in a step.
 
 use palpa_mesh::Vec3;
 
 use super::Live;
 use crate::posed_tool::PosedTool;
 
-/// How near to the edge of its zone a pressed vertex may come, as a share of the radius, before
-/// tools are followed no farther that way.
+/// Distance of a pressed vertex from the zone's centre, as a share of the radius, at which tools
+/// are not followed any farther in that direction.
 const EDGE: f64 = 0.95;
-/// Share of the last step in the smoothed one.
+/// Weight of the last step in the smoothed movement.
 const NEW: f64 = 0.2;
 
-/// The tools on their way.
+/// The tools on the way to their targets.
 #[derive(Debug)]
 pub(super) struct Course {
-    /// The tools where the body has followed them to.
+    /// The tools at the poses that the body has followed them to.
     pub(super) tools: Vec<PosedTool>,
-    /// How far they go in a step, smoothed, m.
+    /// Smoothed movement of the tools per step, m.
     pub(super) drift: Vec3,
-    /// Least gap between tools and the zone's skin, m; 0 where it is not known.
+    /// Least gap between tools and the zone's skin, m; 0 if unknown.
     pub(super) clearance: f64,
 }
 
@@ -31,8 +31,8 @@ impl Course {
         }
     }
 
-    /// Moves the tools to where they are asked to be, each by at most `most`, m, and not in the
-    /// direction `held`. Returns whether any stays short of its target.
+    /// Moves the tools towards their targets, each by at most `most`, m, and not in the direction
+    /// `held`. Returns whether any tool stays short of its target.
     fn advance(&mut self, targets: &[PosedTool], held: Option<Vec3>, most: f64) -> bool {
         debug_assert_eq!(self.tools.len(), targets.len());
         let mut is_short = false;
@@ -65,7 +65,7 @@ impl Course {
 }
 
 impl Live {
-    /// Moves the tools, no farther than one step may. Returns whether any stays short of its
+    /// Moves the tools within the limits of one step. Returns whether any tool stays short of its
     /// target.
     pub(super) fn move_tools(&mut self, targets: &[PosedTool]) -> bool {
         let held = self.held_direction();
@@ -73,8 +73,8 @@ impl Live {
         self.course.advance(targets, held, most)
     }
 
-    /// The direction across the skin in which tools are not followed: pressed vertices have come to
-    /// the edge of the zone there, and beyond it none is a candidate. None where there is room.
+    /// The direction along the skin in which tools are not followed, because pressed vertices have
+    /// reached the edge of the zone, beyond which there are no candidates. `None` if there is room.
     fn held_direction(&self) -> Option<Vec3> {
         if self.plan.exterior.is_empty()
             || self.contact_radius(self.plan.centre) < EDGE * self.plan.radius

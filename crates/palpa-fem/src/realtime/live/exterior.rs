@@ -1,4 +1,4 @@
-//! The body outside the zone, as a step sees it.
+//! The exterior during a step.
 
 use std::sync::Arc;
 
@@ -8,21 +8,20 @@ use super::super::outside::{Follower, Outside};
 use super::super::plan::{Plan, Trouble};
 use super::Live;
 
-/// How the body outside the zone keeps up with it; see [`super::ExteriorMode`].
+/// The way in which the exterior follows the zone; see [`super::ExteriorMode`].
 #[derive(Debug)]
 pub(super) enum ExteriorState {
     /// It is brought to equilibrium in every step.
     Followed {
         follower: Box<Follower>,
-        /// Its forces out of balance, N.
+        /// Its unbalanced forces, N.
         residual: f64,
     },
-    /// It answers linearly about the state of its last factor.
+    /// It responds linearly about the state of its last factor.
     Linear {
-        /// Time that its memory is behind, s.
+        /// Time by which its memory lags behind, s.
         lag: f64,
-        /// Whether the body has begun again at rest since: then that state is not one to go on
-        /// from.
+        /// Whether the body has restarted from rest since then; that state must then not be used.
         is_lost: bool,
     },
 }
@@ -45,7 +44,7 @@ impl ExteriorState {
         matches!(self, Self::Followed { .. })
     }
 
-    /// Whether the displacements outside the zone are those that its linear answer gives.
+    /// Whether the displacements outside the zone come from the linear response.
     pub(super) fn answers_linearly(&self) -> bool {
         matches!(self, Self::Linear { is_lost: false, .. })
     }
@@ -71,7 +70,7 @@ impl ExteriorState {
         }
     }
 
-    /// Forces out of balance of a followed exterior, N.
+    /// Unbalanced forces of a followed exterior, N.
     pub(super) fn residual(&self) -> f64 {
         match self {
             Self::Followed { residual, .. } => *residual,
@@ -79,7 +78,7 @@ impl ExteriorState {
         }
     }
 
-    /// Time that the memory of a linear exterior is behind, s.
+    /// Time by which the memory of a linear exterior lags behind, s.
     pub(super) fn lag(&self) -> f64 {
         match self {
             Self::Followed { .. } => 0.0,
@@ -87,21 +86,22 @@ impl ExteriorState {
         }
     }
 
-    /// Says how far behind the memory of a linear exterior is, s.
+    /// Sets the time by which the memory of a linear exterior lags behind, s.
     pub(super) fn set_lag(&mut self, new: f64) {
         if let Self::Linear { lag, .. } = self {
             *lag = new;
         }
     }
 
-    /// The body begins again at rest.
+    /// Called when the body restarts from rest.
     pub(super) fn lose(&mut self) {
         if let Self::Linear { is_lost, .. } = self {
             *is_lost = true;
         }
     }
 
-    /// A new factor is there. Returns whether the old one was linear about a state to go on from.
+    /// Called with a new factor. Returns whether the old exterior was linearised about a usable
+    /// state.
     pub(super) fn renew(&mut self) -> bool {
         match self {
             Self::Followed { .. } => false,
@@ -109,7 +109,7 @@ impl ExteriorState {
         }
     }
 
-    /// The factor and zone that the displacements outside the zone follow from; none where those
+    /// The factor and zone that determine the displacements outside the zone; `None` if those
     /// displacements are up to date.
     pub(super) fn origin(
         &self,
@@ -122,8 +122,8 @@ impl ExteriorState {
 }
 
 impl Live {
-    /// Brings a followed exterior along with the ring: its displacements, then its forces, once a
-    /// step. Within the step it answers linearly.
+    /// Updates a followed exterior to the ring, once a step: its displacements, then its forces.
+    /// Within the step it responds linearly.
     pub(super) fn bring_exterior(&mut self) -> Result<(), Trouble> {
         let ExteriorState::Followed { follower, .. } = &mut self.exterior else {
             return Ok(());
@@ -155,13 +155,13 @@ impl Live {
         Ok(())
     }
 
-    /// Brings the displacements outside the zone up to date. Cost: a substitution through the
-    /// exterior, and memory.
+    /// Updates the displacements outside the zone. Cost: a substitution through the exterior, and
+    /// memory.
     pub fn settle(&mut self) {
         self.settle_columns(None);
     }
 
-    /// The same for some columns only.
+    /// As [`Self::settle`], for some columns only.
     pub(super) fn settle_columns(&mut self, only: Option<&[u32]>) {
         let mut scratch = SolveScratch::new(&self.plan.tree);
         self.outside.settle(

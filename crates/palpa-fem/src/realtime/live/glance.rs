@@ -12,12 +12,12 @@ use crate::model::Model;
 
 /// The displacements of a [`Live`] body at one moment.
 ///
-/// Where the exterior answers linearly, those outside the zone are computed by [`Self::settled`],
-/// to be called where nobody waits.
+/// If the exterior answers linearly, [`Self::settled`] computes the displacements outside the zone.
+/// Call it on a thread where nothing waits for it.
 #[derive(Debug)]
 pub struct Glance {
     model: Arc<Model>,
-    /// The exterior that the displacements outside the zone follow from; none where they are up to
+    /// The exterior that determines the displacements outside the zone; `None` if those are up to
     /// date.
     exterior: Option<(Arc<Plan>, Arc<Outside>)>,
     displacements: Vec<Vec3>,
@@ -43,8 +43,8 @@ impl Glance {
 }
 
 impl Live {
-    /// Copies the displacements, into the memory of an older copy where there is one. Cost: a copy
-    /// of the displacements.
+    /// Copies the displacements, reusing the memory of an older copy if given. Cost: a copy of the
+    /// displacements.
     pub fn glance(&self, old: Option<Glance>) -> Glance {
         let mut displacements = old.map_or_else(Vec::new, |old| old.displacements);
         displacements.clear();

@@ -9,37 +9,38 @@ use super::Live;
 use super::report::{LiveReport, StepOutcome};
 use crate::model::Model;
 
-/// Share of an iteration below which it has failed.
+/// If less than this share of an iteration can be taken, it has failed.
 const LEAST_SHARE: f64 = 0.05;
-/// A body that nothing touches is still where an iteration moves its zone by no more than this, m,
-/// and its forces are in balance within this share of the tolerance.
+/// A body without contact counts as still if an iteration moves its zone by no more than this, m,
+/// and its residual is within this share of the tolerance.
 const STILL: f64 = 1e-8;
 const STILL_SHARE: f64 = 0.1;
 
-/// What is known of the body where it is now.
+/// The forces that are known for the present state of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Known {
-    /// Nothing: it is elsewhere, or on another zone, since forces were last evaluated.
+    /// None: the body or the zone has changed since forces were last evaluated.
     Nothing,
     /// The internal forces of zone and followed exterior.
     Forces,
-    /// The forces; and nothing touched the body in the last step, which left it as it was. There is
-    /// nothing to solve until a tool comes near.
+    /// The forces are known, nothing touched the body in the last step, and the step left it
+    /// unchanged. There is nothing to solve until a tool comes near.
     Still,
 }
 
-/// Which iteration of a step it is.
+/// The kind of an iteration within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pass {
     /// The first one.
     First,
     /// A later one, with a new stiffness and new candidates.
     Anew,
-    /// A later one near equilibrium, with the factor, compliance and candidates of the one before.
+    /// A later one near equilibrium, with the factor, compliance and candidates of the previous
+    /// one.
     Near,
 }
 
-/// Arrays that iterations work in.
+/// Scratch arrays of the iterations.
 #[derive(Debug)]
 pub(super) struct Scratch {
     /// Internal forces of the zone's prisms, N. `[n_nodes]`
@@ -65,7 +66,7 @@ impl Scratch {
 }
 
 impl Live {
-    /// One Newton iteration. After an error the state is not one to go on from.
+    /// One Newton iteration. After an error the state must not be used any more.
     pub(super) fn iterate(
         &mut self,
         dt: f64,
@@ -103,8 +104,8 @@ impl Live {
         Ok(())
     }
 
-    /// Evaluates the internal forces where those of the last iteration do not hold any more: the
-    /// body is elsewhere, or its materials remember and time has passed.
+    /// Evaluates the internal forces if those of the last iteration are out of date: the body has
+    /// changed, or its materials have memory and time has passed.
     fn evaluate_forces(&mut self, pass: Pass) -> Result<(), Trouble> {
         let has_aged = pass == Pass::First && self.model.has_memory;
         if !has_aged && self.known != Known::Nothing {
@@ -118,8 +119,8 @@ impl Live {
         Ok(())
     }
 
-    /// Takes the step that is in `x`, or as large a share of it as turns no prism inside out.
-    /// Returns the share.
+    /// Takes the step in `x`, or the largest share of it that turns no prism inside out. Returns
+    /// the share.
     fn advance(&mut self, report: &mut LiveReport) -> Result<f64, Trouble> {
         for &[node, _] in &self.plan.zone {
             self.ws.before[node as usize] = self.state.displacements[node as usize];
@@ -139,7 +140,7 @@ impl Live {
         }
     }
 
-    /// Takes a share of the step that is in `x`, from the displacements before it.
+    /// Applies a share of the step in `x` to the displacements before it.
     fn take(&mut self, share: f64) {
         for &[node, dof] in &self.plan.zone {
             let step = Vec3::from_fn(|c, _| f64::from(self.ws.x[dof as usize + c]));
@@ -164,7 +165,7 @@ impl Live {
         Ok(())
     }
 
-    /// Forces out of balance, with those of the tools, reduced to the zone, into `x`.
+    /// Writes the unbalanced forces, with those of the tools and reduced to the zone, into `x`.
     fn right_side(&mut self) {
         let (x, forces) = (&mut self.ws.x, &self.ws.forces);
         for &[node, dof] in &self.plan.zone {
@@ -189,7 +190,7 @@ impl Live {
             .push(&self.plan, displacements, x, &mut self.ws.moves);
     }
 
-    /// Forces out of balance in the zone without its ring, as a share of the tools' force.
+    /// Residual of the zone without its ring: unbalanced forces relative to the tools' force.
     fn residual(&self) -> f64 {
         let levels = self.model.body.n_levels;
         let ring = self.first_ring_dof();
@@ -225,7 +226,7 @@ impl Live {
         self.ws.x.len() - 3 * self.plan.ring.len()
     }
 
-    /// The residual of a body that nothing touches, if it is still where it was.
+    /// The residual of a body without contact, if it has not moved.
     fn residual_at_rest(&mut self) -> Option<f64> {
         if self.known != Known::Still {
             return None;
@@ -249,8 +250,8 @@ impl Live {
             && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
     }
 
-    /// To be called when the body is elsewhere, or on another zone: its forces are not known any
-    /// more.
+    /// Marks the forces as unknown. Call it when the body has moved to another state or has another
+    /// zone.
     pub(super) fn forget_forces(&mut self) {
         self.known = Known::Nothing;
     }

@@ -1,4 +1,4 @@
-//! When a job for the background is due, and how its result is installed.
+//! Decides when a background job is due, and installs its result.
 
 use std::sync::Arc;
 
@@ -12,27 +12,27 @@ use super::{ExteriorMode, Live};
 use crate::law::Prony;
 use crate::model::Model;
 
-/// Growth of the zone's radius where vertices of its ring press.
+/// Growth factor of the zone's radius when vertices of its ring press.
 const ZONE_GROWTH: f64 = 1.3;
-/// Time after which a linear exterior that remembers is asked to be brought up to date, as a share
-/// of its shortest time of relaxation; and its limits, s.
+/// Time after which a linear exterior with viscous memory should be updated, as a share of its
+/// shortest relaxation time; and the limits of that time, s.
 const LAG_SHARE: f64 = 0.5;
 const LAGS: [f64; 2] = [0.01, 0.05];
 
-/// The work that the background does for a body.
+/// The background jobs of a body.
 #[derive(Debug)]
 pub(super) struct Jobs {
     job: Job,
-    /// Jobs asked for, and zones among them; numbers of factors and zones.
+    /// Number of jobs requested so far. Factors and zones take their numbers from it.
     pub(super) n_asked: u64,
     pub(super) n_zones: u64,
-    /// Steps since the job was asked for.
+    /// Steps since the job was requested.
     age: u32,
-    /// Steps that the last job took.
+    /// Duration of the last job in steps.
     pub(super) latency: u32,
-    /// Indentation at the last factor of the exterior, m; infinite to ask for one.
+    /// Indentation at the last factor of the exterior, m; infinite to request a new factor.
     depth_at_factor: f64,
-    /// Time that the memory of a linear exterior may be behind, s.
+    /// Longest time by which the memory of a linear exterior may lag behind, s.
     longest_lag: f64,
 }
 
@@ -43,15 +43,15 @@ pub(super) struct Jobs {
     reason = "one to a body, and a box would be allocated in a step"
 )]
 enum Job {
-    /// No job is asked for.
+    /// No job is requested.
     Idle {
         shop: Box<Shop>,
         /// An exterior that is no longer needed.
         retired: Option<Arc<Outside>>,
     },
-    /// A job is asked for, and no thread has taken it.
+    /// A job is requested, and no thread has taken it.
     Waiting(Rebuild),
-    /// A thread has it.
+    /// A thread is working on it.
     Out,
 }
 
@@ -71,22 +71,22 @@ impl Jobs {
         }
     }
 
-    /// One step later.
+    /// Counts a step.
     pub(super) fn grow_older(&mut self) {
         self.age = self.age.saturating_add(1);
     }
 
-    /// Makes a new factor of the exterior due.
+    /// Requests a new factor of the exterior.
     pub(super) fn ask_for_factor(&mut self) {
         self.depth_at_factor = f64::INFINITY;
     }
 
-    /// The indentation is that of the last factor, m.
+    /// Records the indentation (m) at the last factor.
     pub(super) fn is_factored_at(&mut self, depth: f64) {
         self.depth_at_factor = depth;
     }
 
-    /// Where the exterior's prisms are, unless a job has them.
+    /// The exterior's prisms, unless a job has them.
     pub(super) fn shop(&self) -> Option<&Shop> {
         match &self.job {
             Job::Idle { shop, .. } => Some(shop),
@@ -95,17 +95,17 @@ impl Jobs {
     }
 }
 
-/// The zone that is due.
+/// A job that is due.
 struct Due {
-    /// Where a new zone is to be, at rest, m, and its radius, m; none for a factor of the exterior
-    /// of the present one.
+    /// Centre at rest (m) and radius (m) of a new zone; `None` for a new factor of the present
+    /// exterior.
     zone: Option<(Vec3, f64)>,
     /// Indentation, m.
     depth: f64,
 }
 
 impl Live {
-    /// Asks for a rebuild if one is due and none is under way.
+    /// Requests a job if one is due and none is under way.
     pub(super) fn ask(&mut self, dt: f64) {
         if self.jobs.shop().is_none() || self.plan.exterior.is_empty() {
             return;
@@ -153,8 +153,8 @@ impl Live {
         }
     }
 
-    /// What is due: a new zone where the tools leave the present one or press its ring, or a factor
-    /// where the exterior's is stale.
+    /// The job that is due: a new zone if the tools leave the present one or press its ring, or a
+    /// new factor if the exterior's is out of date.
     fn due(&self) -> Option<Due> {
         let ring = self.first_ring_dof();
         let reaches_ring = self
@@ -184,8 +184,8 @@ impl Live {
         Some(Due { zone, depth })
     }
 
-    /// Where a zone that is asked for now is to be, at rest, m: the middle of the pressed vertices,
-    /// and as far ahead as the tools will go until the zone is there.
+    /// Centre at rest of a zone requested now, m: the middle of the pressed vertices, moved ahead
+    /// by the distance that the tools will go until the zone is ready.
     pub(super) fn next_centre(&self) -> Vec3 {
         let Some(Pressed { middle, along }) = self.pressed() else {
             let (displacements, tools) = (&self.state.displacements, &self.course.tools);
@@ -202,14 +202,14 @@ impl Live {
         middle + lead * (most / lead.norm()).min(1.0)
     }
 
-    /// Memory of the prisms whose memory is moved on in every step.
+    /// Memory of the prisms whose memory is updated in every step.
     pub(super) fn history(&self) -> History {
         let mut history = History::new(&self.model);
         self.remember(&mut history);
         history
     }
 
-    /// The same, into a history.
+    /// Writes the memory of those prisms into a history.
     pub(super) fn remember(&self, history: &mut History) {
         self.inside.batches.store(history);
         if let Some(follower) = self.exterior.follower() {
@@ -217,7 +217,7 @@ impl Live {
         }
     }
 
-    /// Moves on the memory of those prisms of a linear exterior that are evaluated one by one: they
+    /// Updates the memory of those prisms of a linear exterior that are evaluated one by one: they
     /// are few.
     fn bring_up_others(&mut self, dt: f64, lag: f64) {
         if !self.model.has_memory || lag <= 0.0 {
@@ -247,7 +247,7 @@ impl Live {
         }
     }
 
-    /// Work for another thread, if any is due. Its result is to be given to [`Self::install`].
+    /// A job for the background thread, if one is due. Give its result to [`Self::install`].
     pub fn take_job(&mut self) -> Option<Rebuild> {
         match std::mem::replace(&mut self.jobs.job, Job::Out) {
             Job::Waiting(job) => Some(job),
@@ -258,7 +258,7 @@ impl Live {
         }
     }
 
-    /// Takes over the result of a job that this body has asked for.
+    /// Installs the result of a job of this body.
     pub fn install(&mut self, done: Rebuilt) {
         self.jobs.latency = self.jobs.age;
         let Some(outside) = done.outside else {
@@ -270,7 +270,7 @@ impl Live {
         };
         let was_linear = self.exterior.renew();
         if done.inside.is_some() && was_linear {
-            // The columns that enter a zone are where the old exterior puts them.
+            // Columns that enter the zone start at their positions in the old exterior.
             let entering = done.plan.vertices.iter().copied();
             let entering: Vec<u32> = entering
                 .filter(|&v| !self.plan.is_inside[v as usize])
@@ -285,7 +285,7 @@ impl Live {
         };
         if let Some((mut inside, mut follower)) = done.inside {
             if self.model.has_memory {
-                // Memory has moved on since the job was given out.
+                // The memory has changed since the job was taken.
                 let (model, history) = (&*self.model, self.history());
                 inside.batches.load(&history);
                 inside.batches.begin(model, &mut self.memory, &self.state);
@@ -302,7 +302,8 @@ impl Live {
     }
 }
 
-/// Time that the memory of a linear exterior may be behind, s; infinite without viscous materials.
+/// Longest time by which the memory of a linear exterior may lag behind, s; infinite without
+/// viscous materials.
 fn longest_lag(model: &Model) -> f64 {
     let materials = model.materials.iter().filter_map(|m| m.prony.as_ref());
     let shortest = materials

@@ -1,4 +1,4 @@
-//! The moving step of a body that follows tools. Algorithm and limits:
+//! The real-time step of a body that follows tools. Algorithm and limits:
 //! `docs/theory/moving_step.md`.
 //!
 //! | file | what happens there |
@@ -91,7 +91,7 @@ pub struct Live {
     plan: Arc<Plan>,
     /// The zone's prisms and factor.
     inside: Box<Inside>,
-    /// The exterior, linear about an earlier state.
+    /// The exterior, linearised about an earlier state.
     outside: Arc<Outside>,
     exterior: ExteriorState,
     skin: SkinForces,
@@ -100,16 +100,16 @@ pub struct Live {
     recovery: Recovery,
     springs: Springs,
     jobs: Jobs,
-    /// Candidates for contact with their forces, and the compliance that they were found on.
+    /// The contact candidates with their forces, and the compliance used to find them.
     problem: ContactProblem,
     ws: Scratch,
 }
 
 impl Live {
-    /// A body at rest, with its first zone where the tools are.
+    /// A body at rest, with its first zone around the tools.
     ///
     /// # Errors
-    /// When the body is too large to be factored, or cannot be at rest.
+    /// When the body is too large to be factored, or is not stable at rest.
     pub fn new(
         model: Arc<Model>,
         tools: &[PosedTool],
@@ -120,8 +120,8 @@ impl Live {
         Self::at(model, tools, params, centre, come, 0)
     }
 
-    /// A body in a given state, with its first zone round a point of the skin at rest. Zones are
-    /// counted from `n_before` on.
+    /// A body in a given state, with its first zone around a point of the skin at rest. Zones are
+    /// numbered from `n_before` on.
     fn at(
         model: Arc<Model>,
         tools: &[PosedTool],
@@ -186,8 +186,8 @@ impl Live {
         })
     }
 
-    /// Displacements of all nodes, m. `[n_nodes]` Where the exterior answers linearly, those
-    /// outside the zone are brought up to date by [`Self::settle`].
+    /// Displacements of all nodes, m. `[n_nodes]` If the exterior answers linearly,
+    /// [`Self::settle`] updates those outside the zone.
     pub fn displacements(&self) -> &[Vec3] {
         &self.state.displacements
     }
@@ -197,7 +197,7 @@ impl Live {
         &self.model
     }
 
-    /// Numbers of columns of the zone, of its ring, and of the body.
+    /// Number of columns of the zone, of its ring, and of the body.
     pub fn n_columns(&self) -> [usize; 3] {
         let tree = &self.plan.tree;
         [

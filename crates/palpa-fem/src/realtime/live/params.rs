@@ -1,27 +1,27 @@
-//! How a moving step is set up.
+//! Parameters of the real-time step.
 
-/// How a moving step goes about its work.
+/// Parameters of the real-time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveParams {
-    /// Radius of the zone round the tools, measured at rest over the skin, m; infinite for one
-    /// stiffness of the whole body.
+    /// Radius of the zone around the tools, measured at rest over the skin, m; infinite to make the
+    /// whole body the zone.
     pub zone_radius: f64,
     /// How the body outside the zone is followed.
     pub exterior: ExteriorMode,
-    /// Most Newton iterations of a step.
+    /// Largest number of Newton iterations in a step.
     pub max_iterations: usize,
-    /// Forces out of balance, as a share of the tools' force, above which a step takes another
-    /// iteration.
+    /// Residual above which a step takes another iteration: unbalanced forces relative to the
+    /// tools' force.
     pub tolerance: f64,
     /// Gap up to which vertices are candidates for contact, m.
     pub reach: f64,
-    /// How far the tool may go from the zone's centre before a new zone is asked for, as a share of
+    /// Distance of the tool from the zone's centre at which a new zone is requested, as a share of
     /// the radius.
     pub leave: f64,
-    /// Longest way of a tool near the skin in one step, m. A tool that is asked to go farther is
-    /// followed over several steps, so that it cannot jump through the skin.
+    /// Longest move of a tool near the skin in one step, m. A longer move is divided over several
+    /// steps, so that a tool cannot jump through the skin.
     pub longest_move: f64,
-    /// Change of the indentation after which a new stiffness of the exterior is asked for, m.
+    /// Change of the indentation after which a new stiffness of the exterior is requested, m.
     pub stale: f64,
 }
 
@@ -41,8 +41,8 @@ impl Default for LiveParams {
 }
 
 impl LiveParams {
-    /// How far a tool may go while a job is under way, m: out of the zone's middle, or as far as
-    /// the stiffness of a followed exterior serves.
+    /// Distance that a tool may go while a job is under way, m: out of the zone's centre, or as far
+    /// as the stiffness of a followed exterior is valid.
     pub fn longest_way(&self) -> f64 {
         let way = self.leave * self.zone_radius;
         match self.exterior {
@@ -52,13 +52,13 @@ impl LiveParams {
     }
 }
 
-/// How a step treats the body outside the zone. The stiffness there is always an earlier one.
+/// The treatment of the body outside the zone. Its stiffness is always an earlier one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExteriorMode {
-    /// It is brought to equilibrium with its true forces in every step; the cost of a step grows
-    /// with the body.
+    /// The exterior is brought to equilibrium with its true forces in every step; the cost of a
+    /// step grows with the body.
     Followed,
-    /// It answers linearly until the background brings it up to date; the cost of a step is that of
-    /// the zone.
+    /// The exterior responds linearly until the background updates it; the cost of a step is that
+    /// of the zone.
     Linear,
 }

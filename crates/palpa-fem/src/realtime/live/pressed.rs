@@ -1,4 +1,4 @@
-//! Where the tools press, or would press.
+//! The place where the tools press, or would press.
 
 use palpa_mesh::Vec3;
 
@@ -6,19 +6,19 @@ use super::Live;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 
-/// A force below which a residual is not taken relative to it, N.
+/// Residuals are relative to the tools' force, but at least to this force, N.
 const LEAST_FORCE: f64 = 0.01;
 
 /// The place where tools press.
 pub(super) struct Pressed {
-    /// Mean of the vertices at rest, weighted with the forces, m.
+    /// Mean of the vertices at rest, weighted by their forces, m.
     pub(super) middle: Vec3,
     /// Mean direction of the forces; a unit vector.
     pub(super) along: Vec3,
 }
 
 impl Live {
-    /// The place where tools press, if any does.
+    /// The place where tools press; `None` without contact.
     pub(super) fn pressed(&self) -> Option<Pressed> {
         let points = &self.model.body.skin.points;
         let (mut force, mut middle, mut along) = (0.0, Vec3::zeros(), Vec3::zeros());
@@ -33,7 +33,7 @@ impl Live {
         })
     }
 
-    /// How far from a point of the skin at rest vertices press, m.
+    /// Largest distance of a pressing vertex from a point of the skin at rest, m.
     pub(super) fn contact_radius(&self, centre: Vec3) -> f64 {
         let points = &self.model.body.skin.points;
         self.problem
@@ -50,7 +50,8 @@ impl Live {
             .fold(0.0, f64::max)
     }
 
-    /// The force that residuals are relative to, N: the sum of the contact forces' sizes.
+    /// The force that residuals are relative to, N: the sum of the magnitudes of the contact
+    /// forces.
     pub(super) fn tools_force(&self) -> f64 {
         let candidates = self.problem.candidates.iter();
         let size: f64 = candidates.map(|c| c.force().norm()).sum();
@@ -58,8 +59,8 @@ impl Live {
     }
 }
 
-/// The least distance of the skin (or of the vertices `among`) from the tools, m, and where at rest
-/// that vertex is, m.
+/// Least distance of the skin (or of the vertices `among`) from the tools, m, and the position of
+/// that vertex at rest, m.
 pub(super) fn nearest_point(
     model: &Model,
     displacements: &[Vec3],

@@ -1,4 +1,4 @@
-//! Work for another thread: a new zone, or a new factor of the exterior.
+//! Jobs for the background thread: a new zone, or a new factor of the exterior.
 
 use std::sync::Arc;
 
@@ -13,27 +13,27 @@ use super::super::plan::{Plan, Trouble};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// Work for another thread: a new zone with its exterior, or a new factor of the exterior.
+/// A job for the background thread: a new zone with its exterior, or a new factor of the exterior.
 #[derive(Debug)]
 pub struct Rebuild {
     pub(super) model: Arc<Model>,
     pub(super) pattern: Arc<ColumnPattern>,
     pub(super) memory: Memory,
-    /// Displacements when the work was asked for, m. `[n_nodes]`
+    /// Displacements at the time of the request, m. `[n_nodes]`
     pub(super) displacements: Vec<Vec3>,
-    /// The exterior that the displacements outside the zone follow from; none where they are up to
+    /// The exterior that determines the displacements outside the zone; `None` if those are up to
     /// date.
     pub(super) old: Option<(Arc<Plan>, Arc<Outside>)>,
     pub(super) target: Target,
-    /// Kept from the last rebuild.
+    /// Memory kept from the last job.
     pub(super) shop: Box<Shop>,
-    /// Duration of a step, and time that the exterior's memory is behind, s.
+    /// Duration of a step, and the time by which the exterior's memory lags behind, s.
     pub(super) dt: f64,
     pub(super) lag: f64,
-    /// Memory of the prisms that the shop does not have, or of all.
+    /// Viscous memory of the prisms that the shop lacks, or of all prisms.
     pub(super) history: Option<History>,
-    /// An exterior that is no longer needed. Its memory is used again, or freed here, where nobody
-    /// waits.
+    /// An exterior that is no longer needed. The background reuses its memory or frees it, so that
+    /// the step need not.
     pub(super) retired: Option<Arc<Outside>>,
     pub(super) is_followed: bool,
     /// Number of the factor.
@@ -43,14 +43,14 @@ pub struct Rebuild {
 /// The zone whose exterior is to be factored.
 #[derive(Debug)]
 pub(super) enum Target {
-    /// The present one.
+    /// The present zone.
     Same(Arc<Plan>),
-    /// One that is to be made.
+    /// A new zone.
     New {
         id: u64,
-        /// At rest, m.
+        /// Its centre at rest, m.
         centre: Vec3,
-        /// m.
+        /// Its radius, m.
         radius: f64,
     },
 }
@@ -58,7 +58,7 @@ pub(super) enum Target {
 /// The exterior's prisms with their tangents, and the arrays that it is factored in.
 #[derive(Debug)]
 pub(super) struct Shop {
-    /// The zone that it is the exterior of.
+    /// Number of the zone whose exterior this is.
     plan: u64,
     pub(super) follower: Follower,
     workshop: Workshop,
@@ -105,9 +105,9 @@ impl Shop {
 #[derive(Debug)]
 pub struct Rebuilt {
     pub(super) plan: Arc<Plan>,
-    /// The prisms of a new zone; and of its exterior, where that is followed.
+    /// The prisms of a new zone, and those of its exterior if it is followed.
     pub(super) inside: Option<(Box<Inside>, Option<Box<Follower>>)>,
-    /// None where the factor failed.
+    /// The new exterior; `None` if the factor failed.
     pub(super) outside: Option<Arc<Outside>>,
     pub(super) shop: Box<Shop>,
 }
@@ -116,7 +116,7 @@ impl Rebuild {
     /// Does the work. Cost: a factor of the whole body.
     ///
     /// # Panics
-    /// Never: a body that could be factored with one zone can be with another.
+    /// Never: a body that could be factored with one zone can be factored with another.
     pub fn run(mut self) -> Rebuilt {
         let model = Arc::clone(&self.model);
         let pattern = Arc::clone(&self.pattern);
@@ -190,19 +190,19 @@ impl Rebuild {
     }
 }
 
-/// The memory of the exterior's prisms, which may be behind.
+/// The viscous memory of the exterior's prisms, which may lag behind.
 struct ExteriorMemory<'a> {
     memory: &'a mut Memory,
     displacements: &'a [Vec3],
-    /// Whether the exterior answers linearly, so that only shops move its memory on.
+    /// Whether the exterior answers linearly; then only background jobs update its memory.
     is_linear: bool,
-    /// Time that it is behind, s.
+    /// Time by which the memory lags behind, s.
     lag: f64,
 }
 
 impl ExteriorMemory<'_> {
-    /// Brings the memory in a shop up to date. `history` has that of the prisms which no shop has;
-    /// that of `other`, the shop of another zone, is added to it.
+    /// Updates the memory in a shop. `history` holds that of the prisms that no shop has; the
+    /// memory of `other`, the shop of another zone, is added to it.
     fn bring_up(
         self,
         model: &Model,

@@ -1,5 +1,4 @@
-//! The way back from steps that failed: the last good state, a slower pace, and the start again at
-//! rest.
+//! Recovery from failed steps: the last good state, a slower pace, and a restart from rest.
 
 use palpa_mesh::Vec3;
 
@@ -9,23 +8,24 @@ use crate::posed_tool::PosedTool;
 
 /// The slowest pace.
 const LEAST_PACE: f64 = 1.0 / 64.0;
-/// Failed steps in a row after which a body begins again at rest.
+/// Failed steps in a row after which a body restarts from rest.
 const MOST_FAILED: u32 = 8;
-/// How far tools are lifted from a body at rest at a time, m, and how often at most.
+/// Distance by which tools are lifted off a body at rest each time, m, and the largest number of
+/// lifts.
 const LIFT: f64 = 2e-3;
 const MOST_LIFTS: usize = 100;
 
-/// The state to come back to, and how fast to go on.
+/// The state to return to, and the pace after that.
 #[derive(Debug)]
 pub(super) struct Recovery {
     /// Displacements of the last state near equilibrium, m; up to date in the zone, and everywhere
     /// if the exterior is followed. `[n_nodes]`
     displacements: Vec<Vec3>,
-    /// Pressing forces then, N. `[n_vertices]`
+    /// Pressing forces of that state, N. `[n_vertices]`
     pressures: Vec<f64>,
-    /// The tools then.
+    /// Tools of that state.
     tools: Vec<PosedTool>,
-    /// Share of the longest move that a step may make, 1/64 to 1.
+    /// Limit of a step's move, as a share of the longest move, 1/64 to 1.
     pub(super) pace: f64,
     /// Steps in a row that failed.
     n_failed: u32,
@@ -42,23 +42,23 @@ impl Recovery {
         }
     }
 
-    /// After a good step.
+    /// Called after a good step.
     pub(super) fn speed_up(&mut self) {
         self.pace = (self.pace * 2.0).min(1.0);
         self.n_failed = 0;
     }
 
-    /// After a rough step.
+    /// Called after a rough step.
     pub(super) fn slow_down(&mut self) {
         self.pace = (self.pace * 0.5).max(LEAST_PACE);
     }
 }
 
 impl Live {
-    /// Keeps the present state as one to come back to.
+    /// Keeps the present state to return to.
     pub(super) fn keep_good(&mut self) {
         let good = &mut self.recovery;
-        // A linear exterior goes with the zone.
+        // A linear exterior follows from the zone.
         if self.exterior.is_followed() {
             good.displacements
                 .copy_from_slice(&self.state.displacements);
@@ -73,8 +73,8 @@ impl Live {
         good.tools.copy_from_slice(&self.course.tools);
     }
 
-    /// After a step that has lost the body: back to the last good state, or after several such
-    /// steps in a row to rest. The tools are followed more slowly from there.
+    /// Called after a step that has lost the body. Returns to the last good state, or after several
+    /// such steps in a row to rest. The tools are followed more slowly from there.
     pub(super) fn recover(&mut self) {
         self.recovery.n_failed += 1;
         if self.recovery.n_failed < MOST_FAILED {
@@ -107,7 +107,7 @@ impl Live {
         self.forget_forces();
     }
 
-    /// Begins at rest with the tools off the skin, because no step leads on from the last good
+    /// Restarts from rest with the tools off the skin, because no step continues from the last good
     /// state.
     fn start_again(&mut self) {
         self.recovery.n_failed = 0;

@@ -1,43 +1,43 @@
-//! How a moving step ended.
+//! The result of a real-time step.
 
-/// How a step ended.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepOutcome {
-    /// The tools are where they were asked to be.
+    /// The tools have reached their targets.
     Arrived,
-    /// The tools are on their way there, because it was too far for one step. The local model is
-    /// that of the place reached.
+    /// The tools are on the way to their targets, which were too far for one step. The local model
+    /// is that of the place reached.
     Behind,
-    /// The step went only part of the way, because tissue would have turned inside out; or it
-    /// ended far from equilibrium; or its matrix had to be changed before it could be factored. The
-    /// next steps go on from here. The local model must not be rendered.
+    /// The step was cut short because tissue would have turned inside out, or it ended far from
+    /// equilibrium, or its matrix had to be changed before it could be factored. The next steps
+    /// continue from here. The local model must not be rendered.
     BackedOff,
-    /// The step went nowhere. The state is the last good one, or rest after several failures in a
+    /// The step was discarded. The state is the last good one, or rest after several failures in a
     /// row, and the tools are followed more slowly from there.
     Failed,
 }
 
-/// Figures of one moving step.
+/// Figures of one real-time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveReport {
-    /// How it ended.
+    /// The outcome.
     pub outcome: StepOutcome,
-    /// Newton iterations; 0 while nothing touches a body that is at rest.
+    /// Newton iterations; 0 while nothing touches a body at rest.
     pub iterations: usize,
-    /// Forces out of balance in the zone, as a share of the tools' force.
+    /// Residual of the zone: unbalanced forces relative to the tools' force.
     pub residual: f64,
-    /// Forces out of balance in a followed exterior, as a share of the tools' force.
+    /// Residual of a followed exterior: unbalanced forces relative to the tools' force.
     pub outside: f64,
-    /// Vertices that press.
+    /// Number of pressing vertices.
     pub n_active: usize,
-    /// Candidates for contact.
+    /// Number of contact candidates.
     pub n_candidates: usize,
     /// Shift of the diagonal that the zone's stiffness needed, as a share of the diagonal.
     pub shift: f32,
-    /// Stiffness of the springs that held the vertices under the tools while the step was solved,
-    /// as a share of the skin's own stiffness. Their forces are taken out again.
+    /// Stiffness of the springs that held the vertices under the tools during the solve, relative
+    /// to the skin's own stiffness. Their forces have been removed from the result.
     pub spring: f64,
-    /// Number of the zone that was used; counted from 1.
+    /// Number of the zone used, from 1.
     pub zone: u64,
     /// Number of the exterior's factor that was used.
     pub factor: u64,

@@ -1,4 +1,4 @@
-//! A coarse body that is fine where the tools are.
+//! A body with a coarse mesh that is fine where the tools are.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -12,59 +12,59 @@ use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 
-/// Steps in which a body is brought to equilibrium on a new mesh at most, each with a stiffness of
-/// its own.
+/// Largest number of steps that bring a body to equilibrium on a new mesh, each with a new
+/// stiffness.
 const MOST_SETTLING: usize = 8;
-/// How far the tools may be from the middle of the fine part before the mesh moves, as a share of
-/// its radius; and how far ahead of them the next middle is put, likewise.
+/// Distance of the tools from the centre of the fine part at which the mesh moves, and distance by
+/// which the next centre lies ahead of them; both as a share of the radius of the fine part.
 const LEAVE: f64 = 0.25;
 const LEAD: f64 = 0.5;
 
-/// Meshes of one body, each fine round another place. All have the same levels, and the same skin
+/// Meshes of one body, each fine around another place. All have the same levels and the same skin
 /// at rest.
 pub trait FineBodies: Debug + Send + Sync {
-    /// The place (at rest, m) whose mesh serves a point of the skin best. Cost: negligible.
+    /// The place (at rest, m) whose mesh suits a point of the skin best. Cost: negligible.
     fn place(&self, point: Vec3) -> Vec3;
 
-    /// Radius round a place within which it is fine, m.
+    /// Radius of the fine part around a place, m.
     fn radius(&self) -> f64;
 
-    /// The body that is fine round a place. Not called on the thread that steps.
+    /// The body that is fine around a place. Not called on the thread of the steps.
     ///
     /// # Errors
-    /// When there is none.
+    /// When there is no such mesh.
     fn model(&self, place: Vec3) -> Result<Arc<Model>, FemError>;
 }
 
 /// [`Live`] on a mesh that moves with the tools.
 ///
-/// The mesh is fine round a place; when the tools leave its middle, the mesh of a place ahead of
-/// them is made in the background, the body as it is then is carried over to it and brought to
-/// equilibrium there. The changes since then are added when it takes over. Zones move on each
-/// mesh as they do on any.
+/// The mesh is fine around a place. When the tools leave its centre, the background makes the mesh
+/// of a place ahead of them. It carries the present body over to that mesh and brings it to
+/// equilibrium there. Changes since then are added when the new mesh takes over. On each mesh,
+/// zones move as usual.
 #[derive(Debug)]
 pub struct Roaming {
     bodies: Option<Arc<dyn FineBodies>>,
     params: LiveParams,
     live: Box<Live>,
-    /// The middle of the fine part at rest, m.
+    /// Centre of the fine part at rest, m.
     place: Vec3,
-    /// The mesh that is to be taken up, with its place at rest, m.
+    /// The mesh to be used next, with its place at rest, m.
     next: Option<(Vec3, Arc<Model>)>,
     is_job_out: bool,
-    /// Whether the last job was a zone: then a mesh comes first, if one is due.
+    /// Whether the last job was a zone. Then a mesh comes first, if one is due.
     was_zone: bool,
-    /// Number of meshes so far, and of meshes that could not be taken up.
+    /// Number of meshes used so far, and of meshes that could not be taken up.
     n_meshes: u64,
     n_failed: u64,
-    /// The last place without a mesh, or with one that the body could not be carried over to; at
-    /// rest, m.
+    /// The last place (at rest, m) that has no mesh, or to whose mesh the body could not be carried
+    /// over.
     refused: Option<Vec3>,
-    /// No longer needed: freed where nobody waits.
+    /// A body that is no longer needed; freed by the next job in the background.
     retired: Option<Box<Live>>,
 }
 
-/// Work for another thread.
+/// A job for the background thread.
 #[derive(Debug)]
 pub struct RoamJob {
     kind: Kind,
@@ -103,7 +103,7 @@ struct Move {
     n_before: u64,
 }
 
-/// A body on another mesh, as it was when the work was asked for.
+/// A body on another mesh, in the state of the time of the request.
 #[derive(Debug)]
 struct Moved {
     place: Vec3,
@@ -114,8 +114,8 @@ struct Moved {
 }
 
 impl RoamJob {
-    /// Does the work. Cost: that of a zone; of a mesh; or, of a body that moves to it, some zones
-    /// and steps.
+    /// Does the work. Cost: that of a zone, or of a mesh; or, for moving a body to a mesh, of some
+    /// zones and steps.
     pub fn run(self) -> RoamDone {
         drop(self.retired);
         RoamDone(match self.kind {
@@ -139,7 +139,8 @@ impl Move {
         let mut live = Box::new(live);
         live.exterior.set_lag(self.lag);
         for round in 0..MOST_SETTLING {
-            // All of the body takes part: each step asks for a stiffness of the exterior.
+            // The whole body must be in balance, so each step requests a new stiffness of the
+            // exterior.
             live.jobs.ask_for_factor();
             let report = live.step(&self.tools, 0.0);
             if let Some(job) = live.take_job() {
@@ -148,7 +149,7 @@ impl Move {
             let is_good = report.outcome == StepOutcome::Arrived
                 && report.residual <= params.tolerance
                 && report.iterations == 1;
-            // Once with an exterior of this state at least.
+            // At least one step must have an exterior of this state.
             if round > 0 && is_good {
                 return Some(Box::new(Moved {
                     place: self.place,
@@ -164,7 +165,7 @@ impl Move {
 }
 
 impl Moved {
-    /// Goes on where the old mesh is by now.
+    /// Continues from the present state of the old mesh.
     fn take_over(self, old: &mut Live) -> Box<Live> {
         old.take_back_job();
         old.settle();
@@ -210,7 +211,7 @@ impl Moved {
 }
 
 impl Roaming {
-    /// On one mesh that stays.
+    /// A body on one mesh that does not move.
     pub fn fixed(live: Live) -> Self {
         Self {
             bodies: None,
@@ -227,11 +228,11 @@ impl Roaming {
         }
     }
 
-    /// At rest, fine where the tools are.
+    /// A body at rest, fine around the tools.
     ///
     /// # Errors
-    /// When there is no mesh for the place, the body is too large to be factored, or cannot be at
-    /// rest.
+    /// When there is no mesh for the place, the body is too large to be factored, or is not stable
+    /// at rest.
     pub fn new(
         bodies: Arc<dyn FineBodies>,
         tools: &[PosedTool],
@@ -247,30 +248,30 @@ impl Roaming {
         })
     }
 
-    /// The moving step on the present mesh.
+    /// The body on the present mesh.
     pub fn live(&self) -> &Live {
         &self.live
     }
 
-    /// The same, to be read from.
+    /// As [`Self::live`], mutable.
     pub fn live_mut(&mut self) -> &mut Live {
         &mut self.live
     }
 
-    /// Round which place (at rest, m) the mesh is fine, and up to which distance, m; none where it
-    /// is the same all over or stays.
+    /// Centre (at rest, m) and radius (m) of the fine part of the mesh; `None` for a mesh that does
+    /// not move.
     pub fn fine(&self) -> Option<(Vec3, f64)> {
         let bodies = self.bodies.as_ref()?;
         Some((self.place, bodies.radius()))
     }
 
-    /// How many meshes there were, and how many could not be taken up.
+    /// Number of meshes used so far, and of meshes that could not be taken up.
     pub fn n_meshes(&self) -> [u64; 2] {
         [self.n_meshes, self.n_failed]
     }
 
-    /// See [`Live::step`]. Where the tools press beyond the fine part of the mesh,
-    /// the body counts as behind.
+    /// See [`Live::step`]. If the tools press outside the fine part of the mesh, the outcome is
+    /// "behind".
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.live.step(tools, dt);
         if report.outcome == StepOutcome::Arrived && self.is_beyond() {
@@ -287,15 +288,15 @@ impl Roaming {
         (pressed.middle - self.place).norm() + reach > bodies.radius()
     }
 
-    /// Work for another thread, if any is due; its result is to be given to [`Self::install`].
-    /// Zones and meshes take turns; a mesh that is made is taken up first.
+    /// A job for the background thread, if one is due. Give its result to [`Self::install`]. Zones
+    /// and meshes take turns; a finished mesh is taken up first.
     pub fn take_job(&mut self) -> Option<RoamJob> {
         if self.is_job_out {
             return None;
         }
         let is_mesh_first = self.next.is_some() || self.was_zone;
         let zone = |live: &mut Live| Some(Kind::Zone(Box::new(live.take_job()?)));
-        // Where nothing presses, to ask is a search over the skin: once a step.
+        // Without contact this check searches the skin, so it is made once a step.
         let kind = if is_mesh_first {
             self.ask().or_else(|| zone(&mut self.live))
         } else {
@@ -333,8 +334,8 @@ impl Roaming {
         (is_nearer && is_new).then(|| Kind::Mesh(bodies, place))
     }
 
-    /// Where the skin is pressed, or would be, and how far ahead of that the next mesh is to be
-    /// fine; at rest, m.
+    /// The place where the skin is pressed, or would be, and the centre of the next fine part ahead
+    /// of it; at rest, m.
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
         if let Some(Pressed { middle, along }) = live.pressed() {
@@ -347,7 +348,7 @@ impl Roaming {
         (point, Vec3::zeros())
     }
 
-    /// Takes over the result of a job.
+    /// Installs the result of a job.
     pub fn install(&mut self, done: RoamDone) {
         self.is_job_out = false;
         match done.0 {

@@ -1,26 +1,27 @@
 //! The zone's stiffness and factor. Where the body is not stable without its tools, springs hold
-//! the vertices under them; the contact problem takes the springs' forces out again.
+//! the vertices under them. The contact problem removes the forces of the springs again.
 
 use super::super::plan::Trouble;
 use super::Live;
 use super::report::LiveReport;
 
-/// First stiffness of the springs, as a share of the skin's own; its growth; and the largest.
+/// First stiffness of the springs, relative to the skin's own stiffness; growth factor; largest
+/// value.
 const FIRST: f64 = 0.03;
 const GROWTH: f64 = 3.0;
 const MOST: f64 = 10.0;
-/// Least and most iterations after which smaller springs are tried: twice as many each time that
-/// smaller ones do not do.
+/// Least and largest number of iterations before softer springs are tried. The number doubles each
+/// time that softer springs fail.
 const PATIENCE: [u32; 2] = [2, 32];
 
-/// Springs along the normals of vertices that press.
+/// Springs along the normals of pressing vertices.
 #[derive(Debug)]
 pub(super) struct Springs {
-    /// Stiffness of each, as a share of the skin's own; 0 for none.
+    /// Stiffness of each spring relative to the skin's own; 0 for no springs.
     share: f64,
-    /// Iterations since the share was changed.
+    /// Iterations since the last change of `share`.
     age: u32,
-    /// Iterations after which a smaller share is tried.
+    /// Iterations before softer springs are tried.
     patience: u32,
 }
 
@@ -31,12 +32,12 @@ impl Springs {
         patience: PATIENCE[0],
     };
 
-    /// Takes the springs off, as the body is elsewhere.
+    /// Removes the springs, because the body has moved to another state.
     pub(super) fn take_off(&mut self) {
         self.share = 0.0;
     }
 
-    /// One iteration later: smaller springs, if it is time to try them. Returns whether it is.
+    /// Counts an iteration and softens the springs if it is time to try. Returns whether it did.
     fn ease(&mut self) -> bool {
         self.age += 1;
         if self.share == 0.0 || self.age <= self.patience {
@@ -50,8 +51,8 @@ impl Springs {
         true
     }
 
-    /// Stiffer springs, as with these the zone is not stable. `was_eased` says whether they have
-    /// just been made smaller.
+    /// Makes the springs stiffer, because the zone is not stable with the present ones. `was_eased`
+    /// says whether they were just softened.
     fn stiffen(&mut self, was_eased: bool) {
         self.age = 0;
         if was_eased {
@@ -60,10 +61,10 @@ impl Springs {
         self.share = (self.share * GROWTH).max(FIRST);
     }
 
-    /// The zone has been factored with these springs and a shift of its diagonal.
+    /// Called after the zone was factored with these springs and this shift of its diagonal.
     fn settle(&mut self, usual: f64, shift: f32) {
         if shift > 0.0 {
-            // Springs were no help; kept, they would hold the skin stiff for a hundred steps.
+            // The springs did not help. If kept, they would stiffen the skin for a hundred steps.
             self.share = usual;
         }
         if self.share == 0.0 {
@@ -73,7 +74,7 @@ impl Springs {
 }
 
 impl Live {
-    /// Makes the zone's stiffness and factor, with springs that are as soft as they may be.
+    /// Assembles and factors the zone's stiffness, with springs as soft as possible.
     pub(super) fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
         let (model, pattern, plan) = (&*self.model, &*self.pattern, &*self.plan);
         let (inside, springs) = (&mut self.inside, &mut self.springs);

@@ -10,20 +10,20 @@ const ROUGH: f64 = 0.1;
 /// Residual above which a step has lost the body, as a share of the tools' force.
 const LOST: f64 = 0.6;
 
-/// How a step is judged.
+/// The verdict on a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
-    /// Near equilibrium, with the body's own stiffness.
+    /// Near equilibrium, with the body's unmodified stiffness.
     Good,
-    /// Something to go on from, but not to come back to or to render.
+    /// Good enough to continue from, but not to return to or to render.
     Rough,
-    /// Nothing to go on from.
+    /// Not usable.
     Lost,
 }
 
 impl Live {
-    /// Follows the tools to where they are now; their number must be the one that the body was made
-    /// with. `dt` is the time since the last step, s.
+    /// Follows the tools to their new poses. Their number must be that of [`Live::new`]. `dt` is
+    /// the time since the last step, s.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.begin_step(tools, dt);
         self.iterations(dt, &mut report);
@@ -51,7 +51,7 @@ impl Live {
         report
     }
 
-    /// Moves the tools, and takes over what the step's duration makes of materials that remember.
+    /// Moves the tools, and updates viscous materials for the duration of the step.
     fn begin_step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let is_short = self.move_tools(tools);
         self.jobs.grow_older();
@@ -82,13 +82,14 @@ impl Live {
         }
     }
 
-    /// Newton iterations until the zone is in balance, or there have been enough.
+    /// Runs Newton iterations until the zone is in balance or the limit is reached.
     fn iterations(&mut self, dt: f64, report: &mut LiveReport) {
         while report.iterations < self.params.max_iterations {
             let pass = if report.iterations == 0 {
                 Pass::First
             } else if report.residual < ROUGH && report.shift == 0.0 {
-                // The first iteration has come near: its stiffness and contact directions serve.
+                // The first iteration has come near equilibrium, so its stiffness and contact
+                // directions can be kept.
                 Pass::Near
             } else {
                 Pass::Anew
@@ -105,10 +106,10 @@ impl Live {
         }
     }
 
-    /// Brings a followed exterior along, unless the zone is lost already, and judges both.
+    /// Updates a followed exterior, unless the zone is lost already, and judges both.
     fn judge(&mut self, report: &mut LiveReport) -> Verdict {
         let is_lost = |residual: f64| residual.is_nan() || residual > LOST;
-        // A zone that is lost goes back to where the exterior is known.
+        // If the zone is lost, the step returns to a state with a known exterior.
         if report.outcome == StepOutcome::Failed || is_lost(report.residual) {
             return Verdict::Lost;
         }
@@ -124,7 +125,7 @@ impl Live {
         }
     }
 
-    /// Ends the step for materials that remember.
+    /// Updates the memory of viscous materials at the end of the step.
     fn commit_memory(&mut self, dt: f64) {
         if !self.model.has_memory {
             return;

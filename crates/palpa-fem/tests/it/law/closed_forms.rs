@@ -122,8 +122,8 @@ fn the_two_hookean_laws_are_those_of_the_books() {
     assert_close(linear.energy(&f), whole(small), 1e-13);
 }
 
-/// Nominal stresses of the quadratic neo-Hookean law in a frictionless column that may swell, from a solution of the
-/// two equations that is independent of this code; CalculiX agrees with it.
+/// Nominal stresses of the quadratic neo-Hookean law in a frictionless column that may swell, from
+/// a solution of the two equations that is independent of this code; CalculiX agrees with it.
 #[test]
 fn free_column() {
     // Poisson's ratio, axial and lateral stretch, nominal stress in Pa; E = 30 kPa.
@@ -150,7 +150,8 @@ fn free_column() {
     }
 }
 
-/// Nominal pressures of a confined column of the same law, where CalculiX gives the same to 7 digits.
+/// Nominal pressures of a confined column of the same law, where CalculiX gives the same to 7
+/// digits.
 #[test]
 fn confined_column() {
     let law = Law::from(NeoHookean::from_young(30e3, 0.45).unwrap());

@@ -230,7 +230,8 @@ fn small_strain_is_that_of_the_linear_law() {
     for law in every_law() {
         let linear = Law::from(Linear::new(law.shear_modulus(), law.bulk_modulus()).unwrap());
         for strain in [1e-4, 1e-6, 1e-8] {
-            // Exponents magnify strain: the first difference from linear is of relative size b ε or α ε.
+            // Exponents magnify strain: the first difference from linear is of relative size b ε or
+            // α ε.
             let tolerance = 60.0 * strain + 1e-15 / strain;
             for _ in 0..5 {
                 let h = strain * chance.matrix();
@@ -248,7 +249,8 @@ fn small_strain_is_that_of_the_linear_law() {
                     "{law:?}"
                 );
                 let total = (law.stress(&f) - linear.stress(&f)).norm();
-                // Where the volume hardly changes, its rounding is still a share of the bulk modulus.
+                // Where the volume hardly changes, its rounding is still a share of the bulk
+                // modulus.
                 let rounding = 1e-15 * law.bulk_modulus();
                 assert!(
                     total <= tolerance * linear.stress(&f).norm() + rounding,

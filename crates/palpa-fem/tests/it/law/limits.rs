@@ -65,7 +65,8 @@ fn each_law_ends_in_neo_hookean() {
     assert_same_law(Gent::new(MU, 1e14, VOLUMETRIC).unwrap(), expected, 1e-12);
 }
 
-/// `Ī2` is `Ī1` of the inverse, so that the exponent −2 is the second constant of Mooney and Rivlin.
+/// `Ī2` is `Ī1` of the inverse, so that the exponent −2 is the second constant of Mooney and
+/// Rivlin.
 #[test]
 fn ogden_of_two_and_minus_two_is_mooney_rivlin() {
     assert_same_law(
@@ -108,7 +109,8 @@ fn fung_starts_as_yeoh() {
     }
 }
 
-/// At the limit of stretch the energy and the stress grow without bound, and beyond it there is no law.
+/// At the limit of stretch the energy and the stress grow without bound, and beyond it there is no
+/// law.
 #[test]
 fn gent_ends_at_its_limit() {
     let limit = 2.0;

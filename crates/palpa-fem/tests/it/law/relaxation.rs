@@ -66,7 +66,8 @@ fn a_sudden_step_relaxes_exactly_whatever_the_steps() {
     }
 }
 
-/// `F = v {(1 − g) m + g τ [e^{−(t−m)/τ} − e^{−t/τ}]}`, `m = min(t, t_ramp)`, for a force linear in depth.
+/// `F = v {(1 − g) m + g τ [e^{−(t−m)/τ} − e^{−t/τ}]}`, `m = min(t, t_ramp)`, for a force linear in
+/// depth.
 #[test]
 fn ramp_and_hold_is_exact_whatever_the_steps() {
     let (g, tau, t_ramp, speed) = (0.5, 0.1, 0.05, 20.0);
@@ -88,7 +89,8 @@ fn ramp_and_hold_is_exact_whatever_the_steps() {
     }
 }
 
-/// The table of a flat punch (radius 5 mm, half-space of 30 kPa, ν = 0.45) pressed 2 mm in 0.05 s, then held.
+/// The table of a flat punch (radius 5 mm, half-space of 30 kPa, ν = 0.45) pressed 2 mm in 0.05 s,
+/// then held.
 #[test]
 fn ramp_and_hold_of_a_punch() {
     let prony = Prony::new(
@@ -113,7 +115,8 @@ fn ramp_and_hold_of_a_punch() {
     }
 }
 
-/// Under a sinusoid the stress settles to the storage and the loss modulus, with an error of second order in the step.
+/// Under a sinusoid the stress settles to the storage and the loss modulus, with an error of second
+/// order in the step.
 #[test]
 fn a_sinusoid_shows_storage_and_loss() {
     for moduli in [Moduli::Instantaneous, Moduli::LongTerm] {
@@ -229,8 +232,8 @@ fn components_do_not_mix() {
     }
 }
 
-/// At a held strain the whole stress of a solid relaxes by the series, and turning the body turns it: second
-/// Piola–Kirchhoff stresses stay with the material.
+/// At a held strain the whole stress of a solid relaxes by the series, and turning the body turns
+/// it: second Piola–Kirchhoff stresses stay with the material.
 #[test]
 fn a_held_and_turning_solid_relaxes() {
     let prony = series(Moduli::Instantaneous);

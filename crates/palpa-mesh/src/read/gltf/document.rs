@@ -1,12 +1,13 @@
-//! The part of a glTF document that holds geometry. Fields that are not here are passed over.
+//! The part of a glTF document that holds geometry. All other fields are ignored.
 
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
 use super::{Fault, Parsed, fault};
 
-/// Extensions that hold the triangles in another form. Others concern materials, lights and the like, or (as
-/// `KHR_mesh_quantization` with its integer positions) need nothing more than is here.
+/// Extensions that store the triangles in another form. Other extensions concern materials, lights
+/// and the like, or need no more than the code here (such as `KHR_mesh_quantization` with its
+/// integer positions).
 const PACKED: [&str; 4] = [
     "KHR_draco_mesh_compression",
     "EXT_meshopt_compression",
@@ -72,7 +73,7 @@ pub(super) struct Primitive {
     pub(super) mode: u32,
 }
 
-/// The mode of a primitive that names none.
+/// The mode of a primitive without a given mode.
 fn triangles() -> u32 {
     4
 }
@@ -140,7 +141,8 @@ pub(super) struct Buffer {
 }
 
 impl Document {
-    /// Refuses other versions, and extensions without which the triangles cannot be read.
+    /// Returns an error for other versions, and for extensions without which the triangles cannot
+    /// be read.
     pub(super) fn check_supported(&self) -> Parsed<()> {
         if !self.asset.version.starts_with("2.") {
             let version = &self.asset.version;
@@ -157,7 +159,8 @@ impl Document {
         }
     }
 
-    /// The nodes to start from: those of the scene that is shown, or without scenes all that are nobody's child.
+    /// The root nodes: those of the default scene. If there are no scenes, all nodes without a
+    /// parent.
     pub(super) fn roots(&self) -> Parsed<Vec<usize>> {
         if self.scenes.is_empty() {
             let mut is_child = vec![false; self.nodes.len()];
@@ -184,7 +187,7 @@ impl Document {
 }
 
 impl Accessor {
-    /// Values per element, for the two types that geometry has.
+    /// Number of values per element, for the two types used for geometry.
     pub(super) fn width(&self) -> Option<usize> {
         match self.kind.as_str() {
             "SCALAR" => Some(1),

@@ -1,4 +1,4 @@
-//! The indentation with the continuum model.
+//! The scripted indentation with the continuum model.
 
 mod notes;
 mod run;
@@ -18,46 +18,49 @@ use super::{Phase, Place, Waypoint, waypoints};
 use crate::note::Note;
 use crate::prepare::{Approach, Prepared};
 
-/// Samples of a rest in which tissue relaxes, evenly spread in the logarithm of time from this share of the rest on.
+/// Number of samples of a rest in which tissue relaxes. They are evenly spaced in the logarithm of
+/// time, from this share of the rest on.
 const HOLD_SAMPLES: usize = 10;
 const FIRST_HOLD: f64 = 0.01;
 
-/// An indentation that is set up: what does not change while it runs.
+/// An indentation that is set up: the data that stays constant while it runs.
 #[derive(Debug)]
 pub struct Indentation {
     /// The scene that is pressed.
     pub prepared: Arc<Prepared>,
-    /// The finite elements of its body.
+    /// The finite elements of the scene's body.
     pub model: Arc<Model>,
-    /// The level at which each layer begins, and the deepest. `[n_layers + 1]`
+    /// The level at which each layer begins, then the deepest level. `[n_layers + 1]`
     pub borders: Vec<usize>,
     /// Speeds at which the whole press is run, m/s; at least one.
     pub speeds: Vec<f64>,
-    /// Whether any tissue relaxes, so that speed and rest count.
+    /// Whether any tissue relaxes, so that speed and rest matter.
     pub is_viscous: bool,
-    /// What a user should know beside the result: the notes of the prepared scene, and those of the press.
+    /// Remarks for the user: the notes of the prepared scene, then those of the press.
     pub notes: Vec<Note>,
     grip: Grip,
-    /// The state at rest, under the tension of the layers.
+    /// The state at rest, in equilibrium with the tension of the layers.
     rest: State,
     params: SolveParams,
     dynamics: Option<Dynamics>,
 }
 
-/// How the tool holds the skin.
+/// The contact between tool and skin.
 #[derive(Debug)]
 enum Grip {
-    /// These nodes are bonded to it, and stand for areas of skin (m²), if it has any.
+    /// These nodes are bonded to the tool. `areas` are the areas of skin that they stand for (m²);
+    /// empty if the tool has no area.
     Bond { nodes: Vec<usize>, areas: Vec<f64> },
-    /// It touches.
+    /// The tool touches the skin and can separate from it.
     Contact(Approach),
 }
 
 impl Indentation {
-    /// Sets up the indentation of a prepared scene, and takes the body to rest under the tension of its layers.
+    /// Sets up the indentation of a prepared scene, and brings the body to equilibrium with the
+    /// tension of its layers.
     ///
     /// # Errors
-    /// When the body cannot be pressed, or finds no rest.
+    /// When the body cannot be pressed, or no equilibrium at rest is found.
     pub fn build(prepared: Arc<Prepared>) -> anyhow::Result<Self> {
         let scene = &prepared.scene;
         let is_viscous = (prepared.materials.materials.iter()).any(|m| m.prony.is_some());
@@ -101,7 +104,7 @@ impl Indentation {
         &self.prepared.mesh
     }
 
-    /// Where it is pressed.
+    /// The place that is pressed.
     pub fn place(&self) -> &Place {
         self.prepared.place()
     }
@@ -114,7 +117,7 @@ impl Indentation {
         }
     }
 
-    /// Whether mass and damping count.
+    /// Whether inertia and damping are included.
     pub fn is_dynamic(&self) -> bool {
         self.dynamics.is_some()
     }
@@ -129,14 +132,14 @@ impl Indentation {
         self.path(self.speeds[0]).len()
     }
 
-    /// The index of the deepest sample in a run, where loading first ends.
+    /// Index of the deepest sample in a run, at the end of the first loading.
     pub fn deepest(&self) -> usize {
         let path = self.path(self.speeds[0]);
         let is_down = |w: &Waypoint| w.phase == Phase::Load && w.cycle == 0;
         path.iter().rposition(is_down).unwrap_or(0)
     }
 
-    /// Begins the run at the `index`-th speed, at rest.
+    /// Starts the run at speed number `index`, with the body at rest.
     pub fn start(&self, index: usize) -> Run<'_> {
         Run {
             indentation: self,
@@ -153,7 +156,7 @@ impl Indentation {
         }
     }
 
-    /// The rigid tool and where it is at a depth (m); `None` where the skin is bonded.
+    /// The rigid tool with its pose at a depth (m); `None` if the skin is bonded to it.
     pub fn tool_at(&self, depth: f64) -> Option<PosedTool> {
         match &self.grip {
             Grip::Bond { .. } => None,
@@ -161,7 +164,7 @@ impl Indentation {
         }
     }
 
-    /// Pressure of the tool on the skin, where the last step of `run` has it. Pa `[n_vertices]`
+    /// Pressure of the tool on the skin after the last step of `run`, Pa. `[n_vertices]`
     pub fn skin_pressure(&self, run: &Run<'_>) -> Vec<f64> {
         let body = &self.mesh().body;
         let reactions = run.workspace.reactions();
@@ -195,7 +198,7 @@ impl Indentation {
                 .map(|i| FIRST_HOLD.powf(1.0 - i as f64 / (HOLD_SAMPLES - 1) as f64))
                 .collect()
         } else {
-            // Nothing happens.
+            // Without relaxation nothing changes during the rest.
             vec![1.0]
         };
         waypoints(&self.prepared.scene.press, speed, &rests)
@@ -218,7 +221,7 @@ impl Indentation {
         }
     }
 
-    /// Thickness of each layer along the pressed column. m `[n_layers]`
+    /// Thickness of each layer along the pressed column, m. `[n_layers]`
     fn thicknesses(&self, state: &State) -> Vec<f64> {
         let body = &self.mesh().body;
         let at = |level: usize| {
@@ -234,7 +237,7 @@ impl Indentation {
     }
 }
 
-/// The level at which each layer begins, and the deepest.
+/// The level at which each layer begins, then the deepest level. `[n_layers + 1]`
 fn borders(interval_layer: &[usize]) -> Vec<usize> {
     let mut borders = vec![0];
     borders

@@ -1,4 +1,4 @@
-//! What is known beforehand to make a press less accurate.
+//! Notes on settings that are known to make a press less accurate.
 
 use palpa_fem::Model;
 use palpa_mesh::LayeredBody;
@@ -8,15 +8,16 @@ use crate::note::Note;
 use crate::press::mesh::PressedBody;
 use crate::press::n_steps;
 
-/// A contact whose radius is fewer edges than this is worth a note: its force is off by more than about 5 %.
+/// A contact whose radius is fewer edges than this gets a note: its force is off by more than about
+/// 5 %.
 const FEWEST_EDGES: f64 = 3.0;
-/// Skin triangles without a partner are worth a note beyond this share of all.
+/// If more than this share of the skin triangles has no partner, there is a note.
 const FEW_SINGLES: f64 = 0.01;
-/// With friction a step longer than this share of the contact radius is worth a note: its force is off by more than about
-/// 0.5 %.
+/// With friction, a step longer than this share of the contact radius gets a note: its force is off
+/// by more than about 0.5 %.
 const LONGEST_STEP: f64 = 0.05;
 
-/// Says where the mesh is known to be too coarse.
+/// Adds a note where the mesh is known to be too coarse.
 pub(crate) fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes: &mut Vec<Note>) {
     let n_triangles = mesh.body.skin.triangles.len();
     let n_singles = model.n_single_triangles();
@@ -45,7 +46,7 @@ pub(crate) fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes:
     }
 }
 
-/// Says where tension is let go.
+/// Adds a note where free cut faces release the tension of a layer.
 pub(crate) fn note_tension(body: &LayeredBody, scene: &Scene, notes: &mut Vec<Note>) {
     let tense = scene.layers.iter().find(|layer| layer.prestress > 0.0);
     let is_free = scene.body.cut_faces == CutFaces::Free && !body.cut_faces.is_empty();
@@ -56,7 +57,7 @@ pub(crate) fn note_tension(body: &LayeredBody, scene: &Scene, notes: &mut Vec<No
     }
 }
 
-/// Says where steps are too long for friction, which depends on the way that skin has slipped.
+/// Adds a note if steps are too long for friction, which depends on the path of the slip.
 pub(crate) fn note_friction(scene: &Scene, notes: &mut Vec<Note>) {
     let press = &scene.press;
     let step = press.depth / n_steps(press) as f64;

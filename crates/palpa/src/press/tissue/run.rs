@@ -1,4 +1,4 @@
-//! A press at one speed, sample by sample.
+//! One run of a press at one speed, sample by sample.
 
 use palpa_fem::{
     Dynamics, Load, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
@@ -10,39 +10,41 @@ use super::sample::{Failure, Sample, SampleOutcome};
 use super::{Grip, Indentation};
 use crate::press::{Phase, Waypoint, tidy};
 
-/// Forces out of balance in a body at rest, as a share of those that count as none: rounding only.
+/// Tolerance of the force balance of a body at rest, relative to the force that counts as zero:
+/// only rounding is left.
 const REST_TOLERANCE: f64 = 1e-3;
 
-/// What moves while one speed is run.
+/// The state of a run at one speed.
 #[derive(Debug)]
 pub struct Run<'a> {
     pub(super) indentation: &'a Indentation,
-    /// The number of its speed.
+    /// Number of the speed.
     pub index: usize,
     /// The body's state.
     pub state: State,
-    /// What solved it last.
+    /// Memory of the solver, reused between steps.
     pub workspace: Workspace,
     pub(super) path: Vec<Waypoint>,
     pub(super) next: usize,
-    /// The load of the last sample.
+    /// The load of the previous sample.
     pub(super) before: Acting,
     pub(super) earlier: Earlier,
     pub(super) time: f64,
     pub(super) last: Option<Sample>,
-    /// Why the run ended early, if it did.
+    /// Reason why the run ended early, if it did.
     pub failure: Option<Failure>,
 }
 
-/// Tools and held nodes at one moment.
+/// The load at one moment: tools and held nodes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Acting {
     pub(super) tools: Vec<PosedTool>,
     pub(super) held: Vec<(usize, Vec3)>,
 }
 
-/// Displacements at the last samples of one phase, the newest first: enough to go on along a parabola. Newton's method
-/// then starts where it would be after its first iteration, and saves that.
+/// Displacements at the last samples of one phase, newest first, for extrapolation along a
+/// parabola. Newton's method then starts where it would otherwise be after its first iteration,
+/// which saves that iteration.
 #[derive(Debug, Default)]
 pub(super) struct Earlier {
     phase: Option<Phase>,
@@ -52,7 +54,7 @@ pub(super) struct Earlier {
 impl Earlier {
     fn note(&mut self, phase: Phase, displacements: &[Vec3]) {
         if self.phase != Some(phase) {
-            // Where one phase ends, the next one begins.
+            // The last sample of one phase is the first of the next.
             self.displacements.truncate(1);
             self.phase = Some(phase);
         }
@@ -60,7 +62,8 @@ impl Earlier {
         self.displacements.insert(0, displacements.to_vec());
     }
 
-    /// Where nodes will be at the next sample, as far as three or two samples at equal distances tell.
+    /// Extrapolated node displacements at the next sample, from three or two samples at equal
+    /// distances.
     fn guess(&self, phase: Phase) -> Option<Vec<Vec3>> {
         if self.phase != Some(phase) {
             return None;
@@ -90,7 +93,7 @@ impl Acting {
 }
 
 impl Run<'_> {
-    /// Goes on to the next sample; `None` at the end. A sample that did not converge is the last.
+    /// Computes the next sample; `None` at the end. A sample that did not converge is the last.
     pub fn advance(&mut self) -> Option<Sample> {
         let indentation = self.indentation;
         let waypoint = *self.path.get(self.next)?;
@@ -130,7 +133,7 @@ impl Run<'_> {
         Some(sample)
     }
 
-    /// Takes the body to where the tool is at a waypoint; first from a guess that goes on as the last samples did.
+    /// Moves the tool to a waypoint and solves for equilibrium, first from an extrapolated guess.
     fn solve(&mut self, waypoint: &Waypoint, acting: &Acting) -> StepReport {
         let indentation = self.indentation;
         let (before, load) = (
@@ -140,7 +143,8 @@ impl Run<'_> {
         let (model, params) = (&*indentation.model, &indentation.params);
         let has_memory = indentation.is_viscous || indentation.dynamics.is_some();
         if waypoint.depth == 0.0 && (self.next == 0 || !has_memory) {
-            // The body is at rest. There may be no force at all, of which a share could be out of balance.
+            // The body is at rest and may bear no force at all, so a tolerance relative to its
+            // forces would not work.
             let saved = std::mem::replace(&mut self.state, indentation.rest.clone());
             let tolerance = if indentation.prepared.is_tense() {
                 params.tolerance
@@ -173,7 +177,7 @@ impl Run<'_> {
         advance(model, &mut self.state, workspace, &before, &load, params)
     }
 
-    /// What a step has led to, in the units of the table.
+    /// The results of a step, in the units of the table.
     fn measured(&self, waypoint: &Waypoint, report: &StepReport) -> Sample {
         let indentation = self.indentation;
         let direction = &indentation.place().direction;
@@ -192,7 +196,7 @@ impl Run<'_> {
         let fields = prism_fields(&indentation.model, &self.state, &self.workspace);
         let ratios = fields.iter().map(|field| field.volume_ratio);
         let contact = &report.contact;
-        // Plus zero: no sample is "minus nothing".
+        // Adding zero turns -0 into 0.
         let force_n = -pull.dot(direction) + 0.0;
         let depth_mm = waypoint.depth * 1e3;
         let work_mj = self.last.as_ref().map_or(0.0, |last| {

@@ -1,89 +1,91 @@
-//! One line of the result of a press, and how its step ended.
+//! One row of the result of a press, and the result of its step.
 
 use palpa_fem::Outcome;
 use serde::Serialize;
 
 use crate::press::Phase;
 
-/// One line of the result. Forces act on the tool.
+/// One row of the result. Forces act on the tool.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sample {
-    /// The run of the sweep, from 0.
+    /// Number of the run within a sweep, from 0.
     pub run: usize,
-    /// Its speed. mm/s
+    /// Speed of the run, mm/s.
     pub speed_mm_s: f64,
-    /// Part of the indentation.
+    /// Phase of the indentation.
     pub phase: Phase,
-    /// How often the tool has gone down before.
+    /// Number of cycles completed before.
     pub cycle: u32,
-    /// Time since the start of the run. s
+    /// Time since the start of the run, s.
     pub time_s: f64,
-    /// Depth of the tool along its direction, from where it first touches the skin at rest. mm
+    /// Depth of the tool along its direction, from its first touch of the skin at rest, mm.
     pub depth_mm: f64,
-    /// Force against the tool's direction: what pushes back. N
+    /// Force on the tool against its direction, N; positive when the body pushes back.
     pub force_n: f64,
-    /// Components of the force on the tool. N
+    /// x component of the force on the tool, N.
     pub force_x_n: f64,
-    /// See `force_x_n`.
+    /// y component of the force on the tool, N.
     pub force_y_n: f64,
-    /// See `force_x_n`.
+    /// z component of the force on the tool, N.
     pub force_z_n: f64,
-    /// Area of skin at rest that touches the tool or is bonded to it. mm²
+    /// Area at rest of the skin that touches the tool or is bonded to it, mm².
     pub contact_area_mm2: f64,
-    /// Largest force on a vertex over the area of skin that it stands for; at the edge of a bonded disc, where pressure has
-    /// no limit, it grows with refinement. Empty for a single node. kPa
+    /// Largest force on a vertex divided by the skin area that it stands for, kPa. `None` for a
+    /// single node. At the edge of a bonded disc the pressure has no limit, so there it grows with
+    /// refinement.
     pub max_pressure_kpa: Option<f64>,
-    /// Skin vertices that touch the tool or are bonded to it.
+    /// Number of skin vertices that touch the tool or are bonded to it.
     pub n_touching: usize,
-    /// Largest gap at a vertex that touches. µm
+    /// Largest gap at a vertex in contact, µm.
     pub gap_um: f64,
-    /// Deepest penetration of a vertex that should not touch. µm
+    /// Deepest penetration at a vertex that is not in contact, µm.
     pub penetration_um: f64,
-    /// Largest pull at a vertex that touches. N
+    /// Largest tensile force at a vertex in contact, N.
     pub tension_n: f64,
-    /// Largest friction beyond Coulomb's cone. N
+    /// Largest friction force in excess of Coulomb's cone, N.
     pub cone_n: f64,
-    /// Largest share of a friction that does not oppose its slip.
+    /// Largest share of a friction force that does not oppose the slip.
     pub slip: f64,
-    /// Slip over which friction had to be smoothed: vertices that would be held creep by about as much. 0 for Coulomb's
-    /// exact law, which nearly every step obeys. µm
+    /// Slip over which friction had to be smoothed, µm: vertices that would stick creep by about
+    /// this much. 0 for Coulomb's exact law, which nearly every step satisfies.
     pub friction_smoothing_um: f64,
-    /// Forces out of balance as a share of those that hold the body.
+    /// Residual: the unbalanced forces relative to the forces that hold the body.
     pub residual: f64,
     /// Newton iterations.
     pub iterations: usize,
-    /// Parts into which the step was divided.
+    /// Number of sub-steps into which the step was divided.
     pub substeps: usize,
-    /// How the step ended. Unless it converged, the forces are those of the sample before, and this speed's run ends.
+    /// Result of the step. Unless it converged, the forces are those of the previous sample, and
+    /// the run at this speed ends.
     pub outcome: SampleOutcome,
-    /// Strain energy (of a viscous tissue that of its present law). mJ
+    /// Strain energy, mJ; for viscous tissue, that of the law at its present state of relaxation.
     pub energy_mj: f64,
-    /// Work that the tool has done so far, by the trapezoidal rule. mJ
+    /// Work done by the tool so far, by the trapezoidal rule, mJ.
     pub work_mj: f64,
-    /// Smallest volume of a prism as a share of that at rest.
+    /// Smallest ratio of a prism's volume to its volume at rest.
     pub volume_ratio_min: f64,
-    /// Largest likewise.
+    /// Largest ratio of a prism's volume to its volume at rest.
     pub volume_ratio_max: f64,
-    /// Thickness of each layer along the pressed column. mm `[n_layers]`
+    /// Thickness of each layer along the pressed column, mm. `[n_layers]`
     pub layer_thickness_mm: Vec<f64>,
 }
 
-/// How the step to a sample ended; where it failed is in [`Failure`].
+/// Result of the step to a sample; [`Failure`] says where a step failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleOutcome {
-    /// In equilibrium.
+    /// In equilibrium within the tolerance.
     Converged,
-    /// The iterations were used up.
+    /// The iteration limit was reached.
     IterationLimit,
-    /// Tissue would be turned inside out.
+    /// A prism would be turned inside out.
     Inverted,
     /// The stiffness could not be made positive definite.
     Singular,
 }
 
 impl SampleOutcome {
-    /// Whether the sample can be trusted.
+    /// Whether the step converged.
     pub fn is_converged(self) -> bool {
         self == Self::Converged
     }
@@ -100,14 +102,14 @@ impl From<&Outcome> for SampleOutcome {
     }
 }
 
-/// Where a step failed.
+/// A failed step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
-    /// Speed of its run. mm/s
+    /// Speed of the run, mm/s.
     pub speed_mm_s: f64,
-    /// Depth that was to be reached. mm
+    /// Depth that the step should have reached, mm.
     pub depth_mm: f64,
-    /// Why, and where.
+    /// The reason, and the place in the body.
     #[serde(flatten)]
     pub outcome: Outcome,
 }

@@ -1,4 +1,5 @@
-//! The pictures of an indentation: force against depth and time, and the section through the press point.
+//! The pictures of an indentation: force against depth and time, and the section through the press
+//! point.
 
 use std::path::PathBuf;
 
@@ -6,8 +7,8 @@ use palpa_mesh::Vec3;
 use palpa_scene::{Scene, Tool};
 
 use super::super::cut;
-use super::record::Recorded;
-use super::report::PressResult;
+use super::record::BarRecord;
+use super::report::BarResult;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
 use palpa::press::reference::{BarIndentation, BarOutcome, BarSample};
@@ -20,8 +21,8 @@ pub(super) fn draw_pictures(
     scene: &Scene,
     built: &BuiltBody,
     indentation: &BarIndentation,
-    recorded: &Recorded,
-    result: &PressResult,
+    recorded: &BarRecord,
+    result: &BarResult,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let samples: Vec<&BarSample> = recorded
         .samples
@@ -50,7 +51,7 @@ pub(super) fn draw_pictures(
     .line("loading", of_phase(&[Phase::Load, Phase::Hold]));
     let mut retracting = of_phase(&[Phase::Retract]);
     if !retracting.is_empty() {
-        // The way back begins where the rest ended.
+        // The retraction curve begins at the end of the hold.
         retracting.splice(0..0, of_phase(&[Phase::Load, Phase::Hold]).last().copied());
         depth_chart =
             depth_chart.series(palpa_plot::Series::new("retracting", retracting).dashed());
@@ -86,7 +87,7 @@ fn section_picture(
     scene: &Scene,
     built: &BuiltBody,
     indentation: &BarIndentation,
-    recorded: &Recorded,
+    recorded: &BarRecord,
 ) -> Option<palpa_plot::Picture> {
     let body = &built.growth.body;
     let direction = indentation.place.direction.into_inner();

@@ -1,4 +1,5 @@
-//! The run itself: every sample to the table, some of the bodies to the series for ParaView.
+//! Runs the script; writes every sample to the table and some of the bodies to the series for
+//! ParaView.
 
 use palpa_mesh::Vec3;
 
@@ -10,26 +11,27 @@ use palpa::press::reference::{BarIndentation, BarOutcome, BarRun, BarSample};
 use palpa_plot::output::OutDir;
 use palpa_plot::vtu::Grid;
 
-/// What came out of a run.
-pub(super) struct Recorded {
+/// Result of a run.
+pub(super) struct BarRecord {
     pub(super) samples: Vec<BarSample>,
     /// Positions at the deepest sample reached.
     pub(super) deepest: Vec<Vec3>,
     pub(super) deepest_depth: f64,
 }
 
-/// Runs the script; every sample goes to the table at once, so that an interrupted run leaves a valid one.
+/// Runs the script. Every sample goes to the table at once, so that an interrupted run leaves a
+/// valid table.
 pub(super) fn record(
     args: &Args,
     context: &Context,
     out: &OutDir,
     built: &BuiltBody,
     indentation: &BarIndentation,
-) -> anyhow::Result<Recorded> {
+) -> anyhow::Result<BarRecord> {
     let mut table = out.table::<BarSample>("press.csv")?;
     let mut series = Series::new(args.frames, indentation.n_samples(), indentation.deepest());
     let mut run = indentation.start(&built.growth.body);
-    let mut recorded = Recorded {
+    let mut recorded = BarRecord {
         samples: Vec::new(),
         deepest: run.state.positions.clone(),
         deepest_depth: 0.0,
@@ -57,7 +59,7 @@ pub(super) fn record(
     Ok(recorded)
 }
 
-/// The body as it is now, with what moves it and how it was made.
+/// The present body, with the forces that move it and the fields that show how it was made.
 fn grid(built: &BuiltBody, run: &BarRun<'_>) -> Grid {
     let growth = &built.growth;
     let body = &growth.body;

@@ -1,4 +1,4 @@
-//! What is said of an indentation: to machines, and to people.
+//! The reports of an indentation, for machines and for people.
 
 use std::path::{Path, PathBuf};
 
@@ -7,28 +7,28 @@ use palpa_scene::{MaterialStatus, Scene};
 use serde::Serialize;
 
 use super::super::words::{say_layers, status_line};
-use super::record::Recorded;
+use super::record::BarRecord;
 use crate::cli::Context;
 use crate::table::Table;
 use palpa::build::{BuiltBody, in_mm};
 use palpa::press::Phase;
 use palpa::press::reference::{BarIndentation, BarOutcome, BarSample};
 
-/// What `--json` prints and press.json holds.
+/// Content of press.json and of the `--json` output.
 #[derive(Debug, Serialize)]
-pub(super) struct PressReport<'a> {
+pub(super) struct BarReport<'a> {
     pub(super) model: &'static str,
     pub(super) scene: String,
     pub(super) body: &'a GrowthReport,
     pub(super) materials: &'a [MaterialStatus],
-    pub(super) press: PressFacts,
-    pub(super) result: PressResult,
+    pub(super) press: BarFacts,
+    pub(super) result: BarResult,
     pub(super) notes: &'a [String],
     pub(super) samples: &'a [BarSample],
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct PressFacts {
+pub(super) struct BarFacts {
     pub(super) vertex: usize,
     pub(super) at_m: [f64; 3],
     pub(super) direction: [f64; 3],
@@ -40,21 +40,21 @@ pub(super) struct PressFacts {
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct PressResult {
+pub(super) struct BarResult {
     pub(super) outcome: BarOutcome,
-    /// Whether the whole script was run; not after Ctrl-C or a divergence.
+    /// Whether the whole script was run; false after Ctrl-C or a divergence.
     pub(super) is_complete: bool,
     pub(super) max_force_n: f64,
     pub(super) at_depth_mm: f64,
     pub(super) secant_stiffness_n_per_mm: Option<f64>,
     pub(super) force_after_retract_n: Option<f64>,
-    /// Depth from which on prisms are turned over, so that the force is that of the bars alone.
+    /// Depth from which prisms are inverted, so that the force comes from the bars alone.
     pub(super) inverted_from_mm: Option<f64>,
     pub(super) material_status: String,
 }
 
-pub(super) fn facts(scene: &Scene, indentation: &BarIndentation) -> PressFacts {
-    PressFacts {
+pub(super) fn facts(scene: &Scene, indentation: &BarIndentation) -> BarFacts {
+    BarFacts {
         vertex: indentation.place.vertex,
         at_m: indentation.place.at.into(),
         direction: indentation.place.direction.into_inner().into(),
@@ -70,7 +70,7 @@ pub(super) fn result_of(
     samples: &[BarSample],
     materials: &[MaterialStatus],
     is_interrupted: bool,
-) -> PressResult {
+) -> BarResult {
     let good: Vec<&BarSample> = samples
         .iter()
         .filter(|s| s.outcome != BarOutcome::Diverged)
@@ -78,7 +78,7 @@ pub(super) fn result_of(
     let max = good.iter().max_by(|a, b| a.force_n.total_cmp(&b.force_n));
     let (max_force_n, at_depth_mm) = max.map_or((0.0, 0.0), |s| (s.force_n, s.depth_mm));
     let is_any = |outcome: BarOutcome| samples.iter().any(|s| s.outcome == outcome);
-    PressResult {
+    BarResult {
         is_complete: !is_interrupted && !is_any(BarOutcome::Diverged),
         outcome: match () {
             () if is_any(BarOutcome::Diverged) => BarOutcome::Diverged,
@@ -126,8 +126,8 @@ pub(super) fn announce(
 pub(super) fn conclude(
     context: &Context,
     folder: &Path,
-    recorded: &Recorded,
-    report: &PressReport<'_>,
+    recorded: &BarRecord,
+    report: &BarReport<'_>,
     pictures: &[PathBuf],
     notes: &[String],
 ) -> anyhow::Result<()> {

@@ -1,4 +1,4 @@
-//! One frame of the series: the deformed body with what goes on inside.
+//! One frame of the series: the deformed body with its fields.
 
 use palpa_fem::{PrismField, prism_fields};
 
@@ -6,9 +6,10 @@ use super::super::files::with_making;
 use palpa::press::tissue::{Indentation, Run};
 use palpa_plot::vtu::Grid;
 
-/// Point arrays: `displacement` (m), `force` that holds a node (N), `contact_pressure` on the skin (Pa), and how the body was
-/// made. Cell arrays, each a mean over the prism: `cauchy`, `von_mises` and `pressure` (Pa), `stretch_min` and `stretch_max`,
-/// `volume_ratio`, `strain_energy` (J/m³), `lump` (the share of it that is lump, by volume).
+/// Point arrays: `displacement` (m), `force` (N) that holds a node, `contact_pressure` on the skin
+/// (Pa), and how the body was made. Cell arrays, each a mean over the prism: `cauchy`, `von_mises`
+/// and `pressure` (Pa), `stretch_min` and `stretch_max`, `volume_ratio`, `strain_energy` (J/m³),
+/// `lump` (volume share of lump in the prism).
 pub(super) fn grid(indentation: &Indentation, lump_shares: &[f64], run: &Run<'_>) -> Grid {
     let (model, mesh) = (&indentation.model, indentation.mesh());
     let body = &mesh.body;

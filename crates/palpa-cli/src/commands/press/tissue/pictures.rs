@@ -1,4 +1,5 @@
-//! The pictures of a press: force against depth and time, relaxation, layers, and the section through the press point.
+//! The pictures of a press: force against depth and time, relaxation, layers, and the section
+//! through the press point.
 
 use std::path::PathBuf;
 
@@ -36,7 +37,7 @@ pub(super) fn draw_pictures(
     let depth = force_depth(&samples, indentation)
         .subtitle(&subtitle)
         .draw();
-    // The PNG first: the command ends with its path.
+    // The order is reversed to put the PNG first, because the command prints its path at the end.
     paths.extend(depth.save(out, "force_depth")?.into_iter().rev());
     let time = force_time(&samples, indentation).subtitle(&subtitle).draw();
     paths.extend(time.save(out, "force_time")?);
@@ -53,7 +54,8 @@ pub(super) fn draw_pictures(
     Ok(paths)
 }
 
-/// The body cut through the press point, at rest and at the deepest sample: its layers and lumps, and its stress.
+/// The body cut through the press point, at rest and at the deepest sample: its layers and lumps,
+/// and its stress.
 fn sections(job: &Job<'_>, indentation: &Indentation, recorded: &Recorded) -> Option<[Picture; 2]> {
     let body = &indentation.mesh().body;
     let place = indentation.place();
@@ -118,7 +120,8 @@ fn sections(job: &Job<'_>, indentation: &Indentation, recorded: &Recorded) -> Op
     Some([layers, draw("Stress under the tool", &through, &[stressed])])
 }
 
-/// The largest value that shades tell apart: a few prisms at a sharp edge would take the contrast from all others.
+/// Upper end of the colour scale. It is not the maximum, because a few prisms at a sharp edge would
+/// take the contrast from all others.
 fn shown_most(values: &[f64], prisms: &[usize]) -> f64 {
     let mut cut: Vec<f64> = prisms
         .iter()
@@ -129,7 +132,7 @@ fn shown_most(values: &[f64], prisms: &[usize]) -> f64 {
     if most > 0.0 { most } else { 1.0 }
 }
 
-/// The tool where it is at a depth (m).
+/// Outline of the tool at a depth, m.
 fn tool_outline(
     scene: &Scene,
     indentation: &Indentation,
@@ -146,7 +149,7 @@ fn tool_outline(
     };
     let size = tool.shape().footprint_radius();
     let distance = |p: &Vec3| tool.distance_at(&pose, p).distance;
-    // The place on the axis that is farthest inside.
+    // The point on the axis that is farthest inside the tool.
     let tip = pose.translation.vector;
     let on_axis = (1..=40).map(|i| tip - direction * (size * f64::from(i) / 20.0));
     let inside = on_axis
@@ -155,12 +158,12 @@ fn tool_outline(
     ToolOutline::shape(plane, &inside, 1.5 * size, distance)
 }
 
-/// The name of a run, where there are several.
+/// The name of a run if there are several.
 fn speed_name(indentation: &Indentation, index: usize) -> String {
     format!("{} mm/s", indentation.speeds[index] * 1e3)
 }
 
-/// Loops of force against depth, a colour for each speed; the way back is dashed.
+/// Loops of force against depth, one colour for each speed; the retraction is dashed.
 fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
     let mut chart = Chart::new(
         Axis::linear("depth, mm").with_zero(),
@@ -186,7 +189,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
             };
             let mut down = points(&[Phase::Load, Phase::Hold]);
             if cycle > 0 {
-                // It begins where the last cycle has ended.
+                // The loading curve begins where the last cycle ended.
                 let before = of_run.iter().rfind(|s| s.cycle + 1 == cycle);
                 down.splice(0..0, before.map(|s| [s.depth_mm, s.force_n]));
             }
@@ -224,7 +227,8 @@ fn force_time(samples: &[&Sample], indentation: &Indentation) -> Chart {
     chart
 }
 
-/// Force during the first rest, as a share of that at its beginning, over the logarithm of time.
+/// Force during the first hold, as a share of the force at its beginning, against the logarithm of
+/// time.
 fn relaxation(samples: &[&Sample], indentation: &Indentation) -> Chart {
     let mut chart = Chart::new(
         Axis::log("time since the tool rests, s"),
@@ -250,7 +254,8 @@ fn relaxation(samples: &[&Sample], indentation: &Indentation) -> Chart {
     chart
 }
 
-/// Thickness of each layer along the pressed column on the first way down, as a share of that at rest.
+/// Thickness of each layer along the pressed column during the first loading, as a share of the
+/// thickness at rest.
 fn layers(samples: &[&Sample], indentation: &Indentation) -> Chart {
     let mut chart = Chart::new(
         Axis::linear("depth, mm").with_zero(),

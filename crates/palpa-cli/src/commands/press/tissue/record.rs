@@ -1,4 +1,5 @@
-//! The runs themselves: every sample to the table, some of the bodies to the series for ParaView.
+//! Runs the script; writes every sample to the table and some of the bodies to the series for
+//! ParaView.
 
 use palpa_fem::{level_forces, prism_fields};
 use palpa_mesh::quality::prism_shapes;
@@ -10,36 +11,38 @@ use super::fields::grid;
 use palpa::press::tissue::{Failure, Indentation, Run, Sample};
 use palpa_plot::output::{CsvTable, OutDir};
 
-/// What came out of the runs.
+/// Result of the runs.
 pub(super) struct Recorded {
     pub(super) samples: Vec<Sample>,
     pub(super) failures: Vec<Failure>,
-    /// At the deepest sample of the first run.
+    /// The body at the deepest sample of the first run.
     pub(super) deepest: Deepest,
 }
 
-/// The body where it is pressed deepest.
+/// The body at its deepest sample.
 pub(super) struct Deepest {
-    /// Its number among the samples.
+    /// Index of the sample.
     pub(super) sample: usize,
     pub(super) depth_mm: f64,
     pub(super) displacements: Vec<Vec3>,
-    /// For each level the force on it of the tissue below. N `[n_levels]`
+    /// Force of the tissue below on each level, N; shape `[n_levels]`.
     pub(super) level_forces: Vec<Vec3>,
-    /// Von Mises stress of every prism. Pa `[n_prisms]`
+    /// Von Mises stress of every prism, Pa; shape `[n_prisms]`.
     pub(super) von_mises: Vec<f64>,
-    /// Prisms of which a corner is turned inside out.
+    /// Prisms with a corner turned inside out, if any.
     pub(super) turned: Option<Turned>,
 }
 
-/// Prisms that are not valid where they are, though there is volume left at every point of integration.
+/// Prisms that are turned inside out at a corner, although the volume is positive at every
+/// integration point.
 pub(super) struct Turned {
     pub(super) n: usize,
-    /// The middle of the worst. m
+    /// Middle of the worst prism, m.
     pub(super) at: Vec3,
 }
 
-/// Runs the script at every speed; each sample goes to the table at once, so that an interrupted run leaves a valid one.
+/// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
+/// run leaves a valid table.
 pub(super) fn record(job: &Job<'_>, indentation: &Indentation) -> anyhow::Result<Recorded> {
     let Job {
         args,
@@ -121,14 +124,14 @@ fn turned(body: &LayeredBody, positions: &[Vec3]) -> Option<Turned> {
     })
 }
 
-/// The table: the fields of [`Sample`], and at the end a column for the thickness of each layer.
+/// Opens the table: the fields of [`Sample`], then one column for the thickness of each layer.
 fn table<'a>(
     out: &OutDir,
     layers: impl Iterator<Item = &'a str>,
 ) -> anyhow::Result<CsvTable<Sample>> {
     let column = |(i, layer): (usize, &str)| {
         let word = layer.replace(|c: char| !c.is_alphanumeric(), "_");
-        // Two layers may be of one tissue.
+        // The index is needed because two layers may have the same tissue.
         format!("layer_{i}_{word}_mm")
     };
     out.table_with_list("press.csv", layers.enumerate().map(column).collect())

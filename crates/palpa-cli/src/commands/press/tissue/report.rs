@@ -1,4 +1,4 @@
-//! What is said of a press with the continuum: to machines, and to people.
+//! The reports of a press with the continuum, for machines and for people.
 
 use std::path::PathBuf;
 
@@ -14,14 +14,14 @@ use palpa::build::in_mm;
 use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, Sample};
 
-/// What `--json` prints and press.json holds.
+/// Content of press.json and of the `--json` output.
 #[derive(Debug, Serialize)]
 pub(super) struct PressReport<'a> {
     pub(super) model: &'static str,
     pub(super) scene: &'a str,
     /// The body as it was grown, before it was refined.
     pub(super) body: &'a GrowthReport,
-    /// Of the layers, then of the lumps.
+    /// Materials of the layers, then of the lumps.
     pub(super) materials: &'a [MaterialStatus],
     pub(super) press: PressFacts,
     pub(super) result: PressResult,
@@ -35,9 +35,9 @@ pub(super) struct PressFacts {
     pub(super) at_m: [f64; 3],
     pub(super) direction: [f64; 3],
     pub(super) tool: String,
-    /// Skin vertices that are bonded to the tool; 0 for one that touches.
+    /// Number of skin vertices bonded to the tool; 0 for a tool that only touches.
     pub(super) n_operated_nodes: usize,
-    /// Radius of the circle with the area of the skin that is bonded; none for another tool.
+    /// Radius of the circle with the area of the bonded skin; `None` for a tool that is not bonded.
     pub(super) effective_radius_mm: Option<f64>,
     pub(super) mesh_size_near_tool_mm: f64,
     pub(super) tissue_depth_mm: f64,
@@ -166,7 +166,7 @@ pub(super) fn conclude(
     Ok(())
 }
 
-/// To two digits; nothing is 0.
+/// The number with two digits; zero is "0".
 fn scientific(x: f64) -> String {
     if x == 0.0 {
         "0".to_owned()
@@ -175,7 +175,7 @@ fn scientific(x: f64) -> String {
     }
 }
 
-/// What came out at one speed.
+/// Text for the result at one speed.
 fn run_in_words(run: &RunResult) -> String {
     let mut parts = vec![format!(
         "{} mm/s: largest force {:.3} N at {:.2} mm{}",
@@ -206,7 +206,7 @@ fn run_in_words(run: &RunResult) -> String {
     parts.join("; ")
 }
 
-/// The way down of the first run.
+/// Prints the table of the first loading.
 fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> anyhow::Result<()> {
     const ROWS: usize = 12;
     let is_down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
@@ -240,7 +240,7 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
     job.context.say(table)
 }
 
-/// Which layer gives, and what force each hands on.
+/// Prints which layer deforms most, and the force that each layer passes on.
 fn say_forces(job: &Job<'_>, r: &PressResult) -> anyhow::Result<()> {
     if let Some(name) = &r.gives_most {
         job.context.say(format!(

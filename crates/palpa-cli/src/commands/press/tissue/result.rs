@@ -1,4 +1,4 @@
-//! What the samples say together.
+//! The result of all samples together.
 
 use palpa_scene::MaterialStatus;
 use serde::Serialize;
@@ -9,30 +9,30 @@ use palpa::Note;
 use palpa::press::Phase;
 use palpa::press::tissue::{Failure, Indentation, Sample, SampleOutcome};
 
-/// A contact whose radius is fewer edges than this is worth a note.
+/// Smallest contact radius, in edges; a smaller contact causes a note.
 const FEWEST_EDGES: f64 = 3.0;
 
-/// What came out.
+/// Result of a press.
 #[derive(Debug, Serialize)]
 pub(super) struct PressResult {
     /// `converged`, or how the first step that failed ended.
     pub(super) outcome: SampleOutcome,
-    /// Whether the whole script was run; not after Ctrl-C or a step that failed.
+    /// Whether the whole script was run; false after Ctrl-C or a failed step.
     pub(super) is_complete: bool,
-    /// Of the first run, as in `runs`.
+    /// Largest force of the first run; also in `runs`.
     pub(super) max_force_n: f64,
     pub(super) at_depth_mm: f64,
     pub(super) secant_stiffness_n_per_mm: Option<f64>,
     pub(super) force_after_retract_n: Option<f64>,
-    /// One for each speed.
+    /// Result of the run at each speed.
     pub(super) runs: Vec<RunResult>,
-    /// The layers along the pressed column, where the first run is deepest.
+    /// The layers along the pressed column, at the deepest sample of the first run.
     pub(super) layers: Vec<LayerResult>,
-    /// The layer whose thickness changes most there.
+    /// The layer whose thickness changes most at that sample.
     pub(super) gives_most: Option<String>,
-    /// Prisms with corners turned inside out where the first run is deepest.
+    /// Number of prisms with corners turned inside out at that sample.
     pub(super) n_turned_prisms: usize,
-    /// Of all samples that converged.
+    /// Largest errors over all converged samples.
     pub(super) worst: Worst,
     pub(super) failures: Vec<Failure>,
     pub(super) material_status: String,
@@ -40,16 +40,16 @@ pub(super) struct PressResult {
     pub(super) notes: Vec<Note>,
 }
 
-/// What came out at one speed.
+/// Result at one speed.
 #[derive(Debug, Serialize)]
 pub(super) struct RunResult {
     pub(super) speed_mm_s: f64,
     pub(super) max_force_n: f64,
     pub(super) at_depth_mm: f64,
     pub(super) secant_stiffness_n_per_mm: Option<f64>,
-    /// Share of the work of going down that does not come back, for each cycle that was finished.
+    /// Share of the loading work that is not returned, for each finished cycle.
     pub(super) hysteresis: Vec<f64>,
-    /// Share of the force that is lost during the first rest.
+    /// Share of the force that is lost during the first hold.
     pub(super) relaxation: Option<f64>,
     pub(super) force_after_retract_n: Option<f64>,
 }
@@ -60,11 +60,12 @@ pub(super) struct LayerResult {
     pub(super) name: String,
     pub(super) thickness_at_rest_mm: f64,
     pub(super) thickness_pressed_mm: f64,
-    /// Force that the layer hands on to what lies below it, along the press; below the deepest layer, the bone's.
+    /// Force along the press that the layer passes on to the layer below; for the deepest layer, to
+    /// the bone.
     pub(super) force_below_n: f64,
 }
 
-/// The largest departures.
+/// The largest errors of the converged samples.
 #[derive(Debug, Serialize)]
 pub(super) struct Worst {
     pub(super) gap_um: f64,
@@ -73,7 +74,8 @@ pub(super) struct Worst {
     pub(super) cone_n: f64,
     pub(super) slip: f64,
     pub(super) friction_smoothing_um: f64,
-    /// Not of the body at rest before it is pressed, which may have no forces to compare with.
+    /// Largest residual. It excludes the body at rest before the press, which may have no forces to
+    /// compare with.
     pub(super) residual: f64,
     pub(super) volume_ratio_min: f64,
     pub(super) volume_ratio_max: f64,
@@ -146,12 +148,12 @@ fn is_back(sample: &Sample) -> bool {
     sample.phase == Phase::Retract && sample.depth_mm == 0.0
 }
 
-/// Share of the work of going down in a cycle that does not come back.
+/// Share of the loading work of a cycle that is not returned.
 fn loss(samples: &[&Sample], cycle: u32) -> Option<f64> {
     let of_cycle = || samples.iter().filter(move |s| s.cycle == cycle);
     let back = of_cycle().find(|s| is_back(s))?;
     let deepest = of_cycle().rfind(|s| s.phase == Phase::Load)?;
-    // A cycle begins where the last one has ended.
+    // A cycle begins where the last one ended.
     let begin = cycle.checked_sub(1).map_or(0.0, |before| {
         let mut ends = samples.iter().filter(|s| s.cycle == before && is_back(s));
         ends.next_back().map_or(0.0, |s| s.work_mj)
@@ -182,7 +184,8 @@ fn layers(indentation: &Indentation, recorded: &Recorded) -> Vec<LayerResult> {
         .collect()
 }
 
-/// Whether nothing has pressed yet: there may be no force of which a share could be out of balance.
+/// Whether nothing has pressed yet. Then there may be no force to which the residual could be
+/// relative.
 fn is_unloaded(sample: &Sample) -> bool {
     sample.phase == Phase::Load && sample.cycle == 0 && sample.depth_mm == 0.0
 }
