@@ -31,7 +31,8 @@ while read -r file; do
 done < <(grep -rlE 'proptest!|proptest::test_runner' crates --include='*.rs' | sort)
 
 echo "hunt: building, which takes minutes the first time"
-cargo test --quiet --release --no-run "${!modules[@]/#/--package=}"
+packages=("${!modules[@]}")
+cargo test --quiet --release --no-run "${packages[@]/#/--package=}"
 targets=()
 if cargo fuzz --version >/dev/null 2>&1; then
     mapfile -t targets < <(cargo fuzz list)
@@ -47,7 +48,7 @@ properties_end=$((start + (${#targets[@]} > 0 ? seconds / 2 : seconds)))
 while ((SECONDS < properties_end || n_rounds == 0)); do
     seed=$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')
     n_rounds=$((n_rounds + 1))
-    for package in "${!modules[@]}"; do
+    for package in "${packages[@]}"; do
         ((SECONDS < properties_end || n_rounds == 1)) || break
         log="$folder/$package-$seed.log"
         # Word splitting is meant: each module is a filter of its own.
