@@ -56,23 +56,7 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
 /// As [`build`], and when the body has more nodes.
 pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody> {
     let mut notes = Vec::new();
-    let (skin, bones) = match &scene.body.skin {
-        Skin::File(path) => {
-            let unit = scene.body.unit;
-            let skin = read_in_metres(path, unit, &mut notes)?;
-            let bones = scene
-                .body
-                .bones
-                .iter()
-                .map(|path| {
-                    let bone = read_in_metres(path, unit, &mut notes)?;
-                    Ok(mended(&bone, path, &mut notes))
-                })
-                .collect::<anyhow::Result<Vec<_>>>()?;
-            (skin, bones)
-        }
-        Skin::Generated(generator) => generated(*generator),
-    };
+    let (skin, bones) = surfaces(scene, &mut notes)?;
     // Vertex numbers refer to the surface as it was read, before repairs and cuts. From here on,
     // places are positions.
     let press_at = point_of(&skin, &scene.press.target)?;
@@ -117,15 +101,7 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
             .map_or(point, |closest| closest.point),
         _ => on_body.points[press_vertex],
     };
-    let lump_places = (scene.lumps.iter().zip(lumps_at))
-        .map(|(lump, at)| match &lump.place {
-            LumpPlace::Below { target, .. } if *target == scene.press.target => Some(press_at),
-            LumpPlace::Below { .. } => {
-                Some(at.unwrap_or_else(|| on_body.points[nearest(on_body, area_centroid(on_body))]))
-            }
-            LumpPlace::At(_) | LumpPlace::AsRead => None,
-        })
-        .collect();
+    let lump_places = lump_places(scene, on_body, press_at, &lumps_at);
     if let Some((_, radius)) = cut_out {
         note_margin(scene, &growth, radius, &mut notes);
     }
@@ -137,6 +113,42 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
         lump_places,
         notes,
     })
+}
+
+/// The skin as it was read or generated, and the mended bones, in metres.
+fn surfaces(scene: &Scene, notes: &mut Vec<Note>) -> anyhow::Result<(Surface, Vec<Surface>)> {
+    let path = match &scene.body.skin {
+        Skin::File(path) => path,
+        Skin::Generated(generator) => return Ok(generated(*generator)),
+    };
+    let unit = scene.body.unit;
+    let skin = read_in_metres(path, unit, notes)?;
+    let bones = (scene.body.bones.iter())
+        .map(|path| {
+            let bone = read_in_metres(path, unit, notes)?;
+            Ok(mended(&bone, path, notes))
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    Ok((skin, bones))
+}
+
+/// For each lump the point of the grown skin that it lies below; `None` for a lump that does not
+/// depend on the skin. `lumps_at` has the points that the lumps name themselves.
+fn lump_places(
+    scene: &Scene,
+    skin: &Surface,
+    press_at: Vec3,
+    lumps_at: &[Option<Vec3>],
+) -> Vec<Option<Vec3>> {
+    (scene.lumps.iter().zip(lumps_at))
+        .map(|(lump, at)| match &lump.place {
+            LumpPlace::Below { target, .. } if *target == scene.press.target => Some(press_at),
+            LumpPlace::Below { .. } => {
+                Some(at.unwrap_or_else(|| skin.points[nearest(skin, area_centroid(skin))]))
+            }
+            LumpPlace::At(_) | LumpPlace::AsRead => None,
+        })
+        .collect()
 }
 
 /// The point that a target names on the skin as it was read; `None` for the middle of the skin.

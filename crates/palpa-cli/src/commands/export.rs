@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::Outcome;
 use crate::cli::Context;
 use palpa::build::in_mm;
+use palpa::press::Place;
 use palpa::press::mesh::PressedBody;
 use palpa::{Note, Prepared};
 use palpa_lab::export::{self, Deck, Export, Section};
@@ -79,26 +80,9 @@ impl From<Element> for export::Element {
 /// If the scene or body is bad, if CalculiX lacks a feature of the scene, or if the deck cannot be
 /// written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let mut scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
-        None => Scene::embedded(),
-    };
-    if let Some(depth) = args.depth {
-        scene.press.step *= depth.si() / scene.press.depth;
-        scene.press.depth = depth.si();
-        if let Err(problem) = scene.press.check() {
-            bail!("{problem}; see --depth");
-        }
-    }
+    let scene = scene_of(args)?;
     let out = context.out_dir()?;
     let spinner = context.progress(0, "growing the body");
-    if scene.tool.contact().is_some() {
-        bail!(
-            "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
-             \"disc\" or \"node\"",
-            scene.tool
-        );
-    }
     let prepared = Prepared::build(&scene)?;
     drop(spinner);
     let (body, place) = (&prepared.mesh.body, prepared.place());
@@ -107,19 +91,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         .scene
         .as_deref()
         .map_or("embedded forearm".to_owned(), |p| p.display().to_string());
-    let title = [
-        format!(
-            "palpa {}: {}",
-            env!("CARGO_PKG_VERSION"),
-            one_line(&scene_name)
-        ),
-        format!(
-            "tool: {}, at ({}) mm, {:.3} mm deep",
-            scene.tool,
-            in_mm(place.at),
-            scene.press.depth * 1e3
-        ),
-    ];
+    let title = title(&scene, place, &scene_name);
     let deck = Deck::build(&Export {
         body,
         materials: &prepared.materials.materials,
@@ -159,6 +131,46 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     context.json(&report)?;
     conclude(context, out.path(), &report)?;
     Ok(Outcome::Done)
+}
+
+/// The scene with the options applied.
+fn scene_of(args: &Args) -> anyhow::Result<Scene> {
+    let mut scene = match &args.scene {
+        Some(path) => Scene::load(path)?,
+        None => Scene::embedded(),
+    };
+    if let Some(depth) = args.depth {
+        scene.press.step *= depth.si() / scene.press.depth;
+        scene.press.depth = depth.si();
+        if let Err(problem) = scene.press.check() {
+            bail!("{problem}; see --depth");
+        }
+    }
+    if scene.tool.contact().is_some() {
+        bail!(
+            "the deck holds skin that is bonded to the tool, and a {} presses by contact; give the scene's [tool] shape = \
+             \"disc\" or \"node\"",
+            scene.tool
+        );
+    }
+    Ok(scene)
+}
+
+/// The two lines at the head of the deck.
+fn title(scene: &Scene, place: &Place, scene_name: &str) -> [String; 2] {
+    [
+        format!(
+            "palpa {}: {}",
+            env!("CARGO_PKG_VERSION"),
+            one_line(scene_name)
+        ),
+        format!(
+            "tool: {}, at ({}) mm, {:.3} mm deep",
+            scene.tool,
+            in_mm(place.at),
+            scene.press.depth * 1e3
+        ),
+    ]
 }
 
 fn conclude(context: &Context, out: &Path, report: &Report<'_>) -> anyhow::Result<()> {

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{LiveScene, SpringScene, changed_files, scene_of};
+use palpa::live::{FileState, LiveScene, SpringScene, changed_files, scene_of};
 
 /// Run a log again and compare the forces, or export it as tables
 ///
@@ -113,9 +113,21 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         }
     };
     let damage = damage(&log.ending);
-    let found = Found {
+    say_report(&report, &log.ending, context)?;
+    context.json(&found_of(&report, &log.ending, &changed))?;
+    Ok(match report.verdict {
+        _ if context.is_interrupted() => Outcome::Interrupted,
+        _ if damage.is_some() => Outcome::NotGood,
+        Verdict::Same | Verdict::WithinTolerance => Outcome::Done,
+        Verdict::Different | Verdict::Incomplete => Outcome::NotGood,
+    })
+}
+
+/// The result as JSON.
+fn found_of(report: &ReplayReport, ending: &Ending, changed: &[FileState]) -> Found {
+    Found {
         verdict: match report.verdict {
-            Verdict::Same if log.ending != Ending::Whole => "same_as_far_as_read",
+            Verdict::Same if *ending != Ending::Whole => "same_as_far_as_read",
             Verdict::Same => "same",
             Verdict::WithinTolerance => "within_tolerance",
             Verdict::Different => "different",
@@ -130,19 +142,23 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         first_tick_differing: report.first_force.map(|f| f.tick),
         max_force_difference_n: report.max_force_difference,
         stopped: report.stopped.clone(),
-        is_whole: log.ending == Ending::Whole,
-        damage: damage.clone(),
+        is_whole: *ending == Ending::Whole,
+        damage: damage(ending),
         changed_files: changed
             .iter()
             .map(|f| f.path.display().to_string())
             .collect(),
-    };
+    }
+}
+
+/// Prints what was run again, and whether it was the same.
+fn say_report(report: &ReplayReport, ending: &Ending, context: &Context) -> anyhow::Result<()> {
     context.say(format!(
         "{} ticks, {} steps of the tissue and {} background jobs run again",
         report.ticks, report.steps, report.jobs
     ))?;
     context.say(match report.verdict {
-        Verdict::Same if log.ending == Ending::Whole => {
+        Verdict::Same if *ending == Ending::Whole => {
             "every force and every patch is the same to the bit".to_owned()
         }
         Verdict::Same => {
@@ -167,13 +183,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     if let Some(why) = &report.stopped {
         context.say(format!("it had to stop early: {why}"))?;
     }
-    context.json(&found)?;
-    Ok(match report.verdict {
-        _ if context.is_interrupted() => Outcome::Interrupted,
-        _ if damage.is_some() => Outcome::NotGood,
-        Verdict::Same | Verdict::WithinTolerance => Outcome::Done,
-        Verdict::Different | Verdict::Incomplete => Outcome::NotGood,
-    })
+    Ok(())
 }
 
 /// Prints a note if a log is not complete.

@@ -87,35 +87,7 @@ fn cutout(
 fn generator(at: &Site<'_>, table: &GeneratorTable) -> Result<Generator, SceneError> {
     let spacing_at = at.key("spacing");
     let spacing = spacing_at.within(table.spacing, &limits::SPACING)?.si();
-    let given = [
-        ("size", table.size.is_some(), GeneratorKind::Block),
-        ("length", table.length.is_some(), GeneratorKind::Cylinder),
-        ("radius", table.radius.is_some(), GeneratorKind::Cylinder),
-        (
-            "bone_radius",
-            table.bone_radius.is_some(),
-            GeneratorKind::Cylinder,
-        ),
-        ("scale", table.scale.is_some(), GeneratorKind::Forearm),
-    ];
-    if let Some((key, ..)) = given
-        .iter()
-        .find(|&&(_, given, kind)| given && kind != table.kind)
-    {
-        let keys: Vec<_> = given
-            .iter()
-            .filter(|&&(.., kind)| kind == table.kind)
-            .collect();
-        let keys: Vec<_> = keys.iter().map(|(key, ..)| format!("`{key}`")).collect();
-        return Err(at.key(key).invalid(
-            format!(
-                "a {:?} does not take `{key}`; it takes `spacing` and {}",
-                table.kind,
-                keys.join(", ")
-            )
-            .to_lowercase(),
-        ));
-    }
+    check_generator_keys(at, table)?;
     let (generator, area, shortest) = match table.kind {
         GeneratorKind::Block => {
             let size = table.size.unwrap_or([0.1, 0.1, 0.04].map(Length::from_si));
@@ -123,29 +95,7 @@ fn generator(at: &Site<'_>, table: &GeneratorTable) -> Result<Generator, SceneEr
             let generator = Generator::Block { size, spacing };
             (generator, size[0] * size[1], size[0].min(size[1]))
         }
-        GeneratorKind::Cylinder => {
-            let length = table.length.unwrap_or(Length::from_si(0.2));
-            let length = at.key("length").within(length, &limits::CYLINDER_LENGTH)?;
-            let radius = table.radius.unwrap_or(Length::from_si(0.04));
-            let radius = at.key("radius").within(radius, &limits::CYLINDER_RADIUS)?;
-            let bone_radius = table.bone_radius.unwrap_or(Length::from_si(0.01));
-            let bone_at = at.key("bone_radius");
-            let bone_radius = bone_at.within(bone_radius, &limits::BONE_RADIUS)?;
-            if bone_radius >= radius {
-                return Err(bone_at.invalid(format!(
-                    "a bone of radius {bone_radius} does not fit inside a skin of radius {radius}; \
-                     make `bone_radius` smaller than `radius`"
-                )));
-            }
-            let girth = std::f64::consts::TAU * radius.si();
-            let generator = Generator::Cylinder {
-                length: length.si(),
-                radius: radius.si(),
-                bone_radius: bone_radius.si(),
-                spacing,
-            };
-            (generator, girth * length.si(), length.si().min(radius.si()))
-        }
+        GeneratorKind::Cylinder => cylinder(at, table, spacing)?,
         GeneratorKind::Forearm => {
             let scale = at
                 .key("scale")
@@ -175,4 +125,68 @@ fn generator(at: &Site<'_>, table: &GeneratorTable) -> Result<Generator, SceneEr
         )));
     }
     Ok(generator)
+}
+
+/// Refuses keys of another kind of generator.
+fn check_generator_keys(at: &Site<'_>, table: &GeneratorTable) -> Result<(), SceneError> {
+    let given = [
+        ("size", table.size.is_some(), GeneratorKind::Block),
+        ("length", table.length.is_some(), GeneratorKind::Cylinder),
+        ("radius", table.radius.is_some(), GeneratorKind::Cylinder),
+        (
+            "bone_radius",
+            table.bone_radius.is_some(),
+            GeneratorKind::Cylinder,
+        ),
+        ("scale", table.scale.is_some(), GeneratorKind::Forearm),
+    ];
+    if let Some((key, ..)) = given
+        .iter()
+        .find(|&&(_, given, kind)| given && kind != table.kind)
+    {
+        let keys: Vec<_> = given
+            .iter()
+            .filter(|&&(.., kind)| kind == table.kind)
+            .collect();
+        let keys: Vec<_> = keys.iter().map(|(key, ..)| format!("`{key}`")).collect();
+        return Err(at.key(key).invalid(
+            format!(
+                "a {:?} does not take `{key}`; it takes `spacing` and {}",
+                table.kind,
+                keys.join(", ")
+            )
+            .to_lowercase(),
+        ));
+    }
+    Ok(())
+}
+
+/// A cylinder, the area of its skin (m²), and the largest spacing that it can have (m).
+fn cylinder(
+    at: &Site<'_>,
+    table: &GeneratorTable,
+    spacing: f64,
+) -> Result<(Generator, f64, f64), SceneError> {
+    let length = table.length.unwrap_or(Length::from_si(0.2));
+    let length = at.key("length").within(length, &limits::CYLINDER_LENGTH)?;
+    let radius = table.radius.unwrap_or(Length::from_si(0.04));
+    let radius = at.key("radius").within(radius, &limits::CYLINDER_RADIUS)?;
+    let bone_radius = table.bone_radius.unwrap_or(Length::from_si(0.01));
+    let bone_at = at.key("bone_radius");
+    let bone_radius = bone_at.within(bone_radius, &limits::BONE_RADIUS)?;
+    if bone_radius >= radius {
+        return Err(bone_at.invalid(format!(
+            "a bone of radius {bone_radius} does not fit inside a skin of radius {radius}; \
+             make `bone_radius` smaller than `radius`"
+        )));
+    }
+    let girth = std::f64::consts::TAU * radius.si();
+    let generator = Generator::Cylinder {
+        length: length.si(),
+        radius: radius.si(),
+        bone_radius: bone_radius.si(),
+        spacing,
+    };
+    let shortest = length.si().min(radius.si());
+    Ok((generator, girth * length.si(), shortest))
 }

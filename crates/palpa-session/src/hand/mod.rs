@@ -341,7 +341,10 @@ mod tests {
             depth: 1e-3,
         };
         let refused = bench.hand.put(goal, bench.now).unwrap_err().to_string();
-        assert!(refused.contains("motion of the scene is running"), "{refused}");
+        assert!(
+            refused.contains("motion of the scene is running"),
+            "{refused}"
+        );
         bench.run(rest + 1.0);
         assert!(!bench.hand.is_in_motion());
         let pose = bench.run(1.0);

@@ -1,6 +1,6 @@
 //! The figures of a run.
 
-use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus};
+use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus, TickEntry};
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
@@ -132,6 +132,77 @@ struct ForceFigures {
     softening_max: f64,
 }
 
+/// The ticks up to a time, s.
+fn ticks_until(log: &Log, seconds: f64) -> impl DoubleEndedIterator<Item = &TickEntry> {
+    log.ticks.iter().filter(move |t| t.tick.now <= seconds)
+}
+
+impl ForceFigures {
+    /// The figures of device `k`, up to a time in s.
+    fn new(report: &Report, log: &Log, k: usize, force: &ForceReport, seconds: f64) -> Self {
+        let ticks = || ticks_until(log, seconds);
+        let records = || ticks().map(move |t| &t.devices[k]);
+        let last = records().next_back();
+        Self {
+            max_force_n: force.max_force,
+            rms_still_n: is_still(log, k, seconds.min(report.duration)).then_some(force.rms_band),
+            rms_worst_n: force.rms_band_worst,
+            arrival_max_n: force.arrival_max,
+            arrival_p999_n: force.arrival_p999,
+            arrival_alone_max_n: force.arrival_alone_max,
+            other_p999_n: force.other_p999,
+            other_max_n: force.other_max,
+            energy_in_mj: last.map_or(0.0, |d| d.energy_in * 1e3),
+            energy_out_mj: last.map_or(0.0, |d| d.energy_out * 1e3),
+            energy_deficit_mj: force.max_work.max(0.0) * 1e3,
+            energy_budget_mj: ticks()
+                .next_back()
+                .map_or(0.0, |t| t.tick.energy_budget * 1e3),
+            softening_max: records().map(|d| d.softening).fold(0.0, f64::max),
+        }
+    }
+}
+
+impl TissueFigures {
+    /// The figures of a run, up to a time in s; `motion_speed` in m/s.
+    fn new(report: &Report, log: &Log, live: &LiveScene, motion_speed: f64, seconds: f64) -> Self {
+        let status = |wanted: StepStatus| {
+            let steps = log.steps.iter();
+            steps.filter(|s| s.status == wanted as u8).count() as u64
+        };
+        let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
+        let behind = status(StepStatus::Behind);
+        let stale = ticks_until(log, seconds).filter(|t| {
+            let bits = u16::try_from(t.tick.faults).unwrap_or(0);
+            Faults::from_bits(bits).contains(Faults::STALE_PATCH)
+        });
+        let by_steps = fastest_by_steps(report);
+        let zone_wall = zone_wall(log);
+        // The tool moves away from the middle of a zone while the next zone is computed.
+        let by_zones = zone_wall.map(|time| live.params.longest_way() / time);
+        Self {
+            steps: report.steps,
+            steps_per_s: report.step_rate,
+            fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
+            fastest_by_steps_mm_per_s: 1e3 * by_steps,
+            motion_mm_per_s: 1e3 * motion_speed,
+            step_cpu_us: report.step_cpu.into(),
+            step_wall_us: report.step_wall.into(),
+            held_back: report.held_back,
+            unfinished: status(StepStatus::Unfinished),
+            behind,
+            behind_share: behind as f64 / touching.max(1) as f64,
+            stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
+            jobs: report.jobs.count,
+            job_cpu_us: report.jobs.into(),
+            zone_wall_p90_ms: zone_wall.map(|s| s * 1e3),
+            background_cpu_share: report.background_cpu_share,
+            zones: log.steps.iter().map(|s| s.zone).max().unwrap_or(0),
+            meshes: log.steps.iter().map(|s| s.mesh).max().unwrap_or(0),
+        }
+    }
+}
+
 impl Figures {
     pub(super) fn new(
         report: &Report,
@@ -141,7 +212,7 @@ impl Figures {
         motion_speed: f64,
         seconds: f64,
     ) -> Self {
-        let ticks = || log.ticks.iter().filter(|t| t.tick.now <= seconds);
+        let ticks = || ticks_until(log, seconds);
         let mut faults = Vec::new();
         let mut limits = Vec::new();
         for tick in ticks() {
@@ -150,42 +221,8 @@ impl Figures {
             let bits = u16::try_from(tick.tick.limits).unwrap_or(0);
             Limits::from_bits(bits).for_each_name(|name| count(&mut limits, name));
         }
-        let devices = forces.iter().enumerate().map(|(k, force)| {
-            let records = || ticks().map(move |t| &t.devices[k]);
-            let last = records().next_back();
-            ForceFigures {
-                max_force_n: force.max_force,
-                rms_still_n: is_still(log, k, seconds.min(report.duration))
-                    .then_some(force.rms_band),
-                rms_worst_n: force.rms_band_worst,
-                arrival_max_n: force.arrival_max,
-                arrival_p999_n: force.arrival_p999,
-                arrival_alone_max_n: force.arrival_alone_max,
-                other_p999_n: force.other_p999,
-                other_max_n: force.other_max,
-                energy_in_mj: last.map_or(0.0, |d| d.energy_in * 1e3),
-                energy_out_mj: last.map_or(0.0, |d| d.energy_out * 1e3),
-                energy_deficit_mj: force.max_work.max(0.0) * 1e3,
-                energy_budget_mj: ticks()
-                    .next_back()
-                    .map_or(0.0, |t| t.tick.energy_budget * 1e3),
-                softening_max: records().map(|d| d.softening).fold(0.0, f64::max),
-            }
-        });
-        let status = |wanted: StepStatus| {
-            let steps = log.steps.iter();
-            steps.filter(|s| s.status == wanted as u8).count() as u64
-        };
-        let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
-        let behind = status(StepStatus::Behind);
-        let stale = ticks().filter(|t| {
-            let bits = u16::try_from(t.tick.faults).unwrap_or(0);
-            Faults::from_bits(bits).contains(Faults::STALE_PATCH)
-        });
-        let by_steps = fastest_by_steps(report);
-        let zone_wall = zone_wall(log);
-        // The tool moves away from the middle of a zone while the next zone is computed.
-        let by_zones = zone_wall.map(|time| live.params.longest_way() / time);
+        let devices = forces.iter().enumerate();
+        let devices = devices.map(|(k, force)| ForceFigures::new(report, log, k, force, seconds));
         Self {
             seconds: report.duration,
             nodes: live.model.n_nodes(),
@@ -197,26 +234,7 @@ impl Figures {
             wake_up_lateness_us: report.lateness.into(),
             cpu_histogram: report.tick_cpu_histogram.clone(),
             lateness_histogram: report.lateness_histogram.clone(),
-            tissue: TissueFigures {
-                steps: report.steps,
-                steps_per_s: report.step_rate,
-                fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
-                fastest_by_steps_mm_per_s: 1e3 * by_steps,
-                motion_mm_per_s: 1e3 * motion_speed,
-                step_cpu_us: report.step_cpu.into(),
-                step_wall_us: report.step_wall.into(),
-                held_back: report.held_back,
-                unfinished: status(StepStatus::Unfinished),
-                behind,
-                behind_share: behind as f64 / touching.max(1) as f64,
-                stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
-                jobs: report.jobs.count,
-                job_cpu_us: report.jobs.into(),
-                zone_wall_p90_ms: zone_wall.map(|s| s * 1e3),
-                background_cpu_share: report.background_cpu_share,
-                zones: log.steps.iter().map(|s| s.zone).max().unwrap_or(0),
-                meshes: log.steps.iter().map(|s| s.mesh).max().unwrap_or(0),
-            },
+            tissue: TissueFigures::new(report, log, live, motion_speed, seconds),
             devices: devices.collect(),
             faults,
             limits,
