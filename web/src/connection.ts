@@ -23,6 +23,8 @@ const FIRST_WAIT = 500;
 const LONGEST_WAIT = 5000;
 /** Silence after which a connection counts as lost, ms: the engine sends something twice a second. */
 const SILENCE = 6000;
+/** Then for messages that wait to be read, ms: after a page has stood still its timers may come before them. */
+const GRACE = 1000;
 /** ms. */
 const REPLY_WAIT = 35_000;
 
@@ -118,7 +120,9 @@ export class Connection {
 
   private hear(): void {
     window.clearTimeout(this.silence);
-    this.silence = window.setTimeout(() => this.lose(this.socket), SILENCE);
+    this.silence = window.setTimeout(() => {
+      this.silence = window.setTimeout(() => this.lose(this.socket), GRACE);
+    }, SILENCE);
   }
 
   private lose(socket: WebSocket | null): void {
