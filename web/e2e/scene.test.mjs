@@ -7,12 +7,17 @@ import { saveShot } from './shots.mjs';
 import { until } from './viewer.mjs';
 import { extent, readBody } from './vtu.mjs';
 
-/** Force and depth of a press by keys. @param {import('./page.mjs').PalpaPage} palpa */
-async function forceOfPress(palpa) {
+/**
+ * Force and depth of a press by keys.
+ * @param {import('./page.mjs').PalpaPage} palpa
+ * @param {() => Promise<void>} whilePressed
+ */
+async function forceOfPress(palpa, whilePressed = async () => {}) {
   await palpa.atRest();
   await palpa.focus();
   await palpa.page.keyboard.press('Space');
   const { newtons, metres } = await palpa.steady();
+  await whilePressed();
   await palpa.page.keyboard.press('Escape');
   await palpa.atRest();
   return { newtons, metres };
@@ -121,13 +126,8 @@ test('a cone can be chosen, made blunter and pressed', async (t) => {
   await palpa.type('tool-opening_angle', '140 deg',
     ({ tool }) => tool.shape?.kind === 'cone' && Math.abs(tool.shape.opening_angle - (7 * Math.PI) / 9) < 1e-6);
   await palpa.type('tool-tip_radius', '2 mm', ({ tool }) => tool.shape?.kind === 'cone' && Math.abs(tool.shape.tip_radius - 2e-3) < 1e-9);
-  await palpa.atRest();
-  await palpa.focus();
-  await palpa.page.keyboard.press('Space');
-  const { newtons } = await palpa.steady();
+  const { newtons } = await forceOfPress(palpa, () => saveShot(palpa, 'cone'));
   t.diagnostic(`a cone presses with ${newtons.toFixed(3)} N`);
-  await saveShot(palpa, 'cone');
-  await palpa.page.keyboard.press('Escape');
   assert.ok(newtons > 0.02, `${newtons} N`);
   await palpa.choose('block');
 });

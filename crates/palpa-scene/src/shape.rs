@@ -16,7 +16,7 @@ use crate::SceneError;
 use crate::error::Site;
 use crate::file::ToolTable;
 use crate::limits::{self, Limits};
-use crate::units::{Angle, Length};
+use crate::units::{Angle, Kind, Length, Quantity};
 
 /// Default radius of a tool, m.
 const RADIUS: f64 = 8e-3;
@@ -316,15 +316,15 @@ struct Sizes<'a> {
 }
 
 impl Sizes<'_> {
-    fn one(
+    fn one<K: Kind>(
         &self,
         key: &'static str,
-        given: Option<Length>,
+        given: Option<Quantity<K>>,
         default: f64,
-        limits: &Limits<Length>,
+        limits: &Limits<Quantity<K>>,
     ) -> Result<f64, SceneError> {
-        let length = given.unwrap_or(Length::from_si(default));
-        Ok(self.at.key(key).within(length, limits)?.si())
+        let size = given.unwrap_or(Quantity::from_si(default));
+        Ok(self.at.key(key).within(size, limits)?.si())
     }
 
     fn three(
@@ -343,47 +343,49 @@ impl Sizes<'_> {
     }
 
     fn opening_angle(&self) -> Result<f64, SceneError> {
-        let angle = self.table.opening_angle;
-        let angle = angle.unwrap_or(Angle::from_si(OPENING_ANGLE));
-        let at = self.at.key("opening_angle");
-        Ok(at.within(angle, &limits::OPENING_ANGLE)?.si())
+        let given = self.table.opening_angle;
+        self.one(
+            "opening_angle",
+            given,
+            OPENING_ANGLE,
+            &limits::OPENING_ANGLE,
+        )
     }
 
     /// Radius of a rounded tip, at most `most`, in metres.
     fn tip_radius(&self, most: f64) -> Result<f64, SceneError> {
+        let given = self.table.tip_radius;
         let default = TIP_RADIUS.min(most);
-        let tip = self.one(
-            "tip_radius",
-            self.table.tip_radius,
-            default,
-            &limits::EDGE_RADIUS,
-        )?;
-        if tip > most {
-            return Err(self.at.key("tip_radius").invalid(format!(
-                "a tip rounded by {} is rounder than the cone, which has room for {}; make `tip_radius` smaller",
-                Length::from_si(tip),
-                Length::from_si(most)
-            )));
-        }
-        Ok(tip)
+        let words = ["a tip", "is rounder than the cone"];
+        self.rounding("tip_radius", given, default, most, words)
     }
 
     /// Radius of rounded edges, at most `most`, in metres.
     fn edge_radius(&self, most: f64) -> Result<f64, SceneError> {
-        let edge = self.one(
-            "edge_radius",
-            self.table.edge_radius,
-            EDGE * most,
-            &limits::EDGE_RADIUS,
-        )?;
-        if edge > most {
-            return Err(self.at.key("edge_radius").invalid(format!(
-                "edges rounded by {} are rounder than the tool, which has room for {}; make `edge_radius` smaller",
-                Length::from_si(edge),
+        let given = self.table.edge_radius;
+        let words = ["edges", "are rounder than the tool"];
+        self.rounding("edge_radius", given, EDGE * most, most, words)
+    }
+
+    /// A radius of rounding, at most `most`, in metres. The words are of the error when it is
+    /// larger: what is rounded, and what it does not fit.
+    fn rounding(
+        &self,
+        key: &'static str,
+        given: Option<Length>,
+        default: f64,
+        most: f64,
+        [rounded, misfit]: [&str; 2],
+    ) -> Result<f64, SceneError> {
+        let radius = self.one(key, given, default, &limits::EDGE_RADIUS)?;
+        if radius > most {
+            return Err(self.at.key(key).invalid(format!(
+                "{rounded} rounded by {} {misfit}, which has room for {}; make `{key}` smaller",
+                Length::from_si(radius),
                 Length::from_si(most)
             )));
         }
-        Ok(edge)
+        Ok(radius)
     }
 }
 

@@ -112,12 +112,11 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
             again(&log, springs.tissue(springs.beginning(), None)?, context)
         }
     };
-    let damage = damage(&log.ending);
     say_report(&report, &log.ending, context)?;
     context.json(&found_of(&report, &log.ending, &changed))?;
     Ok(match report.verdict {
         _ if context.is_interrupted() => Outcome::Interrupted,
-        _ if damage.is_some() => Outcome::NotGood,
+        _ if matches!(log.ending, Ending::Damaged(_)) => Outcome::NotGood,
         Verdict::Same | Verdict::WithinTolerance => Outcome::Done,
         Verdict::Different | Verdict::Incomplete => Outcome::NotGood,
     })
@@ -159,10 +158,10 @@ fn say_report(report: &ReplayReport, ending: &Ending, context: &Context) -> anyh
     ))?;
     context.say(match report.verdict {
         Verdict::Same if *ending == Ending::Whole => {
-            "every force and every patch is the same to the bit".to_owned()
+            "every force and every patch is the same bit for bit".to_owned()
         }
         Verdict::Same => {
-            "every force and every patch that could be read is the same to the bit".to_owned()
+            "every force and every patch that could be read is the same bit for bit".to_owned()
         }
         Verdict::WithinTolerance => format!(
             "made on another kind of processor; forces differ by {:.2e} N at most, which is within the tolerance",

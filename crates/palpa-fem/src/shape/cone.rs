@@ -24,7 +24,8 @@
 use palpa_mesh::Vec3;
 
 use super::{
-    Distance, RigidShape, ShapeError, across, along, checked, checked_edge, offset_radius,
+    Distance, RigidShape, ShapeError, along, checked, checked_edge, from_axis, from_ball,
+    offset_radius,
 };
 
 const NAME: &str = "cone";
@@ -35,7 +36,6 @@ const HALF_ANGLES: std::ops::RangeInclusive<f64> = 0.05..=1.55;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cone {
     radius: f64,
-    half_angle: f64,
     tip_radius: f64,
     edge_radius: f64,
     /// `sin α`, `cos α`.
@@ -76,28 +76,12 @@ impl Cone {
         let rise = (cos * (radius - edge_radius) - (tip_radius - edge_radius)) / sin;
         Ok(Self {
             radius,
-            half_angle,
             tip_radius,
             edge_radius,
             sin,
             cos,
             rim_height: tip_radius + rise,
         })
-    }
-
-    /// Radius of the shaft. m
-    pub fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// Angle between flank and axis. rad
-    pub fn half_angle(&self) -> f64 {
-        self.half_angle
-    }
-
-    /// Radius of the rim's rounding. m
-    pub fn edge_radius(&self) -> f64 {
-        self.edge_radius
     }
 
     /// A distance with the unit normal `out · radial − down · z`, on a surface whose curvature
@@ -135,30 +119,17 @@ impl Cone {
             curvature: along(&along_meridian) * curvature(bend) + along(&around) * curvature(turn),
         }
     }
-
-    fn distance_to_tip(&self, p: &Vec3) -> Distance {
-        let from_middle = p - Vec3::z() * self.tip_radius;
-        let normal = from_middle.try_normalize(0.0).unwrap_or_else(|| -Vec3::z());
-        let distance = from_middle.norm() - self.tip_radius;
-        Distance {
-            distance,
-            normal,
-            curvature: across(&normal) / offset_radius(self.tip_radius, distance, self.radius),
-        }
-    }
 }
 
 impl RigidShape for Cone {
     const NAME: &'static str = NAME;
 
     fn distance(&self, p: &Vec3) -> Distance {
-        let from_axis = p.x.hypot(p.y);
-        let radial = Vec3::new(p.x, p.y, 0.0)
-            .try_normalize(0.0)
-            .unwrap_or_else(Vec3::x);
+        let (from_axis, radial) = from_axis(p);
         let over_tip = p.z - self.tip_radius;
         if from_axis * self.sin + over_tip * self.cos <= 0.0 {
-            return self.distance_to_tip(p);
+            let from_middle = p - Vec3::z() * self.tip_radius;
+            return from_ball(&from_middle, self.tip_radius, self.radius);
         }
         let out = from_axis - (self.radius - self.edge_radius);
         let down = self.rim_height - p.z;

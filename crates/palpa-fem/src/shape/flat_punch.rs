@@ -11,7 +11,9 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, RigidShape, ShapeError, along, checked, checked_edge, offset_radius};
+use super::{
+    Distance, RigidShape, ShapeError, along, checked, checked_edge, from_axis, offset_radius,
+};
 use crate::Mat3;
 
 const NAME: &str = "flat punch";
@@ -81,10 +83,7 @@ impl RigidShape for FlatPunch {
     const NAME: &'static str = NAME;
 
     fn distance(&self, p: &Vec3) -> Distance {
-        let from_axis = p.x.hypot(p.y);
-        let radial = Vec3::new(p.x, p.y, 0.0)
-            .try_normalize(0.0)
-            .unwrap_or_else(Vec3::x);
+        let (from_axis, radial) = from_axis(p);
         let beyond_flat = from_axis - self.flat_radius();
         let below_side = self.edge_radius - p.z;
         let is_half_ball = self.flat_radius() == 0.0;

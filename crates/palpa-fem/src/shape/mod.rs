@@ -254,6 +254,25 @@ fn offset_radius(rho: f64, d: f64, size: f64) -> f64 {
     (rho + d).max(0.5 * rho).max(SHARPEST * size)
 }
 
+/// A point's distance from the z axis, and the unit vector from the axis to it; x on the axis.
+fn from_axis(p: &Vec3) -> (f64, Vec3) {
+    let radial = Vec3::new(p.x, p.y, 0.0)
+        .try_normalize(0.0)
+        .unwrap_or_else(Vec3::x);
+    (p.x.hypot(p.y), radial)
+}
+
+/// The distance from a ball of a shape of this size; the point is given from the ball's middle.
+fn from_ball(p: &Vec3, radius: f64, size: f64) -> Distance {
+    let normal = p.try_normalize(0.0).unwrap_or_else(|| -Vec3::z());
+    let distance = p.norm() - radius;
+    Distance {
+        distance,
+        normal,
+        curvature: across(&normal) / offset_radius(radius, distance, size),
+    }
+}
+
 /// The projector on a unit vector, `u uᵀ`.
 fn along(u: &Vec3) -> Mat3 {
     u * u.transpose()

@@ -2,7 +2,7 @@
 
 use palpa_mesh::Vec3;
 
-use super::{Distance, RigidShape, ShapeError, across, checked, offset_radius};
+use super::{Distance, RigidShape, ShapeError, checked, from_ball};
 
 const NAME: &str = "sphere";
 
@@ -30,14 +30,7 @@ impl Sphere {
 
     /// The distance of a point given from the ball's middle.
     pub(crate) fn distance_centred(self, p: &Vec3) -> Distance {
-        let from_middle = p.norm();
-        let normal = p.try_normalize(0.0).unwrap_or_else(|| -Vec3::z());
-        let distance = from_middle - self.radius;
-        Distance {
-            distance,
-            normal,
-            curvature: across(&normal) / offset_radius(self.radius, distance, self.radius),
-        }
+        from_ball(p, self.radius, self.radius)
     }
 }
 

@@ -26,7 +26,7 @@ const ALPHA: f64 = 0.8;
 /// Radius of the block, m: twice its depth, so that the free side has little effect.
 const HALF_WIDTH: f64 = 0.24;
 /// A layer counts as felt if the body is this many times as stiff (force over push) as the uniform
-/// one. Differences of stiffness of 4 to 10 % are told apart in the best conditions (Gurari,
+/// one. Differences of stiffness of 4 to 10 % are noticed in the best conditions (Gurari,
 /// Okamura & Kuchenbecker 2017, doi 10.1371/journal.pone.0178605), and of 8 to 23 % in older work.
 /// The first ratio is for attentive people, the second for everyone.
 pub const FELT_RATIOS: [f64; 2] = [1.1, 1.23];

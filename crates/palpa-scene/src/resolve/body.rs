@@ -144,11 +144,8 @@ fn check_generator_keys(at: &Site<'_>, table: &GeneratorTable) -> Result<(), Sce
         .iter()
         .find(|&&(_, given, kind)| given && kind != table.kind)
     {
-        let keys: Vec<_> = given
-            .iter()
-            .filter(|&&(.., kind)| kind == table.kind)
-            .collect();
-        let keys: Vec<_> = keys.iter().map(|(key, ..)| format!("`{key}`")).collect();
+        let keys = given.iter().filter(|&&(.., kind)| kind == table.kind);
+        let keys: Vec<_> = keys.map(|(key, ..)| format!("`{key}`")).collect();
         return Err(at.key(key).invalid(
             format!(
                 "a {:?} does not take `{key}`; it takes `spacing` and {}",

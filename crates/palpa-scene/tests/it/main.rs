@@ -4,7 +4,7 @@
     clippy::float_cmp,
     clippy::format_push_string,
     clippy::unwrap_used,
-    reason = "units are exact to the bit where said; a test may panic, and need not be fast"
+    reason = "units are exact bit for bit where said; a test may panic, and need not be fast"
 )]
 
 mod catalogue;

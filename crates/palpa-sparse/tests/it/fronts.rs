@@ -80,7 +80,7 @@ fn case(nx: usize, ny: usize, n_levels: usize, is_tube: bool, zone_radius: f64) 
     }
 }
 
-/// Blocks of what is inside the zone, then of the rest: springs of random stiffness between nodes,
+/// Blocks of the zone, then of the exterior: springs of random stiffness between nodes,
 /// and to the ground.
 fn blocks(case: &Case, seed: u64) -> [Vec<Block<f64>>; 2] {
     let pattern = &case.pattern;
