@@ -1,7 +1,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpa_tissue::Scene;
+use palpa_scene::Scene;
 
 // What is read is written and read again, and must be the same scene.
 fuzz_target!(|text: &str| {

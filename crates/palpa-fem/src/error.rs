@@ -50,8 +50,8 @@ pub enum FemError {
     },
     /// A small-strain material together with others.
     #[error(
-        "material \"{linear}\" is linear (small strain) and \"{finite}\" is not; one body is either linear throughout or \
-         not at all: give both the same kind of law"
+        "material \"{linear}\" is linear (small strain) and \"{finite}\" is not; all materials of a body must be \
+         linear, or none: give both the same kind of law"
     )]
     MixedKinematics {
         /// Name of a linear material.

@@ -1,9 +1,9 @@
 //! The material at each point of a body: layers, lumps in them, and a field of stiffness over both.
 //!
-//! Material is sampled where the element asks for it, so a lump need not follow the mesh. A place
-//! that is partly lump is given an energy between both materials' that is not their mean by volume:
-//! where one is much stiffer it is hardly strained itself, and the mean would feel it many times
-//! too strongly. The share c of the lump's energy is
+//! Material is sampled where the element asks for it, so a lump need not follow the mesh. The
+//! energy of a place that is partly lump lies between those of both materials, but it is not their
+//! mean by volume. If one material is much stiffer, it is hardly strained itself, so the mean would
+//! overstate its effect many times. The share c of the lump's energy is
 //!
 //! ```text
 //! G = G_m + c (G_l − G_m),  c = φ / (1 + (1 − φ) β (G_l/G_m − 1))

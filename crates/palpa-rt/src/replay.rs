@@ -153,7 +153,7 @@ impl<T: Tissue> Run<'_, T> {
     ) -> Result<(), String> {
         for (k, entry) in ticks.iter().enumerate() {
             if !goes_on(k) {
-                return Err("it was asked to".to_owned());
+                return Err("it was interrupted".to_owned());
             }
             let wanted = k as u64 + 1;
             if entry.tick.tick != wanted {
@@ -214,7 +214,7 @@ impl<T: Tissue> Run<'_, T> {
             let job = self.tissue.take_job();
             if job.is_none() {
                 return Err(format!(
-                    "step {}: the tissue wants no job where it did",
+                    "step {}: the log has a background job here, but the tissue requests none now",
                     logged.step
                 ));
             }

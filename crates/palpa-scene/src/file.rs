@@ -307,8 +307,8 @@ pub(crate) struct MeshTable {
     /// Default: true.
     pub(crate) refine: bool,
     /// Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a
-    /// quarter of the radius that the tool presses on, at most a third of its edge's radius, 0.5 mm
-    /// to 10 mm, and 4/3 of that in real time; nothing under a node.
+    /// quarter of the contact radius, at most a third of the edge radius, limited to 0.5 mm to
+    /// 10 mm; in real time 4/3 of that. A node has no default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
     /// Wanted length of edges and height of levels in and around lumps, 0.1 mm to 100 mm. Default:

@@ -80,7 +80,8 @@ impl Guard {
         let host = only(headers, &header::HOST)?.ok_or("a request without a Host header\n")?;
         if self.is_loopback && !is_this_machine(host) {
             return Err(format!(
-                "Host is {host:?}, which is no name of this machine; open the address that the program printed (127.0.0.1 or localhost)\n"
+                "the Host header {host:?} does not name this machine; open the address that the program printed \
+                 (127.0.0.1 or localhost)\n"
             ));
         }
         match only(headers, &header::ORIGIN)? {

@@ -48,7 +48,7 @@ pub(crate) fn text(board: &Board, is_well: bool) -> String {
     let mut page = Page(String::with_capacity(4096));
     page.gauge(
         "palpa_up",
-        "Whether the engine runs (1) or stands (0).",
+        "Whether the engine runs (1) or has stopped (0).",
         u8::from(is_well),
     );
     server(&mut page, board);
@@ -144,7 +144,7 @@ fn engine(page: &mut Page, figures: &crate::control::EngineFigures) {
     );
     page.gauge(
         "palpa_patch_age_seconds",
-        "From taking the pose to the force that is made of it.",
+        "Age of the contact patch in use: time since its pose was read.",
         figures.latency,
     );
     page.gauge("palpa_body_nodes", "Nodes of the body.", figures.n_nodes);

@@ -64,7 +64,7 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
         .method_not_allowed_fallback(async || {
             (
                 StatusCode::METHOD_NOT_ALLOWED,
-                "not with this method; /api says how\n",
+                "this address does not accept the HTTP method; /api lists the methods\n",
             )
         })
         .layer(from_fn_with_state(Arc::clone(hub), guard::origin))

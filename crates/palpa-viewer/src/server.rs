@@ -59,7 +59,9 @@ pub enum ServerError {
         bind: IpAddr,
     },
     /// The token is short enough to be guessed.
-    #[error("a token of {found} bytes; expected {MIN_TOKEN} or more, as of `openssl rand -hex 16`")]
+    #[error(
+        "the token has {found} bytes; give one of {MIN_TOKEN} or more, such as the output of `openssl rand -hex 16`"
+    )]
     ShortToken {
         /// Its length.
         found: usize,

@@ -283,7 +283,8 @@ impl fmt::Display for Note {
             Self::FileRead { file, text } => write!(f, "{file}: {text}"),
             Self::UnusualSize { file, size } => write!(
                 f,
-                "{file} is {size:.4} m large, and no body part is; check `unit` in the scene's [body]"
+                "{file} measures {size:.4} m from corner to corner, which no body part does; check `unit` in the \
+                 scene's [body]"
             ),
             Self::Repaired {
                 file,
@@ -336,7 +337,8 @@ impl fmt::Display for Note {
             ),
             Self::LevelsTooHigh { max_levels } => write!(
                 f,
-                "levels are higher than wanted under the tool or round a lump, because there are {max_levels} already"
+                "levels are thicker than wanted under the tool or round a lump, because the limit of {max_levels} \
+                 levels was reached"
             ),
             Self::LumpNotRefined { lump } => write!(
                 f,
@@ -351,7 +353,8 @@ impl fmt::Display for Note {
             ),
             Self::DiscNotImprinted { why } => write!(
                 f,
-                "the disc's edge could not be made a ring of vertices, so its radius is that of the vertices under it: {why}"
+                "the edge of the disc could not be cut into the mesh, so the disc holds the vertices under it instead: \
+                 {why}"
             ),
             Self::DiscPatch {
                 n_vertices,
@@ -396,13 +399,15 @@ impl fmt::Display for Note {
             ),
             Self::TensionLost { layer } => write!(
                 f,
-                "the cut faces are free and let go of most of the tension of \"{layer}\" (of 30 kPa in the skin of a block 60 mm \
-                 wide, 3 kPa are left in its middle); set cut_faces = \"fixed\" or \"symmetric\" in [body] to keep it"
+                "the cut faces are free, so most of the tension of \"{layer}\" is lost (for example, 30 kPa in the skin \
+                 of a block 60 mm wide fall to 3 kPa in its middle); set cut_faces = \"fixed\" or \"symmetric\" in \
+                 [body] to keep it"
             ),
             Self::LongFrictionSteps { step, enough } => write!(
                 f,
-                "with friction the force depends on the steps, here of {:.2} mm (a sphere of radius 8 mm with friction 0.4, \
-                 pressed 3 mm: 13 % less in one step, 5 % in steps of 1 mm); press with --step \"{} mm\" or shorter",
+                "with friction the force depends on the step length, here {:.2} mm (for example, a sphere of radius 8 \
+                 mm with friction 0.4, pressed 3 mm deep, gives 13 % less force in one step and 5 % less in steps of 1 \
+                 mm); press with --step \"{} mm\" or shorter",
                 mm(step),
                 rounded(enough * 1e3)
             ),
@@ -421,7 +426,8 @@ impl fmt::Display for Note {
                 f.write_str("bars are without tension at rest; `prestress` was left out")
             }
             Self::FirstSpeedOnly => f.write_str(
-                "bars have no time, so every speed gives the same force; only the first of `speeds` was run",
+                "forces of bars do not depend on time, so every speed gives the same force; only the first of `speeds` \
+                 was run",
             ),
             Self::BarAspects {
                 layers,
@@ -470,8 +476,9 @@ impl fmt::Display for Note {
             ),
             Self::TurnedPrisms { n, depth, at } => write!(
                 f,
-                "prisms with a corner turned inside out at {:.2} mm: {n}, the worst near ({}) mm; stress there means little, and \
-                 the force may be off: press less deep, or make the mesh finer there with [mesh] near_tool or near_lumps",
+                "{n} prisms have a corner turned inside out at a depth of {:.2} mm, the worst near ({}) mm; the stress \
+                 there is not reliable, and the force may be off: press less deep, or make the mesh finer there with \
+                 [mesh] near_tool or near_lumps",
                 mm(depth),
                 Mm(*at)
             ),
@@ -487,8 +494,8 @@ impl fmt::Display for Note {
                 edge,
             } => write!(
                 f,
-                "only {n_vertices} skin vertices touch the tool at most, over a circle of {:.1} mm radius with edges of {:.1} mm: \
-                 the force depends on the mesh; press deeper, or refine it with [mesh] near_tool",
+                "at most {n_vertices} skin vertices touch the tool (contact radius {:.1} mm, skin edges {:.1} mm), so \
+                 the force depends on the mesh; press deeper, or refine the mesh with [mesh] near_tool",
                 mm(radius),
                 mm(edge)
             ),

@@ -21,10 +21,10 @@ function repairs(note: Of<'repaired'>, names: readonly string[]): string {
 
 const en: Words = {
   file_read: ({ file, text }) => `${file}: ${text}`,
-  unusual_size: ({ file, size }) => `${file} is ${size.toFixed(4)} m large. No body part is that size: check “unit” in the scene.`,
+  unusual_size: ({ file, size }) => `${file} measures ${size.toFixed(4)} m from corner to corner. No body part has that size: check “unit” in the scene.`,
   repaired: (note) => `${note.file} was repaired: ${repairs(note, ['vertices welded:', 'triangles without area dropped:', 'double triangles dropped:', 'unused vertices dropped:', 'triangles turned outward:'])}`,
   base_overlaps: ({ n_pairs }) => `The base of the body passes through itself (${n_pairs} pairs of triangles). Look at the cutaway before you trust forces near there.`,
-  cutout_near: ({ radius, enough }) => `The cut-out has a radius of ${mm(radius, 0)}; its rim may be felt below ${mm(enough, 0)}.`,
+  cutout_near: ({ radius, enough }) => `The cut-out has a radius of ${mm(radius, 0)}. With less than ${mm(enough, 0)}, its free rim may change the force.`,
   oblique_press: ({ angle }) => `The press direction is ${Math.round((angle * 180) / Math.PI)}° from the skin's normal: the tool drags more than it presses.`,
   press_on_cut_face: () => 'The place that is pressed lies on a cut face. The force there is that of a free edge.',
   skin_too_coarse: ({ n_triangles, max_vertices }) => `${n_triangles} skin triangles are larger than wanted, because the limit of ${max_vertices} vertices was reached.`,
@@ -42,7 +42,7 @@ const en: Words = {
   long_friction_steps: ({ step, enough }) => `With friction the force depends on the steps, here of ${mm(step, 2)}. Steps of ${mm(enough, 2)} are short enough.`,
   few_under_disc: ({ n_vertices, radius, edge }) => `Only ${n_vertices} skin vertices lie under the tool of radius ${mm(radius)}, with edges of ${mm(edge)} there: the force depends on the mesh.`,
   tension_left_out: () => 'Bars have no tension at rest; “prestress” was left out.',
-  first_speed_only: () => 'Bars have no time: only the first of “speeds” was run.',
+  first_speed_only: () => 'Forces of bars do not depend on time: only the first of “speeds” was run.',
   bar_aspects: ({ layers, least, most }) => `Height of levels over length of skin edges: ${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join(', ')}. Outside ${least} to ${most} bars are too stiff across or too soft in shear.`,
   tension_relaxes: () => 'The tension of the layers is not in equilibrium at the start: the first steps relax it.',
   motion_off_skin: ({ far, length }) => `${mm(far, 0)} along its motion the tool is off the skin, where nothing is felt. Shorten the motion (now ${mm(length, 0)}).`,

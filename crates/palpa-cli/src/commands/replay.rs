@@ -189,7 +189,7 @@ fn say_report(report: &ReplayReport, ending: &Ending, context: &Context) -> anyh
 fn note_ending(ending: &Ending, context: &Context) {
     match ending {
         Ending::Whole => {}
-        Ending::CutOff => context.note("the log ends early, as after a crash; what is there is used"),
+        Ending::CutOff => context.note("the log ends early, as after a crash; the replay uses the part that is there"),
         Ending::Damaged(why) => context.note(format!(
             "the log is damaged, or was still being written when it was copied ({why}); what comes before that is used"
         )),

@@ -32,7 +32,8 @@ use unit::{Corrected, PointResponse, UnitResponse, add_second_derivative_of_det}
 
 use crate::{Kinematics, Law, Mat3, Mat9, VolumeMeasure};
 
-/// Places at which a group asks its material: two of the pair's mean, two of each wedge.
+/// Number of points at which a group evaluates its material: two of the pair's mean, two of each
+/// wedge.
 pub(crate) const N_POINTS: usize = 6;
 /// The two points of the pair's mean, and of each wedge, among the points of a group.
 const PAIR: usize = 0;
@@ -371,7 +372,7 @@ fn two_points(
     response.energy.is_finite().then_some(response)
 }
 
-/// What all phases together answer at a point.
+/// Deviatoric response of all phases together at a point.
 fn deviatoric(
     phases: &[PhaseAt<'_>],
     point: usize,

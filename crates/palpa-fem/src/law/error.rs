@@ -1,6 +1,6 @@
 //! What can be wrong with the parameters of a material.
 
-/// Parameters that make no material.
+/// The reason why the parameters of a material are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LawError {
@@ -28,7 +28,7 @@ pub enum LawError {
         /// Unit of the value; empty for a pure number.
         unit: &'static str,
     },
-    /// Poisson's ratio of no solid, or of an incompressible one.
+    /// A Poisson's ratio that is not between −1 and ½.
     #[error(
         "{owner}: Poisson's ratio is {value}, but must lie above -1 and below 0.5; take 0.45 to 0.499 for tissue that \
          hardly changes its volume"
@@ -39,7 +39,7 @@ pub enum LawError {
         /// What was given.
         value: f64,
     },
-    /// A share that is none.
+    /// A share outside 0 to 1.
     #[error("{owner}: {parameter} is {value}, but must lie between 0 and 1")]
     Share {
         /// The law.
@@ -86,7 +86,7 @@ pub enum LawError {
         /// Largest size.
         most: f64,
     },
-    /// Relaxation that leaves nothing.
+    /// A Prony series whose shares add up to 1 or more, so that no stiffness remains.
     #[error(
         "Prony series: its shares g add up to {sum}, but must stay below 1, so that some stiffness is left in the end"
     )]

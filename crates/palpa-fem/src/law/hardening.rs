@@ -1,4 +1,4 @@
-//! What laws of one kind have in common, for many places at once.
+//! Hardening of a law, in a form that the moving step's kernel evaluates for many points at once.
 
 use super::Ogden;
 

@@ -62,7 +62,7 @@ pub(super) trait FirstInvariant {
     }
 }
 
-/// What the invariants of one deformation gradient have in common.
+/// Quantities that both isochoric invariants of a deformation gradient share.
 pub(super) struct Isochoric {
     f: Mat3,
     /// `F⁻ᵀ`.
@@ -82,8 +82,7 @@ pub(super) struct Isochoric {
 }
 
 impl Isochoric {
-    /// `None` where there is no such law: `det F ≤ 0`, or so near that, that doubles do not hold
-    /// it.
+    /// `None` if `det F ≤ 0`, or if `det F` is so small that rounding leaves no digit of it.
     #[inline]
     pub(super) fn new(f: &Mat3) -> Option<Self> {
         let cof = cofactor(f);

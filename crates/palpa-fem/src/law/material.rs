@@ -1,4 +1,4 @@
-//! A material: a law and what else a tissue is.
+//! A material: its elastic law, relaxation, density and pre-stress.
 
 use super::error::{check_not_negative, check_positive};
 use super::{Law, LawError, Prony};
@@ -33,7 +33,7 @@ impl Material {
         }
     }
 
-    /// Checks what the constructors of the law and the series have not.
+    /// Checks density and pre-stress. The constructors have already checked the law and the series.
     ///
     /// # Errors
     /// A density that is not positive and finite, or a prestress that is negative or not finite.

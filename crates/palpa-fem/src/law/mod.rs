@@ -49,8 +49,8 @@ use crate::{Mat3, Mat9};
 pub(crate) use hardening::{Hardening, Powers};
 use invariants::FirstInvariant;
 
-/// An energy density beyond this (J/m³) is that of no tissue, and its derivatives may overflow: it
-/// counts as infinite.
+/// Energy density, J/m³, above which the energy counts as infinite: no tissue reaches it, and its
+/// derivatives may overflow.
 const HIGHEST_ENERGY: f64 = 1e60;
 
 /// How a law measures the change of volume; 1 at rest.
@@ -73,8 +73,8 @@ pub enum Kinematics {
     Small,
 }
 
-/// What each law says of itself; its energy, stress and tangent it gives by `energy_at`,
-/// `stress_at` and `response_at`, of its own or as a [`FirstInvariant`].
+/// Name, moduli and kinematics of a law. Its energy, stress and tangent come from `energy_at`,
+/// `stress_at` and `response_at`, which the law defines itself or gets as a [`FirstInvariant`].
 trait Described {
     /// Name of the law, as in messages and reports.
     const NAME: &'static str;
@@ -108,7 +108,7 @@ trait Described {
     }
 }
 
-/// What a law's deviatoric part answers to a deformation gradient.
+/// Deviatoric energy, stress and tangent of a law at a deformation gradient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     /// Energy density `W_d`, in J/m³; infinite where the law does not exist (`det F ≤ 0`).

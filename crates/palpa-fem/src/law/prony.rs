@@ -27,7 +27,7 @@ use crate::Mat3;
 
 const NAME: &str = "Prony series";
 
-/// One relaxation.
+/// One term of a Prony series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PronyTerm {
     /// Share of the instantaneous stiffness that relaxes; positive.
@@ -39,9 +39,10 @@ pub struct PronyTerm {
 /// Which state the moduli of a law describe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moduli {
-    /// Right after a sudden step: they relax to `1 − Σ g` of what the law says.
+    /// Right after a sudden step; the stress then relaxes to `1 − Σ g` times the law's stress.
     Instantaneous,
-    /// After a long time: at once the stress is `1/(1 − Σ g)` of what the law says.
+    /// After full relaxation; right after a step the stress is `1/(1 − Σ g)` times the law's
+    /// stress.
     LongTerm,
 }
 

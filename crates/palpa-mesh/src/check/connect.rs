@@ -226,7 +226,8 @@ fn check_winding(surface: &Surface, sides: &[Side], findings: &mut Findings) -> 
         &inverted,
         triangle,
         counted(inverted.len(), "part faces inward", "parts face inward"),
-        "closed, its volume is negative; open, it bulges backward: repair turns it; a sheet that is meant to be hollow (an armpit) is to be kept as it is",
+        "a closed part then has a negative volume, an open part bulges inward; repair turns it. If the part is meant to \
+         be hollow (an armpit), keep it as it is",
     );
     findings.add(
         (FindingKind::OneSided, Severity::Unrepairable),

@@ -90,7 +90,7 @@ fn check_vertices(surface: &Surface, findings: &mut Findings) {
             "vertex with coordinates that are NaN, infinite or beyond 1e9",
             "vertices with coordinates that are NaN, infinite or beyond 1e9",
         ),
-        "where they belong cannot be known: correct or delete them where the surface was made",
+        "Palpa cannot know the right coordinates: correct or delete these vertices in the program that made the surface",
     );
     let unused = select(&|v| !is_used[v]);
     findings.add(
@@ -192,7 +192,7 @@ fn check_size(diagonal: f64, distance: f64, findings: &mut Findings) {
             None => "scale it to metres".to_owned(),
         };
         let message = format!(
-            "{diagonal:.4} long from corner to corner, which is no part of a body in metres"
+            "the surface measures {diagonal:.4} m from corner to corner, which no body part does"
         );
         findings.add_global((FindingKind::Scale, Severity::Note), message, advice);
     }

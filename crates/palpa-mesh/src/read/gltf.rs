@@ -58,6 +58,12 @@ fn fault(problem: impl Into<String>) -> Fault {
     Fault::new(Place::File, problem)
 }
 
+fn missing(what: &str, index: usize) -> Fault {
+    fault(format!(
+        "{what} {index} does not exist, but the file refers to it; export it again"
+    ))
+}
+
 /// The JSON and the binary chunk of a GLB: a header of 12 bytes, then chunks of length, type and
 /// content.
 fn split_glb(bytes: &[u8]) -> Parsed<(&[u8], Option<&[u8]>)> {
@@ -184,7 +190,7 @@ impl Scene<'_> {
                 .document
                 .nodes
                 .get(index)
-                .ok_or_else(|| fault(format!("node {index} is named but not there")))?;
+                .ok_or_else(|| missing("node", index))?;
             if !seen.insert(index) {
                 return Err(fault(format!(
                     "node {index} is reached twice; nodes must form a tree"
@@ -209,7 +215,7 @@ impl Scene<'_> {
             .document
             .meshes
             .get(index)
-            .ok_or_else(|| fault(format!("mesh {index} is named but not there")))?;
+            .ok_or_else(|| missing("mesh", index))?;
         self.builder.n_objects += 1;
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             self.add_primitive(primitive, scene_from_node)
@@ -446,7 +452,7 @@ impl Document {
         let view = self
             .buffer_views
             .get(index)
-            .ok_or_else(|| fault(format!("buffer view {index} is named but not there")))?;
+            .ok_or_else(|| missing("buffer view", index))?;
         let end = view.byte_offset.checked_add(view.byte_length);
         buffers
             .get(view.buffer)

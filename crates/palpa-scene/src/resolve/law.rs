@@ -203,7 +203,8 @@ fn check_bulk(elastic: &Elastic) -> Result<(), LawFault> {
     fault(
         "bulk",
         format!(
-            "a bulk modulus of {} beside this stiffness is a Poisson's ratio of {poisson:.7}, outside {}; take {} to {}",
+            "with this stiffness, a bulk modulus of {} gives a Poisson's ratio of {poisson:.7}, outside {}; give a bulk \
+             modulus of {} to {}",
             Pressure::from_si(elastic.bulk()),
             limits::POISSON,
             Pressure::rounded(bulk_at(limits::POISSON.min), f64::ceil),

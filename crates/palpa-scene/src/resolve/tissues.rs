@@ -157,7 +157,8 @@ fn relaxation(at: &Site<'_>, prony: &PronyTable, source: &str) -> Result<Prony, 
     // The sum of decimal numbers may miss the limit by rounding.
     if sum > limits::PRONY_SUM + 1e-9 {
         return Err(at.invalid(format!(
-            "the shares `g` add up to {sum:.4}, and some stiffness must be left in the end; make them {} at most together",
+            "the shares `g` add up to {sum:.4}, which leaves too little stiffness after relaxation; make their sum {} \
+             at most",
             limits::PRONY_SUM
         )));
     }

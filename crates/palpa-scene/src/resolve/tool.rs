@@ -32,18 +32,31 @@ impl Reader<'_> {
 }
 
 fn check_keys(at: &Site<'_>, tool: &ToolTable) -> Result<(), SceneError> {
+    // Every key is named, so that the compiler asks for a new one.
+    let ToolTable {
+        shape,
+        radius,
+        radii,
+        length,
+        size,
+        opening_angle,
+        tip_radius,
+        edge_radius,
+        axis,
+        friction,
+    } = tool;
     let given = [
-        ("radius", tool.radius.is_some()),
-        ("radii", tool.radii.is_some()),
-        ("length", tool.length.is_some()),
-        ("size", tool.size.is_some()),
-        ("opening_angle", tool.opening_angle.is_some()),
-        ("tip_radius", tool.tip_radius.is_some()),
-        ("edge_radius", tool.edge_radius.is_some()),
-        ("axis", tool.axis.is_some()),
-        ("friction", tool.friction.is_some()),
+        ("radius", radius.is_some()),
+        ("radii", radii.is_some()),
+        ("length", length.is_some()),
+        ("size", size.is_some()),
+        ("opening_angle", opening_angle.is_some()),
+        ("tip_radius", tip_radius.is_some()),
+        ("edge_radius", edge_radius.is_some()),
+        ("axis", axis.is_some()),
+        ("friction", friction.is_some()),
     ];
-    let (name, keys) = tool.shape.takes();
+    let (name, keys) = shape.takes();
     let Some((key, _)) = given
         .iter()
         .find(|(key, given)| *given && !keys.contains(key))

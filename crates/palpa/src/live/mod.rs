@@ -128,8 +128,8 @@ impl LiveScene {
         let mesh = &prepared.mesh;
         if model.n_nodes() > MOST_NODES {
             bail!(
-                "{} nodes are more than can be pressed in real time, {MOST_NODES}; make the mesh coarser: [mesh] near_tool is \
-                 {:.1} mm under the tool now",
+                "{} nodes are more than the {MOST_NODES} that can be pressed in real time; make the mesh coarser: \
+                 [mesh] near_tool is {:.1} mm under the tool now",
                 model.n_nodes(),
                 1e3 * mesh.mesh_size
             );

@@ -268,8 +268,9 @@ impl Figures {
         let t = &self.tissue;
         if t.behind_share > MOST_BEHIND {
             failures.push(format!(
-                "in {:.1} % of the steps with contact the tissue was behind the tool, since zones or meshes came too late: forces there \
-                 are wrong; run less beside it, move more slowly, or make the mesh coarser with [mesh] near_tool",
+                "in {:.1} % of the steps with contact the tissue was behind the tool, because zones or meshes came too \
+                 late: the forces of these steps are wrong; close other programs, move more slowly, or make the mesh \
+                 coarser with [mesh] near_tool",
                 100.0 * t.behind_share
             ));
         }
@@ -296,7 +297,8 @@ impl Figures {
         for d in &self.devices {
             if d.max_force_n == 0.0 {
                 failures.push(
-                    "nothing was felt: the tool never touched the skin, or the run ended before"
+                    "nothing was felt: the tool did not touch the skin during the run; check [motion] in the scene, or \
+                     run longer with --seconds"
                         .to_owned(),
                 );
             }
@@ -304,8 +306,8 @@ impl Figures {
             // change the force by 0.02 N everywhere.
             if d.arrival_alone_max_n > MOST_ARRIVAL {
                 failures.push(format!(
-                    "force changes by {:.4} N more than by the device's own displacement where a patch arrives, which is more \
-                     than {MOST_ARRIVAL}",
+                    "when a patch arrives, the force changes by {:.4} N beyond the change that the device's \
+                     displacement causes; {MOST_ARRIVAL} N are allowed",
                     d.arrival_alone_max_n
                 ));
             }
@@ -324,7 +326,7 @@ impl Figures {
             }
             if d.energy_deficit_mj > d.energy_budget_mj {
                 failures.push(format!(
-                    "{:.2} mJ given out beyond what was taken in, more than {:.2}",
+                    "the loop gave out {:.2} mJ more energy than it took in; {:.2} mJ are allowed",
                     d.energy_deficit_mj, d.energy_budget_mj
                 ));
             }
@@ -429,7 +431,7 @@ impl ForceFigures {
             String::new(),
         );
         row(
-            "the most given out beyond that",
+            "largest excess of energy given out",
             joules(self.energy_deficit_mj),
             joules(self.energy_budget_mj),
         );

@@ -65,7 +65,8 @@ pub(super) fn say_layers(
     context.say(table)?;
     if let Some(worst) = &grown.worst_thinning {
         context.say(format!(
-            "layers thinned under {:.1} % of the skin's area, for want of room; most at ({}) mm, to {:.0} % of their thickness",
+            "layers are thinner than asked under {:.1} % of the skin's area, because there is too little room; worst at \
+             ({}) mm: {:.0} % of the thickness",
             100.0 * grown.thinned_share,
             in_mm(worst.at.into()),
             100.0 * worst.value
@@ -73,7 +74,8 @@ pub(super) fn say_layers(
     }
     if let (Some(spread), Some(worst)) = (&grown.stand_off, &grown.worst_stand_off) {
         context.say(format!(
-            "rigid core stands off the bone by {:.1} mm (median; 95 % below {:.1}), most {:.1} mm under ({}) mm",
+            "distance of the rigid core from the bone: median {:.1} mm, 95 % below {:.1} mm, largest {:.1} mm under the \
+             skin at ({}) mm",
             spread.median * 1e3,
             spread.p95 * 1e3,
             worst.value * 1e3,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
-use super::{Fault, Parsed, fault};
+use super::{Fault, Parsed, fault, missing};
 
 /// Extensions that store the triangles in another form. Other extensions concern materials, lights
 /// and the like, or need no more than the code here (such as `KHR_mesh_quantization` with its
@@ -175,14 +175,14 @@ impl Document {
         let scene = self
             .scenes
             .get(index)
-            .ok_or_else(|| fault(format!("scene {index} is named but not there")))?;
+            .ok_or_else(|| missing("scene", index))?;
         Ok(scene.nodes.clone())
     }
 
     pub(super) fn accessor(&self, index: usize) -> Result<&Accessor, Fault> {
         self.accessors
             .get(index)
-            .ok_or_else(|| fault(format!("accessor {index} is named but not there")))
+            .ok_or_else(|| missing("accessor", index))
     }
 }
 

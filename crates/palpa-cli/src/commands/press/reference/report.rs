@@ -157,13 +157,14 @@ pub(super) fn conclude(
             .map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
     ))?;
     context.say(format!(
-        "{}. Bars have Poisson's ratio ¼ whatever the tissue's, and no time: speed and hold set the clock only.",
+        "{}. Bars always have Poisson's ratio ¼, and their forces do not depend on time: speed and hold change only the \
+         times in the table.",
         r.material_status
     ))?;
     if let Some(depth) = r.inverted_from_mm {
         context.say(format!(
-            "from {depth:.2} mm on prisms are TURNED OVER: bars have no volume, and a soft layer is pressed through \
-             itself. Take the force up to there only"
+            "from a depth of {depth:.2} mm on, prisms are TURNED INSIDE OUT: bars have no volume, so nothing stops a \
+             soft layer from turning inside out. Use the force only up to this depth"
         ))?;
     }
     if let Some(left) = r
@@ -171,7 +172,8 @@ pub(super) fn conclude(
         .filter(|f| f.abs() > 0.02 * r.max_force_n)
     {
         context.say(format!(
-            "back at the start {left:.3} N are left: the drift of a force summed along the path, nothing that tissue does"
+            "back at the start, {left:.3} N remain: the method sums the force along the path, and the sum drifts; \
+             tissue does not do this"
         ))?;
     }
     if r.outcome == BarOutcome::Diverged {

@@ -244,7 +244,7 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
 fn say_forces(job: &Job<'_>, r: &PressResult) -> anyhow::Result<()> {
     if let Some(name) = &r.gives_most {
         job.context.say(format!(
-            "under the tool \"{name}\" gives most; along the press the layers hand on {}",
+            "under the tool, the thickness of \"{name}\" changes most; force that each layer passes on along the press: {}",
             (r.layers.iter())
                 .map(|layer| format!("{:.3} N below {}", layer.force_below_n, layer.name))
                 .collect::<Vec<_>>()
