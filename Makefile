@@ -4,7 +4,7 @@
 # make test-slow  tests of minutes, with optimisation: forces while moving, faults, verification by formula
 # make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
 # make hunt       property tests with fresh seeds and fuzz targets, for HUNT_MINUTES=20
-# make lint       format, clippy; licences, spelling and unused dependencies where their tools are installed
+# make lint       format, clippy, the fuzz targets compile; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation without a warning, the book of docs/, and all links checked
 # make cross      cargo check for Windows and for Linux on ARM, with the standard library that can be had here
 # make loop       a minute of the 1 kHz loop in real time, and the same minute run again
@@ -79,6 +79,7 @@ $(VENV)/ready: tools/requirements.txt
 lint:
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --all-features -- --deny warnings
+	cargo check --manifest-path fuzz/Cargo.toml --target-dir "$(TARGET)"
 	$(call with,cargo-deny,cargo deny check bans licenses sources)
 	$(call with,cargo-machete,cargo machete)
 	$(call with,typos,typos)

@@ -367,7 +367,7 @@ export interface components {
              */
             near_lumps?: string;
             /**
-             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the radius that the tool presses on, at most a third of its edge's radius, 0.5 mm to 10 mm, and 4/3 of that in real time; nothing under a node.
+             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the contact radius, at most a third of the edge radius, limited to 0.5 mm to 10 mm; in real time 4/3 of that. A node has no default.
              * @example 1.5 mm
              */
             near_tool?: string;
