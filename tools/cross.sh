@@ -3,7 +3,7 @@
 #
 # The standard library of a target is taken from rustup; where rustup does not have it, it is checked from source: that of
 # the toolchain, or that of Debian's rustc-web and rust-web-src, unpacked below target/ and not installed. A check needs no linker
-# and no C compiler. The exit code is 1 if a target cannot be had, or does not compile.
+# and no C compiler. The exit code is 3 if a target cannot be had, and another one if a crate does not compile.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 read -ra targets <<<"${TARGETS:-x86_64-pc-windows-gnu aarch64-unknown-linux-gnu}"
@@ -77,7 +77,7 @@ if [ ${#from_source[@]} -gt 0 ]; then
     rustup target add${from_source[*]//--target/}
 or its source with
     rustup component add rust-src" >&2
-        exit 1
+        exit 3
     fi
 fi
 echo "cross: good: ${targets[*]}"
