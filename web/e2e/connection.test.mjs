@@ -114,8 +114,12 @@ test('of two pages one is in control, and a click hands it over', async () => {
   await first.page.keyboard.press('Escape');
 
   await second.page.bringToFront();
-  await second.by('take-control').click();
-  await until('the second controls', async () => (await who(second)) === 'you');
+  await until('the second controls', async () => {
+    if ((await who(second)) === 'you') return true;
+    await second.by('take-control').click();
+    // A starved page may lose its connection, and the request with it. The page says so, and one clicks again.
+    return until('the click counts', async () => (await who(second)) === 'you', 20_000).catch(() => false);
+  });
   await until('the first watches', async () => (await who(first)) === 'other');
   await pressByKeys(second);
 });
