@@ -1,3 +1,7 @@
 //! Integration tests of the library.
 
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+#![expect(clippy::float_cmp, reason = "what is exact is compared exactly")]
+
 mod notes;
+mod record;

@@ -39,13 +39,8 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     context.begin_recording();
     remove_older(out.path())?;
     let recorded = record(job, &indentation)?;
-    let result = result_of(
-        &indentation,
-        &recorded,
-        &materials,
-        context.is_interrupted(),
-    );
-    let notes: Vec<String> = (indentation.notes.iter().chain(&result.notes))
+    let result = result_of(&recorded, &materials, context.is_interrupted());
+    let notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
         .map(Note::to_string)
         .collect();
     let report = PressReport {

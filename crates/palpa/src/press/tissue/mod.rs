@@ -1,6 +1,8 @@
 //! The scripted indentation with the continuum model.
 
 mod notes;
+mod record;
+mod result;
 mod run;
 mod sample;
 
@@ -10,6 +12,8 @@ use palpa_fem::{Dynamics, Model, PosedTool, SolveParams, State, Workspace};
 
 use self::notes::note_friction;
 pub(crate) use self::notes::{note_mesh, note_tension};
+pub use self::record::{Deepest, Record, TurnedPrisms};
+pub use self::result::{LargestErrors, LayerResult, RunResult};
 pub use self::run::Run;
 use self::run::{Acting, Earlier};
 pub use self::sample::{Failure, Sample, SampleOutcome};

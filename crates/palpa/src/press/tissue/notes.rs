@@ -1,9 +1,10 @@
-//! Notes on settings that are known to make a press less accurate.
+//! Notes on settings that are known to make a press less accurate, and on the samples of a press.
 
 use palpa_fem::Model;
 use palpa_mesh::LayeredBody;
 use palpa_scene::{CutFaces, Scene};
 
+use super::{Record, Sample};
 use crate::note::Note;
 use crate::press::mesh::PressedBody;
 use crate::press::n_steps;
@@ -69,4 +70,56 @@ pub(crate) fn note_friction(scene: &Scene, notes: &mut Vec<Note>) {
             enough: longest,
         });
     }
+}
+
+impl Record<'_> {
+    /// Notes on the samples. Those on the scene and its mesh are in [`Indentation::notes`].
+    ///
+    /// [`Indentation::notes`]: super::Indentation::notes
+    pub fn notes(&self) -> Vec<Note> {
+        let good = self.converged();
+        let mut notes: Vec<Note> = (self.failures.iter())
+            .map(|failure| Note::StepFailed {
+                speed: failure.speed_mm_s * 1e-3,
+                depth: failure.depth_mm * 1e-3,
+                outcome: failure.outcome,
+            })
+            .collect();
+        if let Some(turned) = &self.deepest.turned {
+            notes.push(Note::TurnedPrisms {
+                n: turned.n,
+                depth: self.deepest.depth_mm * 1e-3,
+                at: turned.at.into(),
+            });
+        }
+        notes.extend(note_smoothing(&good));
+        if !self.indentation.is_bonded() {
+            notes.extend(note_touching(&good, self.indentation.mesh().mesh_size));
+        }
+        notes
+    }
+}
+
+/// A note if friction was smoothed in any of these samples.
+fn note_smoothing(samples: &[&Sample]) -> Option<Note> {
+    let slips = || samples.iter().map(|s| s.friction_smoothing_um);
+    let n = slips().filter(|&slip| slip > 0.0).count();
+    (n > 0).then(|| Note::FrictionSmoothed {
+        n,
+        n_all: samples.len(),
+        slip: slips().fold(0.0, f64::max) * 1e-6,
+    })
+}
+
+/// A note if the largest contact of these samples is small for the skin's edges, of length `edge`
+/// (m).
+fn note_touching(samples: &[&Sample], edge: f64) -> Option<Note> {
+    let widest =
+        (samples.iter()).max_by(|a, b| a.contact_area_mm2.total_cmp(&b.contact_area_mm2))?;
+    let radius = (widest.contact_area_mm2 * 1e-6 / std::f64::consts::PI).sqrt();
+    (radius < FEWEST_EDGES * edge).then_some(Note::FewTouching {
+        n_vertices: widest.n_touching,
+        radius,
+        edge,
+    })
 }

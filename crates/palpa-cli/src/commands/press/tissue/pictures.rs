@@ -8,25 +8,22 @@ use palpa_mesh::{Surface, Vec3};
 use palpa_scene::{Scene, Tool};
 
 use super::super::{Job, cut};
-use super::record::Recorded;
 use super::result::PressResult;
 use palpa::build::in_mm;
 use palpa::press::Phase;
 use palpa::press::lump::Embedded;
-use palpa::press::tissue::{Indentation, Sample};
+use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa_plot::section::{Panel, Plane, Shades, ToolOutline, cut_body, draw};
 use palpa_plot::{Axis, Chart, PALETTE, Picture, Series};
 
 pub(super) fn draw_pictures(
     job: &Job<'_>,
     indentation: &Indentation,
-    recorded: &Recorded,
+    recorded: &Record<'_>,
     result: &PressResult,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let out = job.out;
-    let samples: Vec<&Sample> = (recorded.samples.iter())
-        .filter(|s| s.outcome.is_converged())
-        .collect();
+    let samples = recorded.converged();
     let subtitle = format!(
         "{}; skin edges {:.1} mm near it; {}",
         job.scene.tool,
@@ -56,7 +53,11 @@ pub(super) fn draw_pictures(
 
 /// The body cut through the press point, at rest and at the deepest sample: its layers and lumps,
 /// and its stress.
-fn sections(job: &Job<'_>, indentation: &Indentation, recorded: &Recorded) -> Option<[Picture; 2]> {
+fn sections(
+    job: &Job<'_>,
+    indentation: &Indentation,
+    recorded: &Record<'_>,
+) -> Option<[Picture; 2]> {
     let body = &indentation.mesh().body;
     let place = indentation.place();
     let deepest = &recorded.deepest;

@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::super::Job;
 use super::super::words::{say_layers, status_word};
-use super::result::{PressResult, RunResult};
+use super::result::PressResult;
 use crate::table::Table;
 use palpa::build::in_mm;
 use palpa::press::Phase;
-use palpa::press::tissue::{Indentation, Sample};
+use palpa::press::tissue::{Indentation, RunResult, Sample};
 
 /// Content of press.json and of the `--json` output.
 #[derive(Debug, Serialize)]
