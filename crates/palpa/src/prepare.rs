@@ -17,7 +17,7 @@ use palpa_fem::{
 };
 use palpa_mesh::growth::MAX_NODES;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
-use palpa_scene::{Scene, Tool};
+use palpa_scene::{ContactTool, Scene};
 
 use crate::build::{BuiltBody, build_within};
 use crate::continuum;
@@ -197,25 +197,22 @@ impl Prepared {
         Ok(state)
     }
 
-    /// The tool's straight way down to the place; `None` if the tool is bonded to the skin. `rest`
-    /// is the body's state at rest; it is needed only if a layer has tension.
+    /// The straight way of the scene's tool, or of another one, down to the place. `rest` is the
+    /// body's state at rest; it is needed only if a layer has tension.
     ///
     /// # Errors
     /// When the sizes of the tool do not give a valid shape.
-    pub fn approach(&self, rest: Option<&State>) -> anyhow::Result<Option<Approach>> {
-        let Tool::Contact(given) = &self.scene.tool else {
-            return Ok(None);
-        };
+    pub fn approach(&self, tool: &ContactTool, rest: Option<&State>) -> anyhow::Result<Approach> {
         let place = self.place();
         let direction = place.direction.into_inner();
-        let (tool, pose) = continuum::tool(given, direction, place.at)?;
+        let (tool, pose) = continuum::tool(tool, direction, place.at)?;
         let touch = first_touch(&self.mesh.body, rest, &tool, &pose, place);
-        Ok(Some(Approach {
+        Ok(Approach {
             tool,
             pose,
             direction,
             touch,
-        }))
+        })
     }
 }
 

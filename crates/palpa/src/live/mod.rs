@@ -31,7 +31,7 @@ use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
 use palpa_mesh::{SurfaceIndex, Vec3};
-use palpa_scene::{Scene, Tool};
+use palpa_scene::Scene;
 use palpa_servo::Pose;
 
 use crate::build::{build_within, in_mm, nearest};
@@ -84,21 +84,21 @@ impl LiveScene {
     /// # Errors
     /// When the scene does not fit together, or its tool is bonded to the skin.
     pub fn build(scene: &Scene) -> anyhow::Result<Self> {
-        if !matches!(scene.tool, Tool::Contact(_)) {
+        let Some(tool) = scene.tool.contact() else {
             bail!(
                 "in real time the tool presses by contact, and the scene's is a {}; give [tool] a shape such as \"sphere\", \
                  \"flat-punch\" or \"fingertip\"",
                 scene.tool
             );
-        }
-        let scene = &coarser(scene);
-        let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
+        };
         let moves = scene.mesh.moves;
         if moves && !scene.mesh.refine {
             bail!(
                 "[mesh] moves = true needs refine = true: with refine = false there is no fine mesh to move"
             );
         }
+        let scene = &coarser(scene);
+        let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
         let way = if moves { Vec::new() } else { way(scene) };
         let prepared = Arc::new(Prepared::on(scene, grown, &way)?);
         // The body's state when the loop begins. Without tension it is the undeformed mesh, so
@@ -108,9 +108,7 @@ impl LiveScene {
         } else {
             None
         };
-        let Some(approach) = prepared.approach(rest.as_ref())? else {
-            bail!("the tool is bonded to the skin");
-        };
+        let approach = prepared.approach(tool, rest.as_ref())?;
         let posed = approach.at(-scene.motion.above);
         let start = hand::beginning(scene, &posed.pose);
         let meshes = if moves {

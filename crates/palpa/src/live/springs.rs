@@ -11,6 +11,7 @@ use std::sync::Arc;
 use super::{MOST_NODES, Watch};
 use crate::build::{BuiltBody, build_within, nearest};
 use crate::continuum;
+use crate::note::Note;
 use crate::press::{Place, reference};
 
 /// Coefficient of friction between tip and node: so high that the node hardly slips.
@@ -30,6 +31,9 @@ pub struct SpringScene {
     /// Pose of the device's frame in the scene: z points out of the tissue where the scene presses,
     /// and the origin lies above the skin.
     pub scene_from_device: Pose,
+    /// Remarks for the user on the place and the cut faces; those on the growth of the body are in
+    /// [`BuiltBody::notes`].
+    pub notes: Vec<Note>,
 }
 
 /// The body with one of its nodes operated.
@@ -53,7 +57,9 @@ impl SpringScene {
         reference::check_reference(scene)?;
         let built = Arc::new(build_within(scene, MOST_NODES)?);
         let body = &built.growth.body;
-        let place = Place::find(scene, body, built.press_vertex, &mut Vec::new())?;
+        let mut notes = Vec::new();
+        let place = Place::find(scene, body, built.press_vertex, &mut notes)?;
+        reference::note_cut_faces(scene, body, &mut notes);
         let point = ContactTool {
             shape: ContactShape::Sphere { radius: POINT },
             friction: 0.0,
@@ -65,6 +71,7 @@ impl SpringScene {
             reach: body.skin.mean_edge_length(),
             scene: Arc::new(scene.clone()),
             built,
+            notes,
         })
     }
 
@@ -90,8 +97,7 @@ impl SpringScene {
     fn held(&self, vertex: usize) -> anyhow::Result<Held> {
         let body = self.body();
         let node = body.node(vertex, 0);
-        let mut notes = Vec::new();
-        let constraints = reference::constraints(&self.scene, body, vec![node], &mut notes);
+        let constraints = reference::constraints(&self.scene, body, vec![node]);
         let params = reference::spring_params(&self.scene);
         let model = SpringModel::build(body, &params, &constraints)?;
         let params = reference::step_params(&self.scene, &model);

@@ -136,10 +136,11 @@ impl BarIndentation {
         if scene.press.speeds.len() > 1 {
             notes.push(Note::FirstSpeedOnly);
         }
+        note_cut_faces(scene, body, &mut notes);
         let model = SpringModel::build(
             body,
             &spring_params(scene),
-            &constraints(scene, body, operated, &mut notes),
+            &constraints(scene, body, operated),
         )?;
         let params = step_params(scene, &model);
         Ok(Self {
@@ -308,28 +309,19 @@ pub(crate) fn step_params(scene: &Scene, model: &SpringModel) -> StepParams {
 
 /// The constraints: the base is fixed, the tool holds `operated`, and cut faces are held as the
 /// scene says.
-pub(crate) fn constraints(
-    scene: &Scene,
-    body: &LayeredBody,
-    operated: Vec<usize>,
-    notes: &mut Vec<Note>,
-) -> Constraints {
+pub(crate) fn constraints(scene: &Scene, body: &LayeredBody, operated: Vec<usize>) -> Constraints {
     let mut constraints = Constraints::hold(body, operated);
     let nodes = |v: u32| (0..body.n_levels).map(move |l| body.node(v as usize, l));
     for face in &body.cut_faces {
         let rim = face.vertices.iter().copied();
         match scene.body.cut_faces {
-            CutFaces::Free => {}
             CutFaces::Symmetric if face.is_flat => {
                 constraints
                     .symmetric
                     .extend(rim.flat_map(nodes).map(|node| (node, face.normal)));
             }
-            CutFaces::Symmetric => {
-                notes.push(Note::CutFaceNotFlat {
-                    at: xyz(face.point),
-                });
-            }
+            // A face that is not flat stays free; `note_cut_faces` says so.
+            CutFaces::Free | CutFaces::Symmetric => {}
             // Nodes that the tool holds stay held by the tool.
             CutFaces::Fixed => {
                 let held = &constraints.operated;
@@ -341,6 +333,16 @@ pub(crate) fn constraints(
     constraints.fixed.sort_unstable();
     constraints.fixed.dedup();
     constraints
+}
+
+/// Adds a note for each cut face that should be a plane of symmetry and is not flat.
+pub(crate) fn note_cut_faces(scene: &Scene, body: &LayeredBody, notes: &mut Vec<Note>) {
+    if scene.body.cut_faces == CutFaces::Symmetric {
+        let bent = body.cut_faces.iter().filter(|face| !face.is_flat);
+        notes.extend(bent.map(|face| Note::CutFaceNotFlat {
+            at: xyz(face.point),
+        }));
+    }
 }
 
 /// Skin nodes within `radius` of the tool's axis, on the pressed side, and connected with the

@@ -3,5 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 #![expect(clippy::float_cmp, reason = "what is exact is compared exactly")]
 
+mod live;
 mod notes;
 mod record;

@@ -251,8 +251,8 @@ fn borders(interval_layer: &[usize]) -> Vec<usize> {
 }
 
 fn grip(prepared: &Prepared, rest: &State) -> anyhow::Result<Grip> {
-    if let Some(approach) = prepared.approach(Some(rest))? {
-        return Ok(Grip::Contact(approach));
+    if let Some(tool) = prepared.scene.tool.contact() {
+        return Ok(Grip::Contact(prepared.approach(tool, Some(rest))?));
     }
     let mesh = &prepared.mesh;
     Ok(match &mesh.patch {
