@@ -13,7 +13,7 @@ use palpa::build::in_mm;
 use palpa::press::Place;
 use palpa::press::mesh::PressedBody;
 use palpa::{Note, Prepared};
-use palpa_lab::export::{self, Deck, Export, Section};
+use palpa_lab::export::{self, Deck, DeckNote, Export, Section};
 
 /// Write a scene as an input deck for CalculiX, to check its forces with another solver
 ///
@@ -107,7 +107,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         title: &title,
     })?;
     let mut notes: Vec<String> = prepared.notes.iter().map(Note::to_string).collect();
-    notes.extend(deck.notes.iter().cloned());
+    notes.extend(deck.notes.iter().map(DeckNote::to_string));
     out.write_with("body.inp", |w| deck.write(w))?;
     let report = Report {
         scene: &scene_name,

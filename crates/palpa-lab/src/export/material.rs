@@ -7,6 +7,8 @@
 use anyhow::bail;
 use palpa_fem::law::{Law, Material, OgdenTerm, Volumetric, Yeoh};
 
+use super::{DeckNote, Departure};
+
 /// Largest number of terms of Ogden's energy that CalculiX accepts.
 const MOST_OGDEN_TERMS: usize = 3;
 /// Value of `D2` or `D3` that makes its term vanish.
@@ -29,22 +31,23 @@ pub(super) struct Card {
 pub(super) fn card(
     number: usize,
     material: &Material,
-    departures: &mut Vec<String>,
-    notes: &mut Vec<String>,
+    departures: &mut Vec<Departure>,
+    notes: &mut Vec<DeckNote>,
 ) -> anyhow::Result<Card> {
     let name = &material.name;
     if material.prestress > 0.0 {
-        departures.push(format!(
-            "the tension at rest of layer \"{name}\" is left out"
-        ));
+        departures.push(Departure::Tension {
+            layer: name.clone(),
+            prestress: material.prestress,
+        });
     }
     // CalculiX has only time-independent laws for hyperelastic solids, so the card describes the
     // fully relaxed material, as in a very slow press.
     let (mut shear_scale, mut bulk_scale) = (1.0, 1.0);
     if let Some(prony) = &material.prony {
-        notes.push(format!(
-            "tissue \"{name}\" relaxes; the deck has it at rest, as pressed very slowly"
-        ));
+        notes.push(DeckNote::Relaxed {
+            tissue: name.clone(),
+        });
         shear_scale = prony.long_term();
         if prony.relaxes_volume() {
             bulk_scale = shear_scale;
@@ -56,9 +59,9 @@ pub(super) fn card(
         material.law.volumetric_energy(),
         Volumetric::Logarithmic { .. }
     ) {
-        departures.push(format!(
-            "tissue \"{name}\" has K/2 (ln J)² for its volume, and the deck K/2 (J − 1)²"
-        ));
+        departures.push(Departure::Volume {
+            tissue: name.clone(),
+        });
     }
     let volumetric = material.law.volumetric_energy();
     let (keyword, numbers) = match &material.law {
@@ -78,19 +81,20 @@ pub(super) fn card(
         }
         Law::Yeoh(law) => yeoh(law, to_mpa, bulk),
         Law::Fung(law) => {
-            departures.push(format!(
-                "tissue \"{name}\" has Fung's exponential, and the deck the first three terms of its series"
-            ));
+            departures.push(Departure::Fung {
+                tissue: name.clone(),
+                b: law.b(),
+            });
             // μ/(2b) (exp(b x) − 1) = μ/2 (x + b x²/2 + b² x³/6 + …)
             let (c10, b) = (0.5 * material.law.shear_modulus(), law.b());
             let law = Yeoh::new([c10, c10 * b / 2.0, c10 * b * b / 6.0], *volumetric)?;
             yeoh(&law, to_mpa, bulk)
         }
         Law::Gent(law) => {
-            departures.push(format!(
-                "tissue \"{name}\" has Gent's logarithm with its limit of stretch, and the deck the first three terms of \
-                 its series, without limit"
-            ));
+            departures.push(Departure::Gent {
+                tissue: name.clone(),
+                limit: law.limit(),
+            });
             // −μ Jm/2 ln(1 − x/Jm) = μ/2 (x + x²/(2 Jm) + x³/(3 Jm²) + …)
             let (c10, jm) = (0.5 * material.law.shear_modulus(), law.limit());
             let law = Yeoh::new([c10, c10 / (2.0 * jm), c10 / (3.0 * jm * jm)], *volumetric)?;

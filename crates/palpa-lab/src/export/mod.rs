@@ -11,10 +11,12 @@
 
 mod material;
 mod mesh;
+mod note;
 mod results;
 mod sets;
 mod write;
 
+pub use note::{DeckNote, Departure};
 pub use results::{PatchForce, patch_forces};
 
 use std::io;
@@ -74,7 +76,7 @@ pub struct Deck<'a> {
     sets: Sets,
     is_linear: bool,
     /// Notes for the user: departures of the deck, and other facts about it.
-    pub notes: Vec<String>,
+    pub notes: Vec<DeckNote>,
 }
 
 /// A material of the deck and its elements.
@@ -115,18 +117,20 @@ impl<'a> Deck<'a> {
         if !departures.is_empty() && !export.is_approximate {
             bail!(
                 "CalculiX cannot represent all of this scene: {}. With --approximate, Palpa writes the nearest and notes it in the deck",
-                departures.join("; ")
+                (departures
+                    .iter()
+                    .map(Departure::to_string)
+                    .collect::<Vec<_>>())
+                .join("; ")
             );
         }
-        notes.extend(departures);
+        notes.extend(departures.into_iter().map(DeckNote::Departure));
         let mesh = DeckMesh::build(export);
         for lump in export.lumps {
             if !mesh.material.contains(&lump.material()) {
-                notes.push(format!(
-                    "a lump of tissue \"{}\" holds the middle of no prism, so the deck is without it; make levels and skin finer \
-                     there",
-                    export.materials[lump.material()].name
-                ));
+                notes.push(DeckNote::LumpMissing {
+                    tissue: export.materials[lump.material()].name.clone(),
+                });
             }
         }
         let sets = Sets::build(export, &mesh);
