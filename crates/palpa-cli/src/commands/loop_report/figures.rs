@@ -4,43 +4,34 @@ use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus, Tick
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
+use super::guarantees::{MOST_ARRIVAL, MOST_RMS};
 use crate::cli::Context;
 use crate::table::Table;
 use palpa::live::{GOOD_TRAVEL, LiveScene};
 
-/// Guarantee of the project: largest thread-CPU time of a tick, s.
-const MOST_TICK: f64 = 200e-6;
-/// Guarantee of the project: largest change of force where a patch arrives, N.
-const MOST_ARRIVAL: f64 = 0.02;
-/// Guarantee of the project: largest RMS of the force between 20 and 400 Hz, hand still, N.
-const MOST_RMS: f64 = 0.02;
-/// Largest share of the steps with contact in which the tissue may be behind the tool.
-const MOST_BEHIND: f64 = 0.01;
-/// Largest share of ticks without a force because the tissue was late: as many as one hiccup of the
-/// machine causes.
-const MOST_STALE: f64 = 1e-3;
 /// The hand counts as still if the tool moves no farther than the first value, m, within the last
 /// seconds, second value, s.
 const STILL: [f64; 2] = [0.5e-3, 2.0];
 
 /// Content of loop.json.
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(Default))]
 pub(super) struct Figures {
     seconds: f64,
-    nodes: usize,
+    pub(super) nodes: usize,
     mesh_size_mm: f64,
     zone_radius_mm: f64,
     ticks: u64,
     /// Ticks skipped because the previous one was too late.
     misses: u64,
-    tick_cpu_us: Times,
+    pub(super) tick_cpu_us: Times,
     wake_up_lateness_us: Times,
     #[serde(skip)]
     pub(super) cpu_histogram: Vec<(f64, f64, u64)>,
     #[serde(skip)]
     pub(super) lateness_histogram: Vec<(f64, f64, u64)>,
-    tissue: TissueFigures,
-    devices: Vec<ForceFigures>,
+    pub(super) tissue: TissueFigures,
+    pub(super) devices: Vec<ForceFigures>,
     /// Number of ticks with each fault.
     faults: Vec<(String, u64)>,
     /// Number of ticks with each limit.
@@ -56,11 +47,12 @@ pub(super) struct Figures {
 
 /// Quantiles in microseconds.
 #[derive(Debug, Clone, Copy, Serialize)]
-struct Times {
+#[cfg_attr(test, derive(Default))]
+pub(super) struct Times {
     mean: f64,
     p50: f64,
     p99: f64,
-    p999: f64,
+    pub(super) p999: f64,
     max: f64,
 }
 
@@ -78,26 +70,27 @@ impl From<Quantiles> for Times {
 }
 
 #[derive(Debug, Serialize)]
-struct TissueFigures {
-    steps: u64,
-    steps_per_s: f64,
+#[cfg_attr(test, derive(Default))]
+pub(super) struct TissueFigures {
+    pub(super) steps: u64,
+    pub(super) steps_per_s: f64,
     /// Largest speed of the tool at which the force keeps its accuracy: steps are short enough, and
     /// zones arrive in time.
     fastest_tool_mm_per_s: f64,
     /// Largest such speed by the steps alone.
-    fastest_by_steps_mm_per_s: f64,
+    pub(super) fastest_by_steps_mm_per_s: f64,
     /// Speed of the hand.
-    motion_mm_per_s: f64,
+    pub(super) motion_mm_per_s: f64,
     step_cpu_us: Times,
     step_wall_us: Times,
-    held_back: u64,
+    pub(super) held_back: u64,
     unfinished: u64,
     /// Number of steps that did not reach the tool.
     behind: u64,
     /// Share of the steps with contact that did not reach the tool.
-    behind_share: f64,
+    pub(super) behind_share: f64,
     /// Share of the ticks without a force because the tissue was late.
-    stale_share: f64,
+    pub(super) stale_share: f64,
     jobs: u64,
     job_cpu_us: Times,
     /// Wall time from the request of a zone until it is taken over, ms: 90th percentile.
@@ -109,26 +102,27 @@ struct TissueFigures {
 }
 
 #[derive(Debug, Serialize)]
-struct ForceFigures {
-    max_force_n: f64,
+#[cfg_attr(test, derive(Default))]
+pub(super) struct ForceFigures {
+    pub(super) max_force_n: f64,
     /// RMS of the force between 20 and 400 Hz over the last 2 s; `None` if the tool was not still
     /// then.
-    rms_still_n: Option<f64>,
+    pub(super) rms_still_n: Option<f64>,
     rms_worst_n: f64,
-    arrival_max_n: f64,
+    pub(super) arrival_max_n: f64,
     arrival_p999_n: f64,
     /// Largest change of force where a patch arrives, beyond the change that the device's own
     /// displacement causes through the tissue's stiffness.
-    arrival_alone_max_n: f64,
-    other_p999_n: f64,
+    pub(super) arrival_alone_max_n: f64,
+    pub(super) other_p999_n: f64,
     other_max_n: f64,
     /// Energy taken from the hand, as counted by the law.
     energy_in_mj: f64,
     /// Energy given to the hand, as counted by the law.
     energy_out_mj: f64,
     /// Largest energy given out beyond the energy taken in, since the last fault.
-    energy_deficit_mj: f64,
-    energy_budget_mj: f64,
+    pub(super) energy_deficit_mj: f64,
+    pub(super) energy_budget_mj: f64,
     softening_max: f64,
 }
 
@@ -255,89 +249,6 @@ impl Figures {
         }
     }
 
-    /// The violated guarantees. Lateness of the machine itself does not count.
-    fn failures(&self) -> Vec<String> {
-        let mut failures = Vec::new();
-        if self.tick_cpu_us.p999 > MOST_TICK * 1e6 {
-            failures.push(format!(
-                "p99.9 of a tick's CPU time is {:.0} µs, more than {:.0}",
-                self.tick_cpu_us.p999,
-                MOST_TICK * 1e6
-            ));
-        }
-        let t = &self.tissue;
-        if t.behind_share > MOST_BEHIND {
-            failures.push(format!(
-                "in {:.1} % of the steps with contact the tissue was behind the tool, because zones or meshes came too \
-                 late: the forces of these steps are wrong; close other programs, move more slowly, or make the mesh \
-                 coarser with [mesh] near_tool",
-                100.0 * t.behind_share
-            ));
-        }
-        if t.stale_share > MOST_STALE {
-            failures.push(format!(
-                "{:.1} % of the ticks had no force, since no fresh patch came ({} steps failed, {:.0} steps/s on {} nodes)",
-                100.0 * t.stale_share, t.held_back, t.steps_per_s, self.nodes
-            ));
-        }
-        if t.held_back as f64 > MOST_BEHIND * t.steps as f64 {
-            failures.push(format!(
-                "{} of {} steps of the tissue failed and were not felt; press less deep, or make the mesh finer there",
-                t.held_back, t.steps
-            ));
-        }
-        // Zones that arrive too late are reported above.
-        if t.motion_mm_per_s > t.fastest_by_steps_mm_per_s {
-            failures.push(format!(
-                "the hand goes at {:.0} mm/s, and steps are short enough for {:.0} mm/s: move more slowly, or make the \
-                 mesh coarser with [mesh] near_tool",
-                t.motion_mm_per_s, t.fastest_by_steps_mm_per_s
-            ));
-        }
-        for d in &self.devices {
-            if d.max_force_n == 0.0 {
-                failures.push(
-                    "nothing was felt: the tool did not touch the skin during the run; check [motion] in the scene, or \
-                     run longer with --seconds"
-                        .to_owned(),
-                );
-            }
-            // The change caused by the device itself is excluded: steps of 45 µm from tick to tick
-            // change the force by 0.02 N everywhere.
-            if d.arrival_alone_max_n > MOST_ARRIVAL {
-                failures.push(format!(
-                    "when a patch arrives, the force changes by {:.4} N beyond the change that the device's \
-                     displacement causes; {MOST_ARRIVAL} N are allowed",
-                    d.arrival_alone_max_n
-                ));
-            }
-            if d.arrival_max_n > 2.0 * d.other_p999_n {
-                failures.push(format!(
-                    "force changes by {:.4} N where a patch arrives, more than twice the p99.9 of other ticks, {:.4}",
-                    d.arrival_max_n, d.other_p999_n
-                ));
-            }
-            if let Some(rms) = d.rms_still_n
-                && rms > MOST_RMS
-            {
-                failures.push(format!(
-                    "force between 20 and 400 Hz is {rms:.4} N with the hand still, more than {MOST_RMS}"
-                ));
-            }
-            if d.energy_deficit_mj > d.energy_budget_mj {
-                failures.push(format!(
-                    "the loop gave out {:.2} mJ more energy than it took in; {:.2} mJ are allowed",
-                    d.energy_deficit_mj, d.energy_budget_mj
-                ));
-            }
-        }
-        failures
-    }
-
-    pub(super) fn is_good(&self) -> bool {
-        self.failures().is_empty()
-    }
-
     pub(super) fn say(&self, context: &Context) -> anyhow::Result<()> {
         let mut table = Table::new(["", "p50", "p99", "p99.9", "max"]).with_left_names();
         for (name, t) in [
@@ -392,14 +303,16 @@ impl Figures {
             context.say(thread)?;
         }
         context.say(format!("memory {}", self.memory))?;
-        for failure in self.failures() {
-            context.say(format!("NOT GOOD: {failure}"))?;
-        }
         Ok(())
     }
 }
 
 impl ForceFigures {
+    /// Largest change of force that a patch may bring, N.
+    pub(super) fn most_arrival_n(&self) -> f64 {
+        2.0 * self.other_p999_n
+    }
+
     fn table(&self) -> Table<3> {
         let mut table = Table::new(["force", "found", "allowed"]).with_left_names();
         let mut row = |name: &str, found: String, allowed: String| {
@@ -416,7 +329,7 @@ impl ForceFigures {
         row(
             "largest change where a patch arrives",
             newtons(self.arrival_max_n),
-            newtons(2.0 * self.other_p999_n),
+            newtons(self.most_arrival_n()),
         );
         row(
             "the same without the device's displacement",

@@ -1,6 +1,7 @@
 //! `palpa loop-report`: runs the whole engine in real time and reports on it.
 
 mod figures;
+mod guarantees;
 mod picture;
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
 use palpa_scene::Scene;
 
 use self::figures::Figures;
+use self::guarantees::broken;
 use super::Outcome;
 use crate::cli::Context;
 use palpa::live::{LiveScene, notes_of, open_device, path, servo_params};
@@ -110,11 +112,15 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     );
     write(&figures, &log, &scene, &subtitle, out)?;
     figures.say(context)?;
+    let broken = broken(&figures);
+    for guarantee in &broken {
+        context.say(format!("NOT GOOD: {guarantee}"))?;
+    }
     context.say(format!("written to {}", out.path().display()))?;
     context.json(&figures)?;
     Ok(if context.is_interrupted() {
         Outcome::Interrupted
-    } else if figures.is_good() {
+    } else if broken.is_empty() {
         Outcome::Done
     } else {
         Outcome::NotGood
