@@ -11,31 +11,41 @@
 //! use std::sync::Arc;
 //!
 //! use palpa::Prepared;
-//! use palpa::press::tissue::Indentation;
+//! use palpa::press::tissue::{Indentation, Record};
 //! use palpa::scene::Scene;
 //!
-//! let text = r#"
-//!     [body]
-//!     generator = { kind = "block", size = ["40 mm", "40 mm", "16 mm"], spacing = "10 mm" }
-//!     [[layer]]
-//!     tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
-//!     [tool]
-//!     shape = "sphere"
-//!     radius = "8 mm"
-//!     [press]
-//!     depth = "2 mm"
-//!     step = "1 mm"
-//! "#;
-//! let scene = Scene::parse(text, Path::new("."))?;
-//! let press = Indentation::build(Arc::new(Prepared::build(&scene)?))?;
-//! let mut run = press.start(0);
-//! let mut forces = Vec::new();
-//! while let Some(sample) = run.advance() {
-//!     assert!(sample.outcome.is_converged());
-//!     forces.push([sample.depth_mm, sample.force_n]);
+//! fn main() -> anyhow::Result<()> {
+//!     let text = r#"
+//!         [body]
+//!         generator = { kind = "block", size = ["40 mm", "40 mm", "16 mm"], spacing = "10 mm" }
+//!         [[layer]]
+//!         tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
+//!         [tool]
+//!         shape = "sphere"
+//!         radius = "8 mm"
+//!         [press]
+//!         depth = "2 mm"
+//!         step = "1 mm"
+//!     "#;
+//!     let scene = Scene::parse(text, Path::new("."))?; // or Scene::load("limb.toml".as_ref())?
+//!     let press = Indentation::build(Arc::new(Prepared::build(&scene)?))?;
+//!     let mut record = Record::new(&press);
+//!     let mut run = press.start(0); // the first speed
+//!     while let Some(sample) = run.advance() {
+//!         // A step that fails is the last. Its sample repeats the forces of the sample before.
+//!         if sample.outcome.is_converged() {
+//!             println!("{} mm, {} N", sample.depth_mm, sample.force_n);
+//!         }
+//!         record.push(&run, sample);
+//!     }
+//!     for note in press.notes.iter().chain(&record.notes()) {
+//!         println!("note: {note}");
+//!     }
+//!     assert!(record.outcome().is_converged());
+//!     let first = &record.runs()[0];
+//!     assert!(first.at_depth_mm == 2.0 && first.max_force_n > 0.05);
+//!     Ok(())
 //! }
-//! assert!(forces[2][0] == 2.0 && forces[2][1] > 0.05);
-//! # Ok::<(), anyhow::Error>(())
 //! ```
 
 pub mod build;
@@ -56,3 +66,8 @@ pub use palpa_scene as scene;
 pub use palpa_servo as servo;
 pub use palpa_springs as springs;
 pub use prepare::{Approach, PrepareParams, Prepared};
+
+// The example of the README is compiled and run as well.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
