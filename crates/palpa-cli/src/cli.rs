@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
-use clap::Parser;
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use palpa::one_paragraph;
 
 use crate::commands::{Command, Outcome};
@@ -52,8 +52,11 @@ pub struct Options {
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(report_bug));
-    let cli = Cli::parse();
-    let context = Context::new(cli.options, cli.command.name());
+    let mut matches = Cli::command().get_matches();
+    let name = matches.subcommand_name().unwrap_or_default().to_owned();
+    let cli = Cli::from_arg_matches_mut(&mut matches)
+        .unwrap_or_else(|error| error.format(&mut Cli::command()).exit());
+    let context = Context::new(cli.options, name);
     if let Err(error) = context.watch_interrupts() {
         print_error(&error);
         return ExitCode::from(2);

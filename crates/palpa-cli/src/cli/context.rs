@@ -23,7 +23,7 @@ use palpa_plot::output::OutDir;
 pub struct Context {
     is_json: bool,
     out: Option<PathBuf>,
-    command: &'static str,
+    command: String,
     opened: OnceLock<OutDir>,
     interrupted: Arc<AtomicBool>,
     is_recording: Arc<AtomicBool>,
@@ -31,7 +31,7 @@ pub struct Context {
 
 impl Context {
     /// Context of the command named `command`; its default output folder is `out/<command>`.
-    pub fn new(options: Options, command: &'static str) -> Self {
+    pub fn new(options: Options, command: String) -> Self {
         Self {
             is_json: options.json,
             out: options.out,
@@ -63,7 +63,7 @@ impl Context {
         }
         let path = match &self.out {
             Some(path) => path.clone(),
-            None => Path::new("out").join(self.command),
+            None => Path::new("out").join(&self.command),
         };
         let dir = OutDir::create(path)?;
         Ok(self.opened.get_or_init(|| dir))

@@ -2,8 +2,7 @@
 //!
 //! A command module has `pub struct Args` (derives [`clap::Args`]; its doc comments are the help
 //! text) and `pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome>`. To add one:
-//! write the module, and name it below once in [`Command`], once in [`Command::name`] and once in
-//! [`Command::run`].
+//! write the module, and name it below once in [`Command`] and once in [`Command::run`].
 
 use clap::Subcommand;
 
@@ -50,23 +49,6 @@ pub enum Command {
 }
 
 impl Command {
-    /// The word on the command line, which also names the default output folder.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Bench(_) => "bench",
-            Self::Check(_) => "check",
-            Self::Export(_) => "export",
-            Self::LoopReport(_) => "loop-report",
-            Self::Press(_) => "press",
-            Self::Replay(_) => "replay",
-            Self::Reproduce(_) => "reproduce",
-            Self::Schema(_) => "schema",
-            Self::Verify(_) => "verify",
-            Self::View(_) => "view",
-            Self::ZWidth(_) => "z-width",
-        }
-    }
-
     /// Runs the command.
     ///
     /// # Errors
