@@ -1,6 +1,9 @@
 //! The continuum model: tissue as a nonlinear, nearly incompressible, viscoelastic solid on layered
 //! prisms.
 
+#[macro_use]
+mod one_of;
+
 mod assembly;
 mod columns;
 mod dynamics;

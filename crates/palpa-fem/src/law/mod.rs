@@ -1,11 +1,19 @@
 //! Material laws.
 //!
-//! To add a law: a file here with its energy (`fung.rs` is a short example); its name in the lists
-//! of this file (`mod`, `pub use`, [`Law`], `of_each!`, `law_from!`) and in `every_law` of
-//! `tests/it/law.rs`, which runs all tests of laws over it. Then it can be used from Rust. For
-//! scenes: its parameters in `palpa-scene/src/law.rs`, an arm in `palpa/src/continuum.rs` and one
-//! in `palpa-lab/src/export/material.rs`, its menu entry in `web/src/ui`, and a row in
-//! `docs/theory/laws.md`.
+//! To add a law:
+//!
+//! 1. A file here with its energy (`fung.rs` is a short example), and its name in `mod`, `pub use`
+//!    and [`Law`]. Without `Described::hardening` all works, but slower while the mesh moves: the
+//!    step then evaluates the law one pair at a time.
+//! 2. Tests: the lists `every_law` of `tests/it/law.rs`, `laws` of `element/tests.rs` and `cases` of
+//!    `realtime/tests.rs`, which run all tests of laws over it; its closed forms in
+//!    `tests/it/law/closed_forms.rs`. Now it can be used from Rust.
+//! 3. For scenes: `palpa-scene/src/law.rs` (the compiler asks for the rest there), and a parameter
+//!    that no law has yet in `PARAMETERS`, with its count, of `parameters.rs`; then an arm in
+//!    `palpa/src/continuum.rs` and one in `palpa-lab/src/export/material.rs`.
+//! 4. For the page: bless and generate (`CONTRIBUTING.md` has the commands), then its entry in
+//!    `web/src/ui/tissue.ts` and its name in `web/src/i18n`, for which the compiler asks.
+//! 5. A row in `docs/theory/laws.md`, and the count of laws in `README.md`.
 //!
 //! A law is the sum of a *deviatoric* energy density, which the element evaluates at its points,
 //! and a *volumetric* one, which it evaluates once at the mean volume change of a pair of prisms,
@@ -131,55 +139,42 @@ impl Response {
 const ZERO3: nalgebra::ArrayStorage<f64, 3, 3> = nalgebra::ArrayStorage([[0.0; 3]; 3]);
 const ZERO9: nalgebra::ArrayStorage<f64, 9, 9> = nalgebra::ArrayStorage([[0.0; 9]; 9]);
 
-/// An elastic law with its parameters.
-///
-/// Every method is pure and allocates nothing. No deformation gradient, however bad, gives a NaN:
-/// where a law does not exist the energy is infinite and its derivatives are zero.
-///
-/// ```
-/// use palpa_fem::Mat3;
-/// use palpa_fem::law::{Law, NeoHookean};
-///
-/// let law = Law::from(NeoHookean::from_young(30e3, 0.45)?);
-/// let stretched = Mat3::new(1.1, 0.0, 0.0, 0.0, 0.95, 0.0, 0.0, 0.0, 0.95);
-/// assert!(law.cauchy_stress(&stretched)[(0, 0)] > 0.0);
-/// assert_eq!(law.energy(&Mat3::identity()), 0.0);
-/// # Ok::<(), palpa_fem::law::LawError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// Hooke's law at small strain.
-    Linear(Linear),
-    /// Hooke's law in the Green–Lagrange strain.
-    StVenantKirchhoff(StVenantKirchhoff),
-    /// One shear modulus.
-    NeoHookean(NeoHookean),
-    /// Both isochoric invariants.
-    MooneyRivlin(MooneyRivlin),
-    /// A cubic in the first isochoric invariant.
-    Yeoh(Yeoh),
-    /// Powers of the isochoric stretches.
-    Ogden(Ogden),
-    /// An exponential in the first isochoric invariant.
-    Fung(Fung),
-    /// A logarithm in the first isochoric invariant, with a limit of stretch.
-    Gent(Gent),
-}
-
-/// `expression` with `$law` bound to the parameters of whichever law it is.
-macro_rules! of_each {
-    ($self:expr, $law:ident => $expression:expr) => {
-        match $self {
-            Law::Linear($law) => $expression,
-            Law::StVenantKirchhoff($law) => $expression,
-            Law::NeoHookean($law) => $expression,
-            Law::MooneyRivlin($law) => $expression,
-            Law::Yeoh($law) => $expression,
-            Law::Ogden($law) => $expression,
-            Law::Fung($law) => $expression,
-            Law::Gent($law) => $expression,
-        }
-    };
+one_of! {
+    ($) of_each!
+    /// An elastic law with its parameters.
+    ///
+    /// Every method is pure and allocates nothing. No deformation gradient, however bad, gives a NaN:
+    /// where a law does not exist the energy is infinite and its derivatives are zero.
+    ///
+    /// ```
+    /// use palpa_fem::Mat3;
+    /// use palpa_fem::law::{Law, NeoHookean};
+    ///
+    /// let law = Law::from(NeoHookean::from_young(30e3, 0.45)?);
+    /// let stretched = Mat3::new(1.1, 0.0, 0.0, 0.0, 0.95, 0.0, 0.0, 0.0, 0.95);
+    /// assert!(law.cauchy_stress(&stretched)[(0, 0)] > 0.0);
+    /// assert_eq!(law.energy(&Mat3::identity()), 0.0);
+    /// # Ok::<(), palpa_fem::law::LawError>(())
+    /// ```
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub enum Law {
+        /// Hooke's law at small strain.
+        Linear,
+        /// Hooke's law in the Green–Lagrange strain.
+        StVenantKirchhoff,
+        /// One shear modulus.
+        NeoHookean,
+        /// Both isochoric invariants.
+        MooneyRivlin,
+        /// A cubic in the first isochoric invariant.
+        Yeoh,
+        /// Powers of the isochoric stretches.
+        Ogden,
+        /// An exponential in the first isochoric invariant.
+        Fung,
+        /// A logarithm in the first isochoric invariant, with a limit of stretch.
+        Gent,
+    }
 }
 
 impl Law {
@@ -192,21 +187,7 @@ impl Law {
             Volumetric::Logarithmic { .. } => None,
         }
     }
-}
 
-macro_rules! law_from {
-    ($($law:ident)*) => { $(
-        impl From<$law> for Law {
-            fn from(law: $law) -> Self {
-                Self::$law(law)
-            }
-        }
-    )* };
-}
-
-law_from!(Linear StVenantKirchhoff NeoHookean MooneyRivlin Yeoh Ogden Fung Gent);
-
-impl Law {
     /// `W_d(F)`, in J/m³; infinite for `det F ≤ 0` (but not of the linear law, which knows no
     /// inversion).
     #[inline]

@@ -1,11 +1,18 @@
 //! Rigid shapes with exact distance: tools that press, and lumps in the tissue.
 //!
-//! To add a shape: a file here with its `RigidShape` (`flat_punch.rs` is an example); its name in
-//! the lists of this file (`mod`, `pub use`, [`Shape`], `of_each!`, `from_shape!`) and in `cases`
-//! of `tests/it/shape.rs`, which runs all tests of shapes over it. Then it can be used from Rust.
-//! For scenes: its sizes in `palpa-scene/src/shape.rs`, an arm of `tool_shape` in
-//! `palpa/src/continuum.rs`, its drawing and menu entry in `web/src/scene`, and a word in
-//! `docs/theory/contact.md`.
+//! To add a shape:
+//!
+//! 1. A file here with its `RigidShape` (`flat_punch.rs` is an example), and its name in `mod`,
+//!    `pub use` and [`Shape`].
+//! 2. Tests: `cases` of `tests/it/shape.rs`, which runs all tests of shapes over it; a case of
+//!    `palpa verify` (`palpa-lab/src/verify`) where the force is known exactly. Now it can be used
+//!    from Rust.
+//! 3. For scenes: `palpa-scene/src/shape.rs`, where the compiler asks for the rest; a size that no
+//!    shape has yet in `file/tool.rs` and in `check_keys` of `resolve/tool.rs`. Then an arm of
+//!    `tool_shape` in `palpa/src/continuum.rs`.
+//! 4. For the page: bless and generate (`CONTRIBUTING.md` has the commands), then its entry in
+//!    `web/src/scene/toolshapes.ts` and its name in `web/src/i18n`, for which the compiler asks.
+//! 5. The table of tools in `docs/scenes.md`, and a word in `docs/theory/contact.md`.
 //!
 //! A shape stands in a frame of its own. Its origin is the *tip*, the point that touches first when
 //! the shape moves along −z; z points out of the tissue:
@@ -67,21 +74,24 @@ pub struct Distance {
     pub curvature: Mat3,
 }
 
-/// A shape that is pressed into tissue. Lengths in metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// A ball.
-    Sphere(Sphere),
-    /// A round punch with a flat face.
-    FlatPunch(FlatPunch),
-    /// A lying cylinder with round ends.
-    Capsule(Capsule),
-    /// A box with rounded edges.
-    RoundedBox(RoundedBox),
-    /// An ellipsoid, such as the pad of a finger.
-    Ellipsoid(Ellipsoid),
-    /// A cone with a rounded tip.
-    Cone(Cone),
+one_of! {
+    ($) of_each!
+    /// A shape that is pressed into tissue. Lengths in metres.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub enum Shape {
+        /// A ball.
+        Sphere,
+        /// A round punch with a flat face.
+        FlatPunch,
+        /// A lying cylinder with round ends.
+        Capsule,
+        /// A box with rounded edges.
+        RoundedBox,
+        /// An ellipsoid, such as the pad of a finger.
+        Ellipsoid,
+        /// A cone with a rounded tip.
+        Cone,
+    }
 }
 
 /// Why a shape is refused.
@@ -162,20 +172,6 @@ trait RigidShape {
     fn footprint_radius(&self) -> f64;
 }
 
-/// `expression` with `$shape` bound to whichever shape it is.
-macro_rules! of_each {
-    ($self:expr, $shape:ident => $expression:expr) => {
-        match $self {
-            Shape::Sphere($shape) => $expression,
-            Shape::FlatPunch($shape) => $expression,
-            Shape::Capsule($shape) => $expression,
-            Shape::RoundedBox($shape) => $expression,
-            Shape::Ellipsoid($shape) => $expression,
-            Shape::Cone($shape) => $expression,
-        }
-    };
-}
-
 impl Shape {
     /// The distance of the point `p_local`, in the shape's frame.
     ///
@@ -214,17 +210,6 @@ impl Shape {
         of_each!(self, shape => shape.name())
     }
 }
-
-macro_rules! from_shape {
-    ($($name:ident),*) => {$(
-        impl From<$name> for Shape {
-            fn from(shape: $name) -> Self {
-                Self::$name(shape)
-            }
-        }
-    )*};
-}
-from_shape!(Sphere, FlatPunch, Capsule, RoundedBox, Ellipsoid, Cone);
 
 /// `value`, if a shape can have this size.
 fn checked(shape: &'static str, what: &'static str, value: f64) -> Result<f64, ShapeError> {
