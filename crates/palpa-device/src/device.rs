@@ -1,13 +1,16 @@
 //! The trait of a haptic device. To add a device:
 //!
-//! 1. Write a file in `src/` with its type and its `impl` of [`HapticDevice`]; `scripted.rs` is the
-//!    shortest one.
+//! 1. Write a file in `src/` with its type and its `impl` of [`HapticDevice`] (`scripted.rs` is the
+//!    shortest one), with its `mod` and `pub use` in `lib.rs`.
 //! 2. Add a variant to [`Driver`](crate::Driver) in `open.rs`; the compiler then points to the
 //!    place that must open it.
-//! 3. Add a test in `tests/it/`, named like the file: readings, limits, and the [`DeviceFault`]
-//!    when the device is gone.
-//! 4. If scene files must be able to name the device, add a variant of the scene's `DeviceKind`,
-//!    which callers match to a `Driver`.
+//! 3. Add a test in `tests/it/`, named like the file, with its `mod` in `tests/it/main.rs`:
+//!    readings, limits, and the [`DeviceFault`] when the device is gone.
+//! 4. If scene files must be able to name the device, add a variant of the scene's `DeviceKind`
+//!    (`palpa-scene/src/motion.rs`); `open_device` in `palpa/src/live/hand.rs` gives it its
+//!    `Driver`. Then bless and generate; `CONTRIBUTING.md` has the commands.
+//! 5. Its figures, such as the limits of its force, are a [`DeviceModel`](crate::DeviceModel):
+//!    `model.rs` says how to add one.
 //!
 //! Nothing else changes: the loop, the recorder and the replay know the trait only.
 

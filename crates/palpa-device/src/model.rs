@@ -1,13 +1,22 @@
 //! Figures of haptic devices: mass, friction, sensor, delays and limits.
 //!
-//! To add a device, write a constant of [`DeviceModel`] with the source of each figure in its doc
-//! comment, and a line in [`DeviceModel::ALL`].
+//! To add a device:
+//!
+//! 1. A constant of [`DeviceModel`] with the source of each figure in its doc comment, and a line in
+//!    [`DeviceModel::ALL`]. Now it can be used from Rust, and `palpa z-width` tests it.
+//! 2. For scenes: a variant of `DevicePreset` in `palpa-scene/src/motion.rs`, and its arm of
+//!    `device_model` in `palpa/src/live/hand.rs`.
+//! 3. For the page: bless and generate (`CONTRIBUTING.md` has the commands), then its name,
+//!    `preset.…`, in `web/src/i18n/en.ts` and `ja.ts`.
+//! 4. Its name and its wall in `docs/realtime.md`.
 
 use palpa_servo::DeviceSpec;
 
 /// The mechanics and the electronics of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceModel {
+    /// Its name for people.
+    pub title: &'static str,
     /// Moving mass at the hand-piece, kg.
     pub mass: f64,
     /// Viscous friction, N s/m.
@@ -34,6 +43,7 @@ impl DeviceModel {
     /// 0.048 mm near the centre). The delay of 1 ms is the latency timer of its USB chip. The mass,
     /// 90 g, is the value that a public driver compensates. Friction is assumed.
     pub const FALCON: Self = Self {
+        title: "Novint Falcon",
         mass: 0.09,
         viscous: 0.5,
         dry: 0.15,
@@ -56,6 +66,7 @@ impl DeviceModel {
     /// 1.02 N/mm along its axes; the smallest is used. Viscous friction, delays and damping are
     /// assumed.
     pub const TOUCH: Self = Self {
+        title: "3D Systems Touch",
         mass: 0.045,
         viscous: 0.3,
         dry: 0.2,
@@ -78,6 +89,7 @@ impl DeviceModel {
     /// 3 kHz. No public figures were found for the rest; it is assumed from the device's kind
     /// (direct drive, low friction).
     pub const INVERSE3: Self = Self {
+        title: "Haply Inverse3",
         mass: 0.15,
         viscous: 0.2,
         dry: 0.05,
@@ -96,6 +108,7 @@ impl DeviceModel {
 
     /// A strong device without friction, sensor steps or delay.
     pub const IDEAL: Self = Self {
+        title: "ideal device",
         mass: 0.05,
         viscous: 0.0,
         dry: 0.0,

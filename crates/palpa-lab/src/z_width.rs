@@ -153,7 +153,7 @@ pub fn picture(rows: &[WallRow]) -> Picture {
                 Axis::linear("damping of the wall [N s/m]").with_zero(),
                 Axis::log("largest stable stiffness [N/m]").with_range(0.8 * low, 1.25 * high),
             )
-            .title(title(device));
+            .title(model.title);
             for has_observer in [false, true] {
                 for ((grip, _), color) in GRIPS.into_iter().zip(PALETTE) {
                     let points: Vec<[f64; 2]> = rows
@@ -185,14 +185,4 @@ pub fn picture(rows: &[WallRow]) -> Picture {
         &charts,
         2,
     )
-}
-
-/// Name of a device for people.
-fn title(device: &str) -> &'static str {
-    match device {
-        "falcon" => "Novint Falcon",
-        "touch" => "3D Systems Touch",
-        "inverse3" => "Haply Inverse3",
-        _ => "ideal device",
-    }
 }

@@ -2,7 +2,9 @@
 //!
 //! A command module has `pub struct Args` (derives [`clap::Args`]; its doc comments are the help
 //! text) and `pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome>`. To add one:
-//! write the module, and name it below once in [`Command`] and once in [`Command::run`].
+//! write the module, name it below in `pub mod`, [`Command`] and [`Command::run`], and in the list of
+//! commands in `README.md`. Its tests are a file of `tests/it`, with its `mod` in
+//! `tests/it/main.rs`.
 
 use clap::Subcommand;
 

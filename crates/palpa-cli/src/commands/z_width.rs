@@ -8,8 +8,6 @@ use super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
 
-/// Names of the devices.
-const DEVICES: [&str; 4] = ["falcon", "touch", "inverse3", "ideal"];
 /// Find the stable range of stiffness and damping of each simulated device
 ///
 /// In simulated time, each device in each grip presses 3 mm into a wall, a spring with a damper,
@@ -20,10 +18,10 @@ const DEVICES: [&str; 4] = ["falcon", "touch", "inverse3", "ideal"];
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Test only this device; may be repeated [default: all]
-    #[arg(long = "device", value_name = "NAME", value_parser = DEVICES)]
+    #[arg(long = "device", value_name = "NAME", value_parser = DeviceModel::ALL.map(|(name, _)| name))]
     devices: Vec<String>,
     /// Test only this grip; may be repeated [default: all]
-    #[arg(long = "grip", value_name = "NAME", value_parser = ["soft", "medium", "stiff"])]
+    #[arg(long = "grip", value_name = "NAME", value_parser = GRIPS.map(|(name, _)| name))]
     grips: Vec<String>,
 }
 
