@@ -1,5 +1,5 @@
-//! The test kit: a builder of scene files ([`Scene`]), and the command in a folder of its own
-//! ([`Bench`]).
+//! The test kit: a builder of scene files ([`Scene`]), the command in a folder of its own
+//! ([`Bench`]), and how many cases a property test draws ([`cases`]).
 //!
 //! It knows texts and processes alone, so that the tests of every crate can use it.
 //!
@@ -14,9 +14,12 @@
 //! ```
 
 mod bench;
+mod cases;
 mod scene;
 mod wait;
 
 pub use bench::{Bench, interrupt};
+
+pub use cases::cases;
 pub use scene::{Layer, Lump, Scene, Value};
 pub use wait::wait_for;

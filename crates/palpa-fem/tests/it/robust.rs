@@ -1,6 +1,8 @@
 //! Random scenes: each press converges, or says where and why not; none panics, hangs or answers
 //! with a NaN.
 
+use std::cell::Cell;
+
 use palpa_fem::law::{
     Fung, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm, Volumetric,
 };
@@ -12,6 +14,7 @@ use palpa_fem::{
 };
 use palpa_mesh::Vec3;
 use palpa_mesh::generate::{GradedBlock, GradedLayer, LevelStack, Outline, graded_block};
+use palpa_testkit::cases;
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
@@ -170,7 +173,8 @@ fn model(scene: &Scene) -> Model {
     .unwrap()
 }
 
-fn press(scene: &Scene) -> Result<(), TestCaseError> {
+/// Whether every step converged.
+fn press(scene: &Scene) -> Result<bool, TestCaseError> {
     let model = model(scene);
     let body = model.body();
     let mut state = State::new(&model);
@@ -260,21 +264,34 @@ fn press(scene: &Scene) -> Result<(), TestCaseError> {
                 // It says where, and the last good state is kept.
                 prop_assert!(at.iter().all(|x| x.is_finite() && x.abs() < 1.0), "{at:?}");
                 prop_assert_eq!(&state, &kept);
-                return Ok(());
+                return Ok(false);
             }
             Outcome::Singular => {
                 prop_assert_eq!(&state, &kept);
-                return Ok(());
+                return Ok(false);
             }
         }
     }
-    Ok(())
+    Ok(true)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, max_shrink_iters: 8, ..ProptestConfig::default() })]
-    #[test]
-    fn random_scenes_converge_or_say_why_not(scene in scenes()) {
-        press(&scene)?;
-    }
+#[test]
+fn random_scenes_mostly_converge_or_say_why_not() {
+    let n_scenes = cases(12);
+    let n_converged = Cell::new(0);
+    let config = ProptestConfig {
+        cases: n_scenes,
+        max_shrink_iters: 8,
+        ..ProptestConfig::default()
+    };
+    proptest!(config, |(scene in scenes())| {
+        let converged = press(&scene)?;
+        n_converged.set(n_converged.get() + u32::from(converged));
+    });
+    // Six seeds had 10 to 12 of 12.
+    assert!(
+        4 * n_converged.get() >= 3 * n_scenes,
+        "{} of {n_scenes} converged",
+        n_converged.get()
+    );
 }

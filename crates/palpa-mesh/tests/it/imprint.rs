@@ -8,6 +8,7 @@ use palpa_mesh::refine::{
     Circle, Imprint, ImprintError, RefineParams, imprint_circle, near_points, refine,
 };
 use palpa_mesh::{LayeredBody, Vec3};
+use palpa_testkit::cases;
 use proptest::prelude::*;
 
 use crate::refine::{flat, grown};
@@ -193,7 +194,7 @@ fn circles_that_cannot_be_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(ProptestConfig::with_cases(cases(60)))]
 
     #[test]
     fn circles_anywhere_are_imprinted(

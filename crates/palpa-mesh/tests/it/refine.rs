@@ -11,6 +11,7 @@ use palpa_mesh::refine::{
     split_levels,
 };
 use palpa_mesh::{GrowthParams, LayerSpec, LayeredBody, Surface, Vec3, grow};
+use palpa_testkit::cases;
 use proptest::prelude::*;
 
 use crate::sound::{assert_sound, smallest_angle, volume};
@@ -287,7 +288,7 @@ fn wishes_are_asked_for_once_a_triangle_whatever_the_size() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(cases(40)))]
 
     #[test]
     fn any_wishes_give_a_sound_body(

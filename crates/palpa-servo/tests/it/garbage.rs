@@ -2,6 +2,7 @@
 
 use crate::support::{HalfSpace, Loop, RADIUS, SPEC};
 use palpa_servo::{Candidate, ContactPatch, DeviceSpec, Mat3, ServoParams, Vec3};
+use palpa_testkit::cases;
 use proptest::prelude::*;
 
 fn wild() -> BoxedStrategy<f64> {
@@ -138,7 +139,7 @@ fn survive(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(cases(300)))]
 
     #[test]
     fn garbage_gives_finite_limited_forces(

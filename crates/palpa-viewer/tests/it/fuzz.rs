@@ -6,6 +6,7 @@ use crate::{
     session::Session,
 };
 use futures_util::{SinkExt, StreamExt};
+use palpa_testkit::cases;
 use palpa_viewer::{Server, control::Request};
 use proptest::{collection::vec, prelude::*};
 use serde_json::{Value, json};
@@ -92,7 +93,7 @@ async fn still_answers(server: &Server) {
 fn any_messages_on_a_socket() {
     let runtime = tokio::runtime::Runtime::new().unwrap();
     let (_session, server) = Session::start(None);
-    proptest!(ProptestConfig::with_cases(64), |(messages in vec(message(), 1..40), is_polite: bool)| {
+    proptest!(ProptestConfig::with_cases(cases(64)), |(messages in vec(message(), 1..40), is_polite: bool)| {
         runtime.block_on(async {
             let (mut socket, _) = connect_async(socket_url(server.address())).await.unwrap();
             for message in messages {
@@ -118,7 +119,7 @@ fn any_bytes_instead_of_http_and_of_frames() {
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
         server.address()
     );
-    proptest!(ProptestConfig::with_cases(64), |(bytes in vec(any::<u8>(), 0..400), is_socket: bool)| {
+    proptest!(ProptestConfig::with_cases(cases(64)), |(bytes in vec(any::<u8>(), 0..400), is_socket: bool)| {
         let mut stream = TcpStream::connect(server.address()).unwrap();
         // Only turns a hang into a failure.
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -144,7 +145,7 @@ fn any_body_of_a_request() {
         3 => nearly().prop_map(String::into_bytes),
         1 => vec(any::<u8>(), 0..400),
     ];
-    proptest!(ProptestConfig::with_cases(128), |(body in body)| {
+    proptest!(ProptestConfig::with_cases(cases(128)), |(body in body)| {
         let status = post(&server, &body).status;
         prop_assert!([200, 400, 409, 429].contains(&status), "{}", status);
     });

@@ -2,6 +2,7 @@
 
 use palpa_fem::law::Law;
 use palpa_fem::{Kinematics, Mat3, Mat9, VolumeMeasure};
+use palpa_testkit::cases;
 use proptest::prelude::*;
 
 use super::{Chance, assert_close, every_law};
@@ -309,7 +310,7 @@ fn any_matrix() -> impl Strategy<Value = Mat3> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(ProptestConfig::with_cases(cases(2000)))]
 
     #[test]
     fn no_deformation_gives_a_nan(f in any_matrix()) {
