@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -110,11 +110,12 @@ impl Bench {
     }
 }
 
-/// Sends a process what Ctrl-C sends.
+/// Sends a process what Ctrl-C sends. Windows has no command for it.
 ///
 /// # Panics
 /// When there is no such process.
-pub fn interrupt(process: &Child) {
+#[cfg(unix)]
+pub fn interrupt(process: &std::process::Child) {
     let kill = Command::new("kill")
         .args(["-INT", &process.id().to_string()])
         .status()

@@ -16,10 +16,13 @@
 mod bench;
 mod cases;
 mod scene;
+mod system;
 mod wait;
 
-pub use bench::{Bench, interrupt};
-
+pub use bench::Bench;
+#[cfg(unix)]
+pub use bench::interrupt;
 pub use cases::cases;
 pub use scene::{Layer, Lump, Scene, Value};
+pub use system::without_system_errors;
 pub use wait::wait_for;

@@ -2,9 +2,8 @@
 //! `loop-report` may end with 1.
 
 use std::fs;
-use std::process::Stdio;
 
-use palpa_testkit::{Bench, Layer, Scene, interrupt, wait_for};
+use palpa_testkit::{Bench, Layer, Scene};
 use serde_json::Value;
 
 use crate::palpa;
@@ -195,6 +194,8 @@ fn a_file_that_is_no_log_is_refused() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_a_run_and_keeps_its_log() {
+    use std::process::Stdio;
+
     let bench = palpa();
     bench.file("gel.toml", gel());
     let args = [
@@ -212,7 +213,7 @@ fn ctrl_c_ends_a_run_and_keeps_its_log() {
         .spawn()
         .unwrap();
     let log = bench.path("live/log.mcap");
-    wait_for("something is logged", || {
+    palpa_testkit::wait_for("something is logged", || {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it ended before it was interrupted"
@@ -220,7 +221,7 @@ fn ctrl_c_ends_a_run_and_keeps_its_log() {
         let size = fs::metadata(&log).map_or(0, |m| m.len());
         (size > 10_000).then_some(())
     });
-    interrupt(&child);
+    palpa_testkit::interrupt(&child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
     same_again(&bench);
 }

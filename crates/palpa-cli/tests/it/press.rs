@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
-use palpa_testkit::{Bench, Layer, Scene, Value as Toml, interrupt, wait_for};
+use palpa_testkit::{Bench, Layer, Scene, Value as Toml, without_system_errors};
 use serde_json::Value;
 
 use crate::palpa;
@@ -304,7 +304,7 @@ fn bad_input_is_refused_in_one_paragraph() {
     ] {
         messages.push(press.refusal(&args));
     }
-    insta::assert_snapshot!(messages.join("\n"));
+    insta::assert_snapshot!(without_system_errors(&messages.join("\n")));
 }
 
 #[test]
@@ -385,14 +385,14 @@ fn ctrl_c_during_a_press(model: &'static str, spacing: f64) {
         .spawn()
         .unwrap();
     let out = bench.path("out/press");
-    wait_for("the second frame of the series", || {
+    palpa_testkit::wait_for("the second frame of the series", || {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it ended before it was interrupted"
         );
         out.join("series/body_001.vtu").exists().then_some(())
     });
-    interrupt(&child);
+    palpa_testkit::interrupt(&child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(
         output.status.code(),

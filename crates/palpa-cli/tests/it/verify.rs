@@ -134,6 +134,7 @@ fn bad_input_is_refused_in_one_line() {
     ] {
         let (code, stdout, stderr) = bench.run(&[&["verify"], args].concat());
         assert_eq!((code, stdout.as_str()), (2, ""), "{args:?}");
+        let stderr = stderr.replace('\\', "/");
         assert!(stderr.contains(said), "{args:?}: {stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
     }

@@ -62,6 +62,7 @@ fn without_its_tables_a_case_says_what_it_needs() {
             reference: Some("no such folder".into()),
         };
         let error = case.run(&empty).unwrap_err().to_string();
+        let error = error.replace('\\', "/");
         assert!(error.contains("no such folder/"), "{}: {error}", case.name);
     }
     assert_eq!(n_cases, 11);

@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 
 use palpa_plot::output::OutDir;
+use palpa_testkit::without_system_errors;
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -101,7 +102,7 @@ fn a_folder_that_cannot_be_made_says_what_where_and_what_to_do() {
     let error = OutDir::create(file.join("out")).unwrap_err();
     let text = format!("{error:#}").replace(folder.path().to_str().unwrap(), "[folder]");
     insta::assert_snapshot!(
-        text,
-        @r#"cannot write results to "[folder]/file/out"; choose another folder with --out DIR: Not a directory (os error 20)"#
+        without_system_errors(&text).replace('\\', "/"),
+        @r#"cannot write results to "[folder]/file/out"; choose another folder with --out DIR: [system error]"#
     );
 }
