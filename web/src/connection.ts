@@ -10,7 +10,7 @@ type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K>
 
 export type ConnectionStatus = 'connecting' | 'open' | 'lost';
 
-export interface ConnectionListener {
+interface ConnectionListener {
   onStatus(status: ConnectionStatus): void;
   /** The engine refuses this page: the token is missing or wrong. */
   onRefused(): void;

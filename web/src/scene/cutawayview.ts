@@ -18,7 +18,7 @@ import type { Stage } from './stage';
 const GRIP_MARGIN = 24;
 
 /** What a section shows. */
-export interface Slice {
+interface Slice {
   cutaway: ViewOptions['cutaway'];
   values: SectionValues;
   /** Which layers are visible, from the skin down. */

@@ -5,7 +5,7 @@ import type { ColourBy } from './quantities';
 export type Vec3 = [number, number, number];
 
 /** Names for screen readers. */
-export interface ViewWords {
+interface ViewWords {
   canvas: string;
   plane: string;
 }

@@ -12,7 +12,7 @@ function svg<K extends keyof SVGElementTagNameMap>(name: K, attributes: Record<s
   return element;
 }
 
-export interface ScreenAxes {
+interface ScreenAxes {
   right: Vector3;
   up: Vector3;
   forward: Vector3;

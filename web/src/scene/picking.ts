@@ -45,7 +45,7 @@ function cast(ray: Ray, x: Float32Array, triangles: Uint32Array | number[], n: n
 }
 
 /** What a ray may meet besides the skin. */
-export interface Pickable {
+interface Pickable {
   section: { section: Section; plane: CutPlane } | null;
   bones: boolean;
   isKept: (p: Vector3) => boolean;

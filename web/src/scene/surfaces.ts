@@ -12,7 +12,7 @@ export interface LayerLook {
   visible: boolean;
 }
 
-export interface SurfacesLook {
+interface SurfacesLook {
   layers: LayerLook[];
   isMapped: boolean;
   /** Whether skin is shaded as skin, not in the plain colour of a legend. */

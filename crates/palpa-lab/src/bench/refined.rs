@@ -24,7 +24,7 @@ pub enum Problem {
 }
 
 /// Depths (m) and forces (N) of a pressed body on the refined mesh.
-pub type Curve = &'static [(f64, f64)];
+pub type ConvergedForces = &'static [(f64, f64)];
 
 impl Problem {
     /// All problems.
@@ -38,7 +38,7 @@ impl Problem {
 
     /// Forces (N) of the straight press at the depths of a ride, recorded from [`Self::compute`]
     /// (`palpa bench --refined`, on 9,000 to 11,000 nodes).
-    pub fn recorded(self) -> Curve {
+    pub fn recorded(self) -> ConvergedForces {
         match self {
             Self::Layers => &[
                 (2e-3, 0.18854),

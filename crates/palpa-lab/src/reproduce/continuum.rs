@@ -114,12 +114,12 @@ pub struct PressedDisc {
     /// Nodes that can move.
     pub nodes: usize,
     /// The bodies: uniform, hard middle, hard bottom.
-    pub bodies: Vec<PressedBody>,
+    pub bodies: Vec<DiscPress>,
 }
 
 /// One body, pressed as deep as possible.
 #[derive(Debug, Clone, Serialize)]
-pub struct PressedBody {
+pub struct DiscPress {
     /// The body.
     pub body: Body,
     /// Push and force on the disc, `[mm, N]`.
@@ -177,7 +177,7 @@ impl Continuum {
                 };
                 pressed_disc.nodes = model.n_free_nodes();
                 let uniform = pressed_disc.bodies.first();
-                let uniform = uniform.map_or(&pressed.curve, |u: &PressedBody| &u.curve);
+                let uniform = uniform.map_or(&pressed.curve, |u: &DiscPress| &u.curve);
                 let (stiffness_ratio, slope_ratio) = ratios(&pressed.curve, uniform);
                 pressed.felt_from_mm = FELT_RATIOS.map(|felt| felt_from(&stiffness_ratio, felt));
                 (pressed.stiffness_ratio, pressed.slope_ratio) = (stiffness_ratio, slope_ratio);
@@ -236,13 +236,13 @@ fn press(
     disc: &Disc,
     patch: &[usize],
     is_stopped: &mut impl FnMut() -> bool,
-) -> Option<PressedBody> {
+) -> Option<DiscPress> {
     let (mut state, mut ws) = (State::new(model), Workspace::new(model));
     let held = |mm: usize| -> Vec<(usize, Vec3)> {
         let down = Vec3::new(0.0, 0.0, -1e-3 * mm as f64);
         patch.iter().map(|&node| (node, down)).collect()
     };
-    let mut pressed = PressedBody {
+    let mut pressed = DiscPress {
         body,
         curve: vec![[0.0, 0.0]],
         ended_by: "the deepest push tried".into(),

@@ -67,7 +67,7 @@ pub fn readings() -> Vec<Reading> {
 }
 
 /// A force curve: depth and force, `[mm, N]`, starting at rest.
-pub type Curve = Vec<[f64; 2]>;
+pub type ForceCurve = Vec<[f64; 2]>;
 
 /// Pushes the held node straight down, one millimetre per step.
 ///
@@ -75,7 +75,7 @@ pub type Curve = Vec<[f64; 2]>;
 ///
 /// # Errors
 /// If the model cannot be built.
-pub fn curve(body: Body, reading: &Reading) -> Result<Curve, SpringError> {
+pub fn curve(body: Body, reading: &Reading) -> Result<ForceCurve, SpringError> {
     let shape = Shape {
         lateral_spacing: reading.lateral_spacing,
         ..Shape::thesis(reading.n)
@@ -107,22 +107,22 @@ pub fn curve(body: Body, reading: &Reading) -> Result<Curve, SpringError> {
 }
 
 /// The part of a curve down to a depth, or `None` if it ends before.
-fn down_to(curve: &Curve, depth_mm: usize) -> Option<&[[f64; 2]]> {
+fn down_to(curve: &ForceCurve, depth_mm: usize) -> Option<&[[f64; 2]]> {
     curve.get(..=depth_mm)
 }
 
 /// R² of the straight line down to a depth.
-pub fn r2(curve: &Curve, depth_mm: usize) -> Option<f64> {
+pub fn r2(curve: &ForceCurve, depth_mm: usize) -> Option<f64> {
     line(down_to(curve, depth_mm)?).map(|l| l.r2)
 }
 
 /// The knee down to a depth.
-pub fn knee_of(curve: &Curve, depth_mm: usize) -> Option<Knee> {
+pub fn knee_of(curve: &ForceCurve, depth_mm: usize) -> Option<Knee> {
     knee(down_to(curve, depth_mm)?)
 }
 
 /// Slope of each slice of [`SLICE_MM`], in N/mm.
-fn slopes(curve: &Curve) -> Vec<f64> {
+fn slopes(curve: &ForceCurve) -> Vec<f64> {
     curve
         .windows(SLICE_MM + 1)
         .step_by(SLICE_MM)
@@ -131,7 +131,7 @@ fn slopes(curve: &Curve) -> Vec<f64> {
 }
 
 /// Slope of a layered curve relative to the uniform one, slice by slice.
-pub fn slope_ratio(layered: &Curve, uniform: &Curve) -> Vec<f64> {
+pub fn slope_ratio(layered: &ForceCurve, uniform: &ForceCurve) -> Vec<f64> {
     let pairs = slopes(layered).into_iter().zip(slopes(uniform));
     pairs.map(|(l, u)| l / u).collect()
 }
@@ -142,7 +142,7 @@ pub struct Curves {
     /// The reading of these curves.
     pub reading: Reading,
     /// The curves: uniform, hard middle, hard bottom.
-    pub bodies: [Curve; 3],
+    pub bodies: [ForceCurve; 3],
 }
 
 impl Curves {
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_curve_that_ends_early_has_no_fit_beyond_its_end() {
-        let short: Curve = (0..=70).map(|i| [f64::from(i), f64::from(i)]).collect();
+        let short: ForceCurve = (0..=70).map(|i| [f64::from(i), f64::from(i)]).collect();
         assert!(r2(&short, 60).is_some());
         assert_eq!(r2(&short, 90), None);
         assert_eq!(slopes(&short).len(), 7);

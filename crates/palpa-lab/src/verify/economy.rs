@@ -27,7 +27,7 @@ const SPHERE_FROM: f64 = 2e-3;
 const SPHERE_START: f64 = 1e-3;
 
 /// First height (m) and growth of the levels of each layer.
-type Stack = &'static [(f64, f64)];
+type LevelHeights = &'static [(f64, f64)];
 
 /// A rung of the ladder: similar meshes and their tolerances.
 struct Rung {
@@ -42,14 +42,14 @@ struct Rung {
 /// The features that differ between the meshes of a rung.
 #[derive(Clone, Copy)]
 struct Variant {
-    levels: Stack,
+    levels: LevelHeights,
     /// Seed of an irregular mesh; `None` for a regular one.
     seed: Option<u64>,
     /// Offset of the tool from a vertex, in spacings.
     at: [f64; 2],
 }
 
-const fn regular(levels: Stack) -> Variant {
+const fn regular(levels: LevelHeights) -> Variant {
     Variant {
         levels,
         seed: None,
@@ -57,7 +57,7 @@ const fn regular(levels: Stack) -> Variant {
     }
 }
 
-const fn irregular(levels: Stack, seed: u64) -> Variant {
+const fn irregular(levels: LevelHeights, seed: u64) -> Variant {
     Variant {
         seed: Some(seed),
         ..regular(levels)
@@ -74,7 +74,7 @@ const fn beside(variant: Variant) -> Variant {
 }
 
 /// Levels of skin, fat and muscle.
-const LAYERED: [Stack; 3] = [
+const LAYERED: [LevelHeights; 3] = [
     &[(2e-3, 0.0), (1e-3, 0.3), (2.5e-3, 0.6)],
     &[(2e-3, 0.0), (1.2e-3, 0.25), (4e-3, 0.6)],
     &[(2e-3, 0.0), (0.65e-3, 0.25), (2.5e-3, 0.6)],
@@ -110,7 +110,7 @@ static DISC: [Rung; 3] = [
     },
 ];
 
-const HOMOGENEOUS: [Stack; 2] = [&[(1.5e-3, 0.5)], &[(0.8e-3, 0.35)]];
+const HOMOGENEOUS: [LevelHeights; 2] = [&[(1.5e-3, 0.5)], &[(0.8e-3, 0.35)]];
 
 static SPHERE: [Rung; 3] = [
     Rung {
@@ -288,7 +288,7 @@ pub(crate) fn run(options: &Options) -> Result<Findings, VerifyError> {
 mod tests {
     use super::*;
 
-    const COARSE: [Stack; 2] = [
+    const COARSE: [LevelHeights; 2] = [
         &[(2e-3, 0.0), (5e-3, 0.0), (28e-3, 0.0)],
         &[(2e-3, 0.0), (10e-3, 0.0), (28e-3, 0.0)],
     ];

@@ -19,12 +19,12 @@ const LEAST_RANGE: f64 = 2.0;
 const FAINT: f64 = 0.3;
 
 /// One curve of a study: errors on meshes, from coarse to fine.
-struct Curve<'a> {
+struct StudyCurve<'a> {
     name: &'a str,
     points: Vec<&'a StudyPoint>,
 }
 
-impl Curve<'_> {
+impl StudyCurve<'_> {
     /// Mesh sizes, numbers of nodes, and absolute errors.
     fn placed(&self) -> Vec<Placed> {
         (self.points.iter())
@@ -70,8 +70,8 @@ fn with_order(name: &str, points: &[Placed]) -> String {
 
 /// The largest error of the curves on each mesh and their root mean square; `None` if the curves
 /// use different meshes.
-fn summary(curves: &[Curve<'_>]) -> Option<[Vec<Placed>; 2]> {
-    let placed: Vec<Vec<Placed>> = curves.iter().map(Curve::placed).collect();
+fn summary(curves: &[StudyCurve<'_>]) -> Option<[Vec<Placed>; 2]> {
+    let placed: Vec<Vec<Placed>> = curves.iter().map(StudyCurve::placed).collect();
     let first = placed.first()?;
     let is_same = |other: &Vec<Placed>| {
         other.len() == first.len()
@@ -186,7 +186,7 @@ fn in_percent(points: &[Placed]) -> Vec<[f64; 2]> {
 }
 
 /// Common start of the names of all curves, up to the end of a phrase.
-fn common_start<'a>(curves: &[Curve<'a>]) -> &'a str {
+fn common_start<'a>(curves: &[StudyCurve<'a>]) -> &'a str {
     let Some(first) = curves.first().filter(|_| curves.len() > 1) else {
         return "";
     };
@@ -197,12 +197,12 @@ fn common_start<'a>(curves: &[Curve<'a>]) -> &'a str {
         .unwrap_or("")
 }
 
-fn curves<'a>(case: &str, found: &'a Findings) -> Vec<Curve<'a>> {
-    let mut curves: Vec<Curve<'a>> = Vec::new();
+fn curves<'a>(case: &str, found: &'a Findings) -> Vec<StudyCurve<'a>> {
+    let mut curves: Vec<StudyCurve<'a>> = Vec::new();
     for point in found.study.iter().filter(|p| p.case == case) {
         match curves.iter_mut().find(|c| c.name == point.series) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(Curve {
+            None => curves.push(StudyCurve {
                 name: &point.series,
                 points: vec![point],
             }),
@@ -216,7 +216,7 @@ fn curves<'a>(case: &str, found: &'a Findings) -> Vec<Curve<'a>> {
 
 /// The tolerances of the figures at the ends of the curves; those of the whole case if no curve
 /// ends in a figure.
-fn tolerances(case: &str, found: &Findings, curves: &[Curve<'_>]) -> Vec<f64> {
+fn tolerances(case: &str, found: &Findings, curves: &[StudyCurve<'_>]) -> Vec<f64> {
     let is_end = |error: f64| {
         let ends = curves.iter().filter_map(|c| c.points.last());
         ends.into_iter()

@@ -298,11 +298,6 @@ impl Tree {
         self.flops[half as usize]
     }
 
-    /// Number of entries in the factor of a half.
-    pub fn n_numbers(&self, half: Half) -> usize {
-        self.panels[half as usize]
-    }
-
     /// The first unknown of a column in vectors that are ordered by elimination.
     pub fn first_dof(&self, column: usize) -> usize {
         self.place[column] as usize * self.width
