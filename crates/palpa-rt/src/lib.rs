@@ -57,7 +57,11 @@
 //! - Loom runs all interleavings of the mailbox:
 //!   `RUSTFLAGS="--cfg loom" cargo test -p palpa-rt --release --lib --target-dir target/loom proof`
 //! - The real-time sanitizer watches the loop's body:
-//!   ```text RTSAN_ENABLE=1 RTSAN_LIB_PATH=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/lib/librustc-stable_rt.rtsan.a \ cargo test -p palpa-rt --features rtsan --target-dir target/rtsan --test it realtime ```
+//!   ```text
+//!   RTSAN_ENABLE=1 \
+//!   RTSAN_LIB_PATH=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/lib/librustc-stable_rt.rtsan.a \
+//!   cargo test -p palpa-rt --features rtsan --target-dir target/rtsan --test it realtime
+//!   ```
 //! - Ordinary tests run the loop's body under an allocator that aborts, and the mailbox under load.
 
 mod clock;
