@@ -22,7 +22,9 @@ impl Path {
     }
 }
 
-/// A random number from 0 to 1 by splitmix64 (Steele, Lea & Flood 2014).
+/// A random number from 0 to 1 by splitmix64 (Steele, Lea & Flood 2014). `palpa-mesh` has the same
+/// generator in `generate/random.rs`; neither crate depends on the other, and a library's may draw
+/// other numbers in its next version.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;

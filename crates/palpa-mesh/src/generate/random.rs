@@ -1,4 +1,8 @@
 //! Random numbers for irregular meshes, the same on every machine.
+//!
+//! The generator is written out here, and again in `palpa-device/src/path/tremor.rs`: a library's
+//! may draw other numbers in its next version, which would change recorded figures, and neither
+//! crate depends on the other.
 
 /// The generator `SplitMix64` (Steele, Lea & Flood 2014).
 #[derive(Debug)]
