@@ -1,4 +1,4 @@
-//! What the rest shape decides about an element: gradients and volumes at its points.
+//! Gradients and volumes at the points of an element, from its rest shape.
 //!
 //! All integrals of the element are exact with one point in the plane of a wedge and two over its
 //! thickness: volumes and gradient integrals of a six-node prism are linear in the plane and of

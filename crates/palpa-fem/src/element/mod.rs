@@ -47,8 +47,8 @@ pub(crate) struct Phase {
     pub(crate) volume: f64,
 }
 
-/// What stays constant during a step of a viscous or pre-stressed material, at every place of a
-/// group.
+/// Stress that stays constant during a step of a viscous or pre-stressed material, at every place
+/// of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Overstress {
     /// Second Piola–Kirchhoff stress that does not depend on the step's deformation, in Pa.

@@ -28,7 +28,7 @@ use crate::{Kinematics, Mat3, Mat9};
 
 type Vec9 = nalgebra::SVector<f64, 9>;
 
-/// What a material answers at a point: energy, stress and tangent, all times the point's volume.
+/// Response of a material at a point: energy, stress and tangent, all times the point's volume.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PointResponse {
     pub(crate) energy: f64,

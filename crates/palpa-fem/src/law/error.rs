@@ -1,4 +1,4 @@
-//! What can be wrong with the parameters of a material.
+//! Errors in the parameters of a material.
 
 /// The reason why the parameters of a material are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -11,7 +11,7 @@ pub enum LawError {
         owner: &'static str,
         /// The parameter in words.
         parameter: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
         /// Unit of the value; empty for a pure number.
         unit: &'static str,
@@ -23,7 +23,7 @@ pub enum LawError {
         owner: &'static str,
         /// The parameter in words.
         parameter: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
         /// Unit of the value; empty for a pure number.
         unit: &'static str,
@@ -36,7 +36,7 @@ pub enum LawError {
     Poisson {
         /// The law.
         owner: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// A share outside 0 to 1.
@@ -46,7 +46,7 @@ pub enum LawError {
         owner: &'static str,
         /// The parameter in words.
         parameter: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// A Yeoh law whose energy stops growing.
@@ -79,7 +79,7 @@ pub enum LawError {
     Exponent {
         /// The term, from 1.
         term: usize,
-        /// What was given.
+        /// The value given.
         value: f64,
         /// Smallest size.
         least: f64,

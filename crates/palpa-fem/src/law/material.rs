@@ -3,7 +3,7 @@
 use super::error::{check_not_negative, check_positive};
 use super::{Law, LawError, Prony};
 
-/// What a layer or a lump is made of.
+/// The material of a layer or a lump.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Its name in messages and reports, such as `fat`.

@@ -25,7 +25,7 @@ const NAME: &str = "Ogden";
 /// One term of an Ogden law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OgdenTerm {
-    /// What the term adds to the shear modulus, Pa; positive.
+    /// Share of the term in the shear modulus, Pa; positive.
     pub mu: f64,
     /// Exponent `α`; positive or negative.
     pub alpha: f64,

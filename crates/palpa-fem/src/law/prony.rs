@@ -151,7 +151,7 @@ impl Prony {
         sum.map(|part| part * self.instantaneous())
     }
 
-    /// What a step of the duration `dt` needs at every point. `dt = 0` is a sudden step, `dt = ∞`
+    /// Factors of a step of the duration `dt` (s), the same at every point. `dt = 0` is a sudden step, `dt = ∞`
     /// relaxes fully.
     ///
     /// # Panics

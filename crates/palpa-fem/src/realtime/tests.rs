@@ -102,7 +102,7 @@ fn cases() -> Vec<(&'static str, Materials)> {
     ]
 }
 
-/// What a body goes through.
+/// A strain of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Strain {
     /// Every prism in another way, by up to a third.

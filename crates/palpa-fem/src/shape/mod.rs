@@ -48,7 +48,7 @@ use palpa_mesh::Vec3;
 
 use crate::Mat3;
 
-/// What a size may be, in metres: below, rounding would show; above, nothing is pressed.
+/// Range of sizes, m: below, rounding would show; above, nothing is pressed.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-6..=10.0;
 
 /// Curvature radii smaller than this share of the shape count as this: a sharp edge would bend the
@@ -205,7 +205,7 @@ impl Shape {
         of_each!(self, shape => shape.footprint_radius())
     }
 
-    /// What the shape is called, such as `flat punch`.
+    /// Name of the shape, such as `flat punch`.
     pub fn name(&self) -> &'static str {
         of_each!(self, shape => shape.name())
     }

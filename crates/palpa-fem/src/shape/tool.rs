@@ -7,7 +7,7 @@ use super::{Distance, Shape, ShapeError};
 /// Where a rigid thing stands: turns and shifts points of its own frame into the world's.
 pub type Pose = nalgebra::Isometry3<f64>;
 
-/// What presses on the skin.
+/// A rigid tool that presses on the skin: a shape with its friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tool {
     shape: Shape,

@@ -8,7 +8,7 @@ use palpa_mesh::generate::{
 use palpa_mesh::refine::{RefineParams, near_points, refine};
 use palpa_mesh::{Surface, Vec3};
 
-/// What every pairing keeps: each triangle once, corners in their order.
+/// The properties of every pairing: each triangle once, corners in their order.
 fn assert_sound(skin: &Surface, pairing: &Pairing) {
     let mut uses = vec![0; skin.triangles.len()];
     for Pair { triangles, corners } in &pairing.pairs {

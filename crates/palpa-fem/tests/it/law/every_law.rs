@@ -1,4 +1,4 @@
-//! What holds for every law.
+//! Properties of every law.
 
 use palpa_fem::law::Law;
 use palpa_fem::{Kinematics, Mat3, Mat9, VolumeMeasure};
