@@ -34,8 +34,9 @@ $(PAGE): web/package-lock.json web/index.html web/tsconfig.json web/vite.config.
 	cd web && npm ci --no-audit --no-fund && npm run build
 
 test: $(PAGE) test-page
-	@if command -v cargo-nextest >/dev/null; then cargo nextest run --workspace; \
-	else cargo test --workspace --lib --bins --tests; fi
+	@if command -v cargo-nextest >/dev/null; then cargo nextest run --workspace; else \
+	cargo test --workspace --exclude palpa-rt --exclude palpa-cli --lib --bins --tests && \
+	cargo test --package palpa-rt --package palpa-cli --lib --bins --tests -- --test-threads=1; fi
 	cargo test --workspace --doc
 
 # The binary with its page in a real browser.
