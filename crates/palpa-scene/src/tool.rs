@@ -2,10 +2,14 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::{ContactShape, frame};
 
 /// The tool of a scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Tool {
     /// A patch of skin bonded to a rigid disc of this radius, in metres.
     Disc {
@@ -19,7 +23,7 @@ pub enum Tool {
 }
 
 /// A rigid body that presses by contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct ContactTool {
     /// Its shape.
     pub shape: ContactShape,

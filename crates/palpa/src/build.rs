@@ -253,7 +253,7 @@ pub(crate) fn read_in_metres(
     let file = read_surface(path)?;
     notes.extend(file.notes.iter().map(|note| Note::FileRead {
         file: file_name(path),
-        text: note.to_string(),
+        note: note.clone(),
     }));
     let surface = match unit {
         LengthUnit::M => file.surface,

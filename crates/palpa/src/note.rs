@@ -13,6 +13,9 @@ use std::fmt;
 
 use palpa_fem::Outcome;
 use palpa_mesh::Vec3;
+use palpa_mesh::read::ReadNote;
+use palpa_mesh::refine::ImprintError;
+use palpa_scene::Tool;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -25,8 +28,8 @@ pub enum Note {
     FileRead {
         /// Name of the file.
         file: String,
-        /// What the reader did, in English.
-        text: String,
+        /// What the reader did.
+        note: ReadNote,
     },
     /// A surface is larger or smaller than any body part.
     UnusualSize {
@@ -97,8 +100,8 @@ pub enum Note {
     },
     /// The edge of a bonded disc could not be cut into the skin's mesh.
     DiscNotImprinted {
-        /// The reason, in English.
-        why: String,
+        /// The reason.
+        why: ImprintError,
     },
     /// The skin that a bonded disc holds if its edge is not part of the mesh.
     DiscPatch {
@@ -184,10 +187,10 @@ pub enum Note {
     },
     /// A bonded tool was replaced by one that touches.
     ToolReplaced {
-        /// The scene's tool, in English.
-        tool: String,
-        /// The tool used instead, in English.
-        by: String,
+        /// The scene's tool.
+        tool: Tool,
+        /// The tool used instead.
+        by: Tool,
     },
     /// The mesh under the tool is coarser than for a scripted press.
     CoarserForTouch {
@@ -201,7 +204,6 @@ pub enum Note {
         /// Depth that the step should have reached, m.
         depth: f64,
         /// The reason, and the place in the body.
-        #[schemars(skip)]
         outcome: Outcome,
     },
     /// Prisms have a corner that is turned inside out.
@@ -280,7 +282,7 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |length: &f64| length * 1e3;
         match self {
-            Self::FileRead { file, text } => write!(f, "{file}: {text}"),
+            Self::FileRead { file, note } => write!(f, "{file}: {note}"),
             Self::UnusualSize { file, size } => write!(
                 f,
                 "{file} measures {size:.4} m from corner to corner, which no body part does; check `unit` in the \

@@ -13,8 +13,8 @@ export interface components {
             file: string;
             /** @constant */
             kind: "file_read";
-            /** @description What the reader did, in English. */
-            text: string;
+            /** @description What the reader did. */
+            note: components["schemas"]["ReadNote"];
         } | {
             /** @description Name of the file. */
             file: string;
@@ -132,8 +132,8 @@ export interface components {
         } | {
             /** @constant */
             kind: "disc_not_imprinted";
-            /** @description The reason, in English. */
-            why: string;
+            /** @description The reason. */
+            why: components["schemas"]["ImprintError"];
         } | {
             /** @description Place of the disc, m. */
             at: [
@@ -283,12 +283,12 @@ export interface components {
              */
             length: number;
         } | {
-            /** @description The tool used instead, in English. */
-            by: string;
+            /** @description The tool used instead. */
+            by: components["schemas"]["Tool"];
             /** @constant */
             kind: "tool_replaced";
-            /** @description The scene's tool, in English. */
-            tool: string;
+            /** @description The scene's tool. */
+            tool: components["schemas"]["Tool"];
         } | {
             /**
              * Format: double
@@ -305,6 +305,8 @@ export interface components {
             depth: number;
             /** @constant */
             kind: "step_failed";
+            /** @description The reason, and the place in the body. */
+            outcome: components["schemas"]["Outcome"];
             /**
              * Format: double
              * @description Speed of the run, m/s.
@@ -366,6 +368,141 @@ export interface components {
              */
             radius: number;
         };
+        /**
+         * @description The shape of a rigid tool. All lengths in metres. In its own frame the tip is the origin, x
+         *     points along the length, and z points out of the tissue. At depth 0 the tip, in the middle of
+         *     the face, touches the skin at rest.
+         */
+        ContactShape: {
+            /** @constant */
+            kind: "sphere";
+            /**
+             * Format: double
+             * @description Its radius.
+             */
+            radius: number;
+        } | {
+            /**
+             * Format: double
+             * @description Radius of its rounded edge, no more than `radius`.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "flat-punch";
+            /**
+             * Format: double
+             * @description Radius of the rod.
+             */
+            radius: number;
+        } | {
+            /** @constant */
+            kind: "capsule";
+            /**
+             * Format: double
+             * @description Length of the straight part, between the centres of the ends.
+             */
+            length: number;
+            /**
+             * Format: double
+             * @description Radius of the cylinder and its ends.
+             */
+            radius: number;
+        } | {
+            /**
+             * Format: double
+             * @description Radius of its rounded edges, no more than half its smallest size.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "box";
+            /** @description Its full size along x, y and z. */
+            size: [
+                number,
+                number,
+                number
+            ];
+        } | {
+            /** @constant */
+            kind: "fingertip";
+            /** @description Its radii along x (the finger), y and z. */
+            radii: [
+                number,
+                number,
+                number
+            ];
+        } | {
+            /**
+             * Format: double
+             * @description Radius of the rounding between cone and rod, no more than `radius`.
+             */
+            edge_radius: number;
+            /** @constant */
+            kind: "cone";
+            /**
+             * Format: double
+             * @description Full angle at its tip, in radians.
+             */
+            opening_angle: number;
+            /**
+             * Format: double
+             * @description Radius of the rod.
+             */
+            radius: number;
+            /**
+             * Format: double
+             * @description Radius of its rounded tip, no more than `radius`.
+             */
+            tip_radius: number;
+        };
+        /** @description A rigid body that presses by contact. */
+        ContactTool: {
+            /**
+             * @description Unit vector of its length; only the part across the press counts. `None` is as near to the
+             *     body's x as possible, see [`axes`](Self::axes).
+             */
+            axis?: [
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Format: double
+             * @description Coulomb's coefficient of friction; 0 for no friction.
+             */
+            friction: number;
+            /** @description Its shape. */
+            shape: components["schemas"]["ContactShape"];
+        };
+        /** @description A file format for surfaces that can be read. */
+        Format: "obj" | "stl" | "ply" | "off" | "gltf";
+        /** @description Reason why a circle cannot be imprinted. */
+        ImprintError: {
+            /** @description Axis of the circle. */
+            direction: string;
+            /** @constant */
+            kind: "no-circle";
+            /**
+             * Format: double
+             * @description Radius of the circle. m
+             */
+            radius: number;
+        } | {
+            /** @constant */
+            kind: "over-rim";
+            /**
+             * Format: uint32
+             * @description A rim vertex inside the circle.
+             */
+            vertex: number;
+        } | {
+            /** @constant */
+            kind: "too-coarse";
+            /**
+             * Format: double
+             * @description Radius of the circle. m
+             */
+            radius: number;
+        };
         /** @description The shape of a layer's levels. */
         LayerAspect: {
             /**
@@ -376,6 +513,114 @@ export interface components {
             /** @description Name of the layer. */
             name: string;
         };
+        /** @description The outcome of a step. */
+        Outcome: {
+            /** @constant */
+            kind: "converged";
+        } | {
+            /** @description Place of the largest unbalanced force, at rest, m. */
+            at: [
+                number,
+                number,
+                number
+            ];
+            /** @constant */
+            kind: "iteration_limit";
+        } | {
+            /** @description The place, at rest, m. */
+            at: [
+                number,
+                number,
+                number
+            ];
+            /** @constant */
+            kind: "inverted";
+        } | {
+            /** @constant */
+            kind: "singular";
+        };
+        /** @description A place in a file. */
+        Place: {
+            /** Format: uint */
+            line: number;
+        } | {
+            /** Format: uint */
+            byte: number;
+        } | {
+            /** Format: uint */
+            record: number;
+        } | "file";
+        /** @description A problem that the reader could work around. */
+        ReadNote: {
+            /** @description The extension of the file. */
+            extension: string;
+            /** @description The format of the content. */
+            format: components["schemas"]["Format"];
+            /** @constant */
+            kind: "extension-mismatch";
+        } | {
+            /** @constant */
+            kind: "utf16";
+        } | {
+            /**
+             * Format: uint
+             * @description Number of such faces.
+             */
+            count: number;
+            /** @description Place of the first one. */
+            first: components["schemas"]["Place"];
+            /** @constant */
+            kind: "short-faces";
+        } | {
+            /**
+             * Format: uint
+             * @description Number of such polygons.
+             */
+            count: number;
+            /** @description Place of the first one. */
+            first: components["schemas"]["Place"];
+            /** @constant */
+            kind: "folded-polygons";
+        } | {
+            /**
+             * Format: uint
+             * @description Number of such vertices.
+             */
+            count: number;
+            /** @description Place of the first one. */
+            first: components["schemas"]["Place"];
+            /** @constant */
+            kind: "unread-vertices";
+        } | {
+            /**
+             * Format: uint
+             * @description Number of such elements.
+             */
+            count: number;
+            /** @constant */
+            kind: "not-faces";
+        } | {
+            /**
+             * Format: uint
+             * @description Number of bytes.
+             */
+            bytes: number;
+            /** @constant */
+            kind: "trailing-bytes";
+        };
+        /** @description The tool of a scene. */
+        Tool: {
+            /** @constant */
+            kind: "disc";
+            /**
+             * Format: double
+             * @description Radius in metres.
+             */
+            radius: number;
+        } | {
+            /** @constant */
+            kind: "node";
+        } | components["schemas"]["ContactTool"];
     };
     responses: never;
     parameters: never;
@@ -384,6 +629,14 @@ export interface components {
     pathItems: never;
 }
 export type Note = components['schemas']['Note'];
+export type ContactShape = components['schemas']['ContactShape'];
+export type ContactTool = components['schemas']['ContactTool'];
+export type Format = components['schemas']['Format'];
+export type ImprintError = components['schemas']['ImprintError'];
 export type LayerAspect = components['schemas']['LayerAspect'];
+export type Outcome = components['schemas']['Outcome'];
+export type Place = components['schemas']['Place'];
+export type ReadNote = components['schemas']['ReadNote'];
+export type Tool = components['schemas']['Tool'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

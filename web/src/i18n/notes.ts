@@ -1,9 +1,11 @@
 // Words of the engine's notes. The engine sends kind and numbers; each kind has an entry for each language here, so that a
 // new kind does not compile without its words.
 
-import type { Note } from '../generated/notes';
+import type { Format, ImprintError, Note, Outcome, Place, ReadNote, Tool } from '../generated/notes';
 import { inMillimetres } from '../ui/quantity';
-import type { Language } from '.';
+import { en as enNames } from './en';
+import { ja as jaNames } from './ja';
+import type { Dictionary, Language } from '.';
 
 type Kind = Note['kind'];
 type Of<K extends Kind> = Extract<Note, { kind: K }>;
@@ -19,8 +21,59 @@ function repairs(note: Of<'repaired'>, names: readonly string[]): string {
   return counts.flatMap((n, i) => (n > 0 ? [`${names[i]} ${n}`] : [])).join(', ');
 }
 
+type Inner<Union extends { kind: string }> = { [K in Union['kind']]: (of: Extract<Union, { kind: K }>) => string };
+
+function said<Union extends { kind: string }>(words: Inner<Union>, of: Union): string {
+  return (words[of.kind as Union['kind']] as (of: Union) => string)(of);
+}
+
+const FORMATS: Record<Format, string> = { obj: 'OBJ', stl: 'STL', ply: 'PLY', off: 'OFF', gltf: 'glTF' };
+const PLACES = {
+  en: { line: 'line', byte: 'byte', record: 'record', file: 'the file' },
+  ja: { line: '行', byte: 'バイト', record: 'レコード', file: 'ファイル' },
+};
+
+/** A place in a file. */
+function inFile(at: Place, names: (typeof PLACES)['en']): string {
+  if (at === 'file') return names.file;
+  if ('line' in at) return `${names.line} ${at.line}`;
+  return 'byte' in at ? `${names.byte} ${at.byte}` : `${names.record} ${at.record}`;
+}
+
+/** Name of a tool, and its radius if it has one. */
+function toolWords(tool: Tool, names: Dictionary, sized: (name: string, radius: string) => string): string {
+  const shape = 'shape' in tool ? tool.shape : tool;
+  const name = names[`tool_shape.${shape.kind}`];
+  return 'radius' in shape ? sized(name, mm(shape.radius)) : name;
+}
+
+const enReads: Inner<ReadNote> = {
+  'extension-mismatch': ({ extension, format }) => `named .${extension}, but its content is ${FORMATS[format]}; read as ${FORMATS[format]}`,
+  utf16: () => 'the text is UTF-16; save it as UTF-8 for other programs',
+  'short-faces': ({ count, first }) => `${count} face(s) with fewer than three corners were left out, the first at ${inFile(first, PLACES.en)}`,
+  'folded-polygons': ({ count, first }) => `${count} polygon(s) fold over themselves, the first at ${inFile(first, PLACES.en)}; cut them into triangles in a mesh program`,
+  'unread-vertices': ({ count, first }) => `${count} vertex line(s) are not numbers, the first at ${inFile(first, PLACES.en)}; no face uses them`,
+  'not-faces': ({ count }) => `${count} part(s) of lines or points were left out`,
+  'trailing-bytes': ({ bytes }) => `${bytes} byte(s) after the last record were not read`,
+};
+
+const enImprints: Inner<ImprintError> = {
+  'no-circle': ({ radius }) => `a circle of radius ${mm(radius)} is not possible about the tool's axis`,
+  'over-rim': () => 'it crosses the rim of the skin; move it inward or make it smaller',
+  'too-coarse': ({ radius }) => `the triangles are too large for a circle of radius ${mm(radius, 2)}; refine the skin there to a third of it`,
+};
+
+const enOutcomes: Inner<Outcome> = {
+  converged: () => '',
+  iteration_limit: ({ at }) => ` No equilibrium was found; the largest imbalance is near ${place(at)}.`,
+  inverted: ({ at }) => ` The tissue would turn inside out near ${place(at)}.`,
+  singular: () => ' The tissue has lost its stiffness.',
+};
+
+const enTool = (tool: Tool) => toolWords(tool, enNames, (name, radius) => `${name} of radius ${radius}`).toLowerCase();
+
 const en: Words = {
-  file_read: ({ file, text }) => `${file}: ${text}`,
+  file_read: ({ file, note }) => `${file}: ${said(enReads, note)}.`,
   unusual_size: ({ file, size }) => `${file} measures ${size.toFixed(4)} m from corner to corner. No body part has that size: check “unit” in the scene.`,
   repaired: (note) => `${note.file} was repaired: ${repairs(note, ['vertices welded:', 'triangles without area dropped:', 'double triangles dropped:', 'unused vertices dropped:', 'triangles turned outward:'])}`,
   base_overlaps: ({ n_pairs }) => `The base of the body passes through itself (${n_pairs} pairs of triangles). Look at the cutaway before you trust forces near there.`,
@@ -31,7 +84,7 @@ const en: Words = {
   levels_too_high: ({ max_levels }) => `Levels are higher than wanted, because there are ${max_levels} already.`,
   lump_not_refined: ({ lump }) => `The mesh is not refined round the lump “${lump}”, because its size is not known. Set [mesh] near_lumps.`,
   lump_partly_outside: ({ lump, share, at }) => `${percent(share)} of the lump “${lump}” at ${place(at)} lies in the tissue. The rest does not count.`,
-  disc_not_imprinted: ({ why }) => `The edge of the disc could not be cut into the mesh: ${why}`,
+  disc_not_imprinted: ({ why }) => `The edge of the disc could not be cut into the mesh: ${said(enImprints, why)}.`,
   disc_patch: ({ n_vertices, radius, effective_radius }) => `${n_vertices} skin vertices lie under the disc of radius ${mm(radius)}; they hold a patch of radius ${mm(effective_radius)}.`,
   cut_face_not_flat: ({ at }) => `The cut face at ${place(at)} is not flat, so it cannot be a plane of symmetry. It was left free.`,
   speeds_alike: () => 'No tissue relaxes and nothing has mass here: every speed gives the same force.',
@@ -46,16 +99,41 @@ const en: Words = {
   bar_aspects: ({ layers, least, most }) => `Height of levels over length of skin edges: ${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join(', ')}. Outside ${least} to ${most} bars are too stiff across or too soft in shear.`,
   tension_relaxes: () => 'The tension of the layers is not in equilibrium at the start: the first steps relax it.',
   motion_off_skin: ({ far, length }) => `${mm(far, 0)} along its motion the tool is off the skin, where nothing is felt. Shorten the motion (now ${mm(length, 0)}).`,
-  tool_replaced: ({ tool, by }) => `A hand presses by contact: the scene's ${tool} was replaced by a ${by}.`,
+  tool_replaced: ({ tool, by }) => `A hand presses by contact: the scene's ${enTool(tool)} was replaced by a ${enTool(by)}.`,
   coarser_for_touch: ({ edge }) => `Skin edges under the tool are ${mm(edge)} long, so that the body can follow a hand. [mesh] near_tool makes them finer.`,
-  step_failed: ({ depth }) => `The step to ${mm(depth, 2)} failed. Press less deep, or refine the mesh there.`,
+  step_failed: ({ depth, outcome }) => `The step to ${mm(depth, 2)} failed.${said(enOutcomes, outcome)} Press less deep, or refine the mesh there.`,
   turned_prisms: ({ n, depth, at }) => `${n} prisms have a corner turned inside out at ${mm(depth, 2)}, the worst near ${place(at)}. The force may be off.`,
   friction_smoothed: ({ n, n_all, slip }) => `Friction had to be smoothed in ${n} of ${n_all} steps, over a slip of up to ${Math.round(slip * 1e6)} µm.`,
   few_touching: ({ n_vertices, radius, edge }) => `At most ${n_vertices} skin vertices touch the tool, over a circle of radius ${mm(radius)} with edges of ${mm(edge)}: the force depends on the mesh.`,
 };
 
+const jaReads: Inner<ReadNote> = {
+  'extension-mismatch': ({ extension, format }) => `拡張子は .${extension} ですが、内容は ${FORMATS[format]} です。${FORMATS[format]} として読み込みました`,
+  utf16: () => 'テキストが UTF-16 です。ほかのプログラムで使うには UTF-8 で保存してください',
+  'short-faces': ({ count, first }) => `頂点が 3 個未満の面 ${count} 個を除きました（最初：${inFile(first, PLACES.ja)}）`,
+  'folded-polygons': ({ count, first }) => `折り重なった多角形が ${count} 個あります（最初：${inFile(first, PLACES.ja)}）。メッシュ編集ソフトで三角形に分割してください`,
+  'unread-vertices': ({ count, first }) => `数でない頂点の行が ${count} 行あります（最初：${inFile(first, PLACES.ja)}）。どの面にも使われていません`,
+  'not-faces': ({ count }) => `線や点の要素 ${count} 個を除きました`,
+  'trailing-bytes': ({ bytes }) => `最後のレコードの後の ${bytes} バイトは読み込みませんでした`,
+};
+
+const jaImprints: Inner<ImprintError> = {
+  'no-circle': ({ radius }) => `圧子の軸のまわりに半径 ${mm(radius)} の円を置けません`,
+  'over-rim': () => '円が皮膚の縁にかかっています。内側へ移すか、小さくしてください',
+  'too-coarse': ({ radius }) => `半径 ${mm(radius, 2)} の円に対して三角形が大きすぎます。その付近の皮膚を半径の 3 分の 1 まで細かくしてください`,
+};
+
+const jaOutcomes: Inner<Outcome> = {
+  converged: () => '',
+  iteration_limit: ({ at }) => `釣り合いが見つかりません（最大の不釣り合いは ${place(at)} の付近）。`,
+  inverted: ({ at }) => `${place(at)} の付近で組織が裏返ります。`,
+  singular: () => '組織の剛性が失われました。',
+};
+
+const jaTool = (tool: Tool) => toolWords(tool, jaNames, (name, radius) => `${name}、半径 ${radius}`);
+
 const ja: Words = {
-  file_read: ({ file, text }) => `${file}：${text}`,
+  file_read: ({ file, note }) => `${file}：${said(jaReads, note)}。`,
   unusual_size: ({ file, size }) => `${file} の大きさは ${size.toFixed(4)} m です。この大きさの体の部位はありません。シーンの unit を確認してください。`,
   repaired: (note) => `${note.file} を修復しました：${repairs(note, ['結合した頂点', '面積のない三角形の削除', '重複した三角形の削除', '未使用の頂点の削除', '外向きに直した三角形'])}`,
   base_overlaps: ({ n_pairs }) => `体の底面が自分自身と交差しています（三角形 ${n_pairs} 組）。その付近の力を使う前に断面を確認してください。`,
@@ -66,7 +144,7 @@ const ja: Words = {
   levels_too_high: ({ max_levels }) => `層の分割がすでに ${max_levels} 段あるため、希望より粗くなっています。`,
   lump_not_refined: ({ lump }) => `しこり「${lump}」の大きさが分からないため、周囲のメッシュを細かくできません。[mesh] near_lumps を設定してください。`,
   lump_partly_outside: ({ lump, share, at }) => `${place(at)} のしこり「${lump}」のうち組織の中にあるのは ${percent(share)} です。残りは計算に含まれません。`,
-  disc_not_imprinted: ({ why }) => `円板の縁をメッシュに刻めませんでした：${why}`,
+  disc_not_imprinted: ({ why }) => `円板の縁をメッシュに刻めませんでした：${said(jaImprints, why)}。`,
   disc_patch: ({ n_vertices, radius, effective_radius }) => `半径 ${mm(radius)} の円板の下に皮膚の頂点が ${n_vertices} 個あり、半径 ${mm(effective_radius)} の範囲を保持します。`,
   cut_face_not_flat: ({ at }) => `${place(at)} の切断面は平らでないため、対称面にできません。自由端としました。`,
   speeds_alike: () => '緩和する組織も質量もないため、どの速度でも力は同じです。',
@@ -81,9 +159,9 @@ const ja: Words = {
   bar_aspects: ({ layers, least, most }) => `層の高さと皮膚の辺の長さの比：${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join('、')}。${least}〜${most} の範囲外では、棒の硬さが正しくありません。`,
   tension_relaxes: () => '開始時に層の張力が釣り合っていません。最初の数ステップで釣り合います。',
   motion_off_skin: ({ far, length }) => `動作の ${mm(far, 0)} の位置で圧子が皮膚から外れ、力を感じません。動作の長さ（現在 ${mm(length, 0)}）を短くしてください。`,
-  tool_replaced: ({ tool, by }) => `手は接触で押します。シーンの圧子（${tool}）を ${by} に置き換えました。`,
+  tool_replaced: ({ tool, by }) => `手は接触で押します。シーンの圧子（${jaTool(tool)}）を別の圧子（${jaTool(by)}）に置き換えました。`,
   coarser_for_touch: ({ edge }) => `手の動きに追従できるよう、圧子の下の皮膚の辺の長さを ${mm(edge)} にしました。[mesh] near_tool で細かくできます。`,
-  step_failed: ({ depth }) => `${mm(depth, 2)} までのステップに失敗しました。浅く押すか、その付近のメッシュを細かくしてください。`,
+  step_failed: ({ depth, outcome }) => `${mm(depth, 2)} までのステップに失敗しました。${said(jaOutcomes, outcome)}浅く押すか、その付近のメッシュを細かくしてください。`,
   turned_prisms: ({ n, depth, at }) => `深さ ${mm(depth, 2)} で ${n} 個の要素が裏返っています（最悪の位置 ${place(at)}）。力が正しくない可能性があります。`,
   friction_smoothed: ({ n, n_all, slip }) => `${n_all} ステップ中 ${n} ステップで摩擦を平滑化しました（滑り 最大 ${Math.round(slip * 1e6)} µm）。`,
   few_touching: ({ n_vertices, radius, edge }) => `圧子に触れる皮膚の頂点は最大 ${n_vertices} 個です（半径 ${mm(radius)}、辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,

@@ -9,7 +9,7 @@ use crate::posed_tool::PosedTool;
 use crate::state::{State, Touch};
 
 /// The outcome of a step.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Outcome {
     /// All laws hold within the tolerances.

@@ -1,11 +1,12 @@
 //! The format of a file.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{stl, text};
 
 /// A file format for surfaces that can be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Format {

@@ -43,7 +43,8 @@ pub struct Imprint {
 }
 
 /// Reason why a circle cannot be imprinted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ImprintError {
     /// The radius or the axis is invalid.

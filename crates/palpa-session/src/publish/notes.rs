@@ -36,4 +36,27 @@ mod tests {
             "press_on_cut_face"
         );
     }
+
+    #[test]
+    fn tools_in_a_note_are_kinds_and_numbers() {
+        let by = palpa_scene::ContactTool {
+            shape: palpa_scene::ContactShape::Sphere { radius: 0.004 },
+            friction: 0.0,
+            axis: None,
+        };
+        let shown = shown(&Note::ToolReplaced {
+            tool: palpa_scene::Tool::Disc { radius: 0.005 },
+            by: palpa_scene::Tool::Contact(by),
+        });
+        assert_eq!(shown.values["tool"]["kind"], "disc");
+        assert_eq!(shown.values["tool"]["radius"], 0.005);
+        assert_eq!(shown.values["by"]["shape"]["kind"], "sphere");
+        assert!(
+            shown
+                .text
+                .contains("bonded disc, radius 5.0 mm was replaced by a sphere"),
+            "{}",
+            shown.text
+        );
+    }
 }

@@ -33,8 +33,8 @@ pub(super) fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
             axis: None,
         });
         notes.push(Note::ToolReplaced {
-            tool: scene.tool.to_string(),
-            by: tool.to_string(),
+            tool: scene.tool,
+            by: tool,
         });
         scene.tool = tool;
     }

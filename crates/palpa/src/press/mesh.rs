@@ -439,9 +439,7 @@ fn bond(
                     radius: effective,
                 };
             }
-            Err(why) => notes.push(Note::DiscNotImprinted {
-                why: why.to_string(),
-            }),
+            Err(why) => notes.push(Note::DiscNotImprinted { why }),
         }
     }
     let body = &refined.body;
