@@ -11,6 +11,7 @@ import { sceneOf, until } from './viewer.mjs';
 import { extent, readBody } from './vtu.mjs';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+const JAPANESE = /[\u3040-\u30ff\u4e00-\u9fff]/;
 const TABS = ['scene', 'view', 'tissues', 'lumps', 'tool', 'device', 'motion', 'record', 'game', 'engine'];
 
 /** What axe finds that is serious or critical. @param {PalpaPage} palpa @returns {Promise<string[]>} */
@@ -95,10 +96,16 @@ test('pictures in both themes, and in Japanese', async () => {
   await palpa.tab('tissues');
   await palpa.by('language').selectOption('ja');
   await palpa.page.locator('html[lang=ja]').waitFor();
-  assert.match(await palpa.by('tab-tissues').innerText(), /[\u3040-\u30ff\u4e00-\u9fff]/);
+  assert.match(await palpa.by('tab-tissues').innerText(), JAPANESE);
   const words = await palpa.page.locator('#panel').innerText();
   assert.ok(!/Thickness|Poisson/.test(words), 'the panel is in Japanese');
   await saveShot(palpa, 'japanese');
+  await palpa.tab('engine');
+  await palpa.by('step-status').waitFor();
+  assert.match(await palpa.by('step-status').innerText(), JAPANESE);
+  const events = await palpa.page.locator('.events li').allInnerTexts();
+  assert.ok(events.length > 0);
+  for (const event of events) assert.match(event, JAPANESE);
   await palpa.by('language').selectOption('en');
   await palpa.page.locator('html[lang=en]').waitFor();
   await palpa.tab('motion');

@@ -5,7 +5,8 @@ import type { EngineFigures, Hello, Message, NoticeLevel, State } from './genera
 import type { SceneTable } from './generated/scene';
 import { SNAPSHOT_VERSION, type FrameSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
 import { Connection, type ConnectionStatus, type Request } from './connection';
-import { t } from './i18n';
+import { language, t } from './i18n';
+import { noticeWords } from './i18n/events';
 import { History } from './ui/history';
 
 export type Vec3 = [number, number, number];
@@ -134,7 +135,7 @@ function takeMessage(message: Message): void {
       figures.value = message;
       break;
     case 'notice':
-      notify(message.level, message.text);
+      notify(message.level, noticeWords(message.what, language.value));
       break;
     case 'reply':
       if (message.error != null) notify('warning', message.error);

@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     print("job, CPU", &report.jobs);
     println!("{:?}", report.forces);
     for event in report.warnings() {
-        println!("{:9.3} s  {}", event.time, event.text);
+        println!("{:9.3} s  {}", event.time, event.what);
     }
     let again = replay(
         &Log::open(&path)?,

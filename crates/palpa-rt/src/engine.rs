@@ -8,7 +8,7 @@ pub use self::report::{Report, Snapshot};
 
 use crate::{
     clock::{Clock, RealClock},
-    event::Speaker,
+    event::{RecordKind, Speaker},
     fault::FaultHooks,
     findings::Board,
     mailbox::{Reader, mailbox},
@@ -207,9 +207,12 @@ impl Engine {
             findings: self.findings.clone(),
             counts_lost: Box::new(move || {
                 [
-                    ("ticks", loop_stats.lost_records.load(Ordering::Relaxed)),
                     (
-                        "tissue steps",
+                        RecordKind::Ticks,
+                        loop_stats.lost_records.load(Ordering::Relaxed),
+                    ),
+                    (
+                        RecordKind::Steps,
                         tissue_stats.lost_records.load(Ordering::Relaxed),
                     ),
                 ]

@@ -1,5 +1,7 @@
-//! Events: fixed-size records that cross a ring; the recorder turns them into text.
+//! Events: typed records that cross a ring. A report has them as they are; a log has their words.
 
+use crate::tissue::StepStatus;
+use palpa_device::DeviceFault;
 use palpa_servo::Faults;
 use rtrb::Producer;
 use std::fmt;
@@ -16,19 +18,22 @@ pub enum Level {
 }
 
 /// The kinds of events.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
+///
+/// `Display` has the words of log files and of the command. The viewer's page has its own words: to
+/// add a kind, also add it to `palpa_viewer::control::EventKind`, and its words to
+/// `web/src/i18n/events.ts`. The page does not compile without them.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Happening {
     /// The 1 kHz loop began.
     LoopStarted,
     /// The 1 kHz loop ended after this many ticks.
     LoopStopped(u64),
     /// A device could not be read.
-    DeviceLost(u32, &'static str),
+    DeviceLost(u32, DeviceFault),
     /// A device can be read again; it was away for this many ticks.
     DeviceBack(u32, u64),
     /// A device did not accept its command.
-    WriteFailed(u32, &'static str),
+    WriteFailed(u32, DeviceFault),
     /// Ticks were skipped because one took too long.
     DeadlineMissed {
         /// Number of ticks skipped since the last such event.
@@ -43,7 +48,7 @@ pub enum Happening {
     /// The tissue thread ended after this many steps.
     TissueStopped(u64),
     /// The status of the tissue's steps changed: step number and new status.
-    StepStatus(u64, &'static str),
+    StepStatus(u64, StepStatus),
     /// The tissue panicked in a step; its thread is gone.
     TissuePanicked(u64),
     /// The tissue was moved on by less time than passed; total difference since the last such
@@ -52,15 +57,44 @@ pub enum Happening {
     /// A background job panicked; the tissue continues without its result.
     JobPanicked,
     /// A fault hook caused a fault on purpose.
-    Injected(&'static str),
+    Injected(Injection),
     /// A ring was full; this many records of this kind were lost.
-    RecordsLost(&'static str, u64),
-    /// The file could not be written; all later records are lost.
-    FileFailed,
+    RecordsLost(RecordKind, u64),
+    /// The file could not be written, for this reason; all later records are lost. Only the
+    /// recorder makes this event: a real-time thread must not allocate.
+    FileFailed(String),
+}
+
+/// The faults that a fault hook causes on purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Injection {
+    /// The tissue panics.
+    TissuePanics,
+    /// A patch has a force that is not a number.
+    PatchWithNan,
+    /// The tissue's patch is late.
+    PatchLate,
+    /// The tissue pauses.
+    TissuePauses,
+    /// The pause of the tissue is over.
+    TissueGoesOn,
+    /// The 1 kHz loop wakes up late.
+    LoopLate,
+}
+
+/// The records that a ring may lose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordKind {
+    /// Ticks of the 1 kHz loop.
+    Ticks,
+    /// Steps of the tissue.
+    Steps,
+    /// Events.
+    Events,
 }
 
 /// An event with its time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// Time, s.
     pub time: f64,
@@ -87,7 +121,7 @@ impl Happening {
             | Self::TissuePanicked(_)
             | Self::JobPanicked
             | Self::RecordsLost(..)
-            | Self::FileFailed => Level::Error,
+            | Self::FileFailed(_) => Level::Error,
         }
     }
 }
@@ -97,9 +131,17 @@ impl fmt::Display for Happening {
         match self {
             Self::LoopStarted => write!(f, "haptic loop started"),
             Self::LoopStopped(n) => write!(f, "haptic loop stopped after {n} ticks"),
-            Self::DeviceLost(d, why) => write!(f, "device {d} lost: {why}; its force goes to zero"),
+            Self::DeviceLost(d, why) => {
+                write!(
+                    f,
+                    "device {d} lost: {}; its force goes to zero",
+                    reason(*why)
+                )
+            }
             Self::DeviceBack(d, n) => write!(f, "device {d} is back after {n} ticks"),
-            Self::WriteFailed(d, why) => write!(f, "device {d} did not take its force: {why}"),
+            Self::WriteFailed(d, why) => {
+                write!(f, "device {d} did not take its force: {}", reason(*why))
+            }
             Self::DeadlineMissed { skipped, longest } => {
                 write!(
                     f,
@@ -120,7 +162,7 @@ impl fmt::Display for Happening {
             }
             Self::TissueStarted => write!(f, "tissue started"),
             Self::TissueStopped(n) => write!(f, "tissue stopped after {n} steps"),
-            Self::StepStatus(step, text) => write!(f, "tissue step {step}: {text}"),
+            Self::StepStatus(step, status) => write!(f, "tissue step {step}: {}", status.name()),
             Self::TissuePanicked(step) => {
                 write!(
                     f,
@@ -137,8 +179,45 @@ impl fmt::Display for Happening {
             }
             Self::Injected(what) => write!(f, "fault on purpose: {what}"),
             Self::RecordsLost(kind, n) => write!(f, "ring full: {n} {kind} not recorded"),
-            Self::FileFailed => write!(f, "the log file cannot be written; recording ends here"),
+            Self::FileFailed(why) => {
+                write!(
+                    f,
+                    "the log file cannot be written; recording ends here ({why})"
+                )
+            }
         }
+    }
+}
+
+fn reason(fault: DeviceFault) -> &'static str {
+    match fault {
+        DeviceFault::Unplugged => "not connected",
+        DeviceFault::TimedOut => "no answer in time",
+        DeviceFault::Garbled => "its answer cannot be understood",
+        _ => "not usable",
+    }
+}
+
+impl fmt::Display for Injection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TissuePanics => "the tissue panics",
+            Self::PatchWithNan => "a patch with NaN",
+            Self::PatchLate => "the tissue's patch is late",
+            Self::TissuePauses => "the tissue pauses",
+            Self::TissueGoesOn => "the tissue goes on",
+            Self::LoopLate => "the loop wakes up late",
+        })
+    }
+}
+
+impl fmt::Display for RecordKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ticks => "ticks",
+            Self::Steps => "tissue steps",
+            Self::Events => "events",
+        })
     }
 }
 
@@ -161,7 +240,7 @@ impl Speaker {
         if self.lost > 0 {
             let lost = Event {
                 time,
-                what: Happening::RecordsLost("events", self.lost),
+                what: Happening::RecordsLost(RecordKind::Events, self.lost),
             };
             if self.ring.push(lost).is_ok() {
                 self.lost = 0;

@@ -4,14 +4,14 @@
     reason = "shared by the recorder and those who ask it; no thread of the 1 kHz path knows of it"
 )]
 
-use crate::{recorder::EventRow, smoothness::ForceReport};
+use crate::{event::Event, smoothness::ForceReport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Results of the recorder.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
     pub(crate) forces: Vec<ForceReport>,
-    pub(crate) events: Vec<EventRow>,
+    pub(crate) events: Vec<Event>,
     pub(crate) has_file_failed: bool,
 }
 

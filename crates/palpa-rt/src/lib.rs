@@ -87,7 +87,7 @@ mod tissue_thread;
 
 pub use clock::{Clock, ManualClock, RealClock, thread_cpu};
 pub use engine::{Engine, EngineParams, Report, Snapshot, StartError};
-pub use event::{Event, Happening, Level};
+pub use event::{Event, Happening, Injection, Level, RecordKind};
 pub use export::{ExportError, Exported, Table, export};
 pub use fault::FaultHooks;
 pub use histogram::{Histogram, Quantiles};

@@ -6,7 +6,7 @@
 
 use crate::{
     clock::rest,
-    event::{Event, Happening, Level},
+    event::{Event, Happening, Level, RecordKind},
     findings::Board,
     layout::Record,
     record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
@@ -51,7 +51,7 @@ pub struct RecorderParams {
     pub notes: BTreeMap<String, String>,
 }
 
-/// An event as text.
+/// An event of a log, in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EventRow {
     /// Time, s.
@@ -70,7 +70,7 @@ pub(crate) struct Recorder {
     pub(crate) file: Option<LogFile>,
     pub(crate) forces: Vec<ForceStats>,
     pub(crate) findings: Board,
-    pub(crate) counts_lost: Box<dyn FnMut() -> [(&'static str, u64); 2] + Send>,
+    pub(crate) counts_lost: Box<dyn FnMut() -> [(RecordKind, u64); 2] + Send>,
     pub(crate) said_lost: [u64; 2],
     pub(crate) last_time: f64,
 }
@@ -135,15 +135,10 @@ impl Recorder {
     }
 
     fn event(&mut self, event: Event) {
-        let row = EventRow {
-            time: event.time,
-            level: event.what.level(),
-            text: event.what.to_string(),
-        };
-        self.try_file(|file| file.event(&row));
+        self.try_file(|file| file.event(&event));
         let mut findings = self.findings.lock();
         if findings.events.len() < MAX_EVENTS {
-            findings.events.push(row);
+            findings.events.push(event);
         }
     }
 
@@ -164,10 +159,9 @@ impl Recorder {
     fn say_failed(&self, error: &McapError) {
         let mut findings = self.findings.lock();
         findings.has_file_failed = true;
-        findings.events.push(EventRow {
+        findings.events.push(Event {
             time: self.last_time,
-            level: Happening::FileFailed.level(),
-            text: format!("{} ({error})", Happening::FileFailed),
+            what: Happening::FileFailed(error.to_string()),
         });
     }
 }
@@ -265,14 +259,15 @@ impl LogFile {
         self.write(channel, time)
     }
 
-    fn event(&mut self, row: &EventRow) -> McapResult<()> {
+    fn event(&mut self, event: &Event) -> McapResult<()> {
+        let text = event.what.to_string();
         self.buffer.clear();
-        self.buffer.extend_from_slice(&row.time.to_le_bytes());
-        self.buffer.push(row.level as u8);
+        self.buffer.extend_from_slice(&event.time.to_le_bytes());
+        self.buffer.push(event.what.level() as u8);
         self.buffer
-            .extend_from_slice(&(row.text.len() as u32).to_le_bytes());
-        self.buffer.extend_from_slice(row.text.as_bytes());
-        self.write(self.events, row.time)
+            .extend_from_slice(&(text.len() as u32).to_le_bytes());
+        self.buffer.extend_from_slice(text.as_bytes());
+        self.write(self.events, event.time)
     }
 
     fn write(&mut self, channel_id: u16, time: f64) -> McapResult<()> {

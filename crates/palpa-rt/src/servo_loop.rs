@@ -6,14 +6,14 @@ pub use self::entry::TickEntry;
 
 use crate::{
     clock::{Clock, thread_cpu},
-    event::{Happening, Speaker},
+    event::{Happening, Injection, Speaker},
     fault::FaultHooks,
     histogram::Histogram,
     mailbox::{Reader, Writer},
     record::{DeviceRecord, TickRecord},
     tissue_thread::PoseSample,
 };
-use palpa_device::{DeviceFault, HapticDevice};
+use palpa_device::HapticDevice;
 use palpa_servo::{
     ContactPatch, DeviceState, Faults, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo,
     TickReport, Vec3,
@@ -177,7 +177,7 @@ impl ServoLoop {
             clock.wait_until(due);
             if let Some(delay) = faults.take_loop_delay() {
                 self.speaker
-                    .say(clock.now(), Happening::Injected("the loop wakes up late"));
+                    .say(clock.now(), Happening::Injected(Injection::LoopLate));
                 clock.wait_until(due + delay);
             }
             let now = clock.now();
@@ -244,7 +244,7 @@ impl ServoLoop {
                 Err(fault) => {
                     if *away == 0 {
                         self.speaker
-                            .say(now, Happening::DeviceLost(k as u32, reason(fault)));
+                            .say(now, Happening::DeviceLost(k as u32, fault));
                     }
                     *away += 1;
                 }
@@ -282,7 +282,7 @@ impl ServoLoop {
                 && *is_written
             {
                 self.speaker
-                    .say(now, Happening::WriteFailed(k as u32, reason(fault)));
+                    .say(now, Happening::WriteFailed(k as u32, fault));
             }
             *is_written = result.is_ok();
         }
@@ -371,14 +371,4 @@ impl PatchSource for Arrival<'_> {
 fn is_finite(pose: &Pose) -> bool {
     pose.translation.vector.iter().all(|v| v.is_finite())
         && pose.rotation.coords.iter().all(|v| v.is_finite())
-}
-
-/// The fault as static text, for an event.
-fn reason(fault: DeviceFault) -> &'static str {
-    match fault {
-        DeviceFault::Unplugged => "not connected",
-        DeviceFault::TimedOut => "no answer in time",
-        DeviceFault::Garbled => "its answer cannot be understood",
-        _ => "not usable",
-    }
 }

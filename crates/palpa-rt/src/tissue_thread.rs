@@ -2,7 +2,7 @@
 
 use crate::{
     clock::{Clock, rest, thread_cpu},
-    event::{Happening, Speaker},
+    event::{Happening, Injection, Speaker},
     fault::FaultHooks,
     histogram::Histogram,
     mailbox::{Reader, Writer},
@@ -146,7 +146,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             if new_status != status {
                 status = new_status;
                 self.speaker
-                    .say(self.clock.now(), Happening::StepStatus(step, status.name()));
+                    .say(self.clock.now(), Happening::StepStatus(step, status));
             }
             if self.ring.push(record).is_err() {
                 self.stats.lost_records.fetch_add(1, Ordering::Relaxed);
@@ -174,7 +174,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         };
         if self.faults.take_panic() {
             self.speaker
-                .say(now, Happening::Injected("the tissue panics"));
+                .say(now, Happening::Injected(Injection::TissuePanics));
             panic!("a panic on purpose");
         }
         let patch = self.patches.slot();
@@ -184,12 +184,12 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         if is_spoilt {
             spoil(patch);
             self.speaker
-                .say(now, Happening::Injected("a patch with NaN"));
+                .say(now, Happening::Injected(Injection::PatchWithNan));
         }
         let mut record = step_record(&input, &result, patch);
         if let Some(delay) = self.faults.take_tissue_delay() {
             self.speaker
-                .say(now, Happening::Injected("the tissue's patch is late"));
+                .say(now, Happening::Injected(Injection::PatchLate));
             self.clock.wait_until(self.clock.now() + delay);
         }
         if record.published {
@@ -240,13 +240,17 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
     }
 
     fn wait_out_pause(&mut self, stop: &AtomicBool) {
-        self.speaker
-            .say(self.clock.now(), Happening::Injected("the tissue pauses"));
+        self.speaker.say(
+            self.clock.now(),
+            Happening::Injected(Injection::TissuePauses),
+        );
         while self.faults.is_tissue_paused() && !stop.load(Ordering::Relaxed) {
             rest(Duration::from_micros(500));
         }
-        self.speaker
-            .say(self.clock.now(), Happening::Injected("the tissue goes on"));
+        self.speaker.say(
+            self.clock.now(),
+            Happening::Injected(Injection::TissueGoesOn),
+        );
     }
 }
 

@@ -12,7 +12,7 @@ use palpa::live::notes_of;
 use palpa::one_paragraph;
 use palpa_rt::RecorderParams;
 use palpa_scene::Scene;
-use palpa_viewer::control::{Field, Hand, NoticeLevel, Phase, Request};
+use palpa_viewer::control::{Field, Hand, NoticeKind, NoticeLevel, Phase, Problem, Request};
 use palpa_viewer::{Answer, Clients, HostFile, Publisher};
 
 use crate::builder::{Builder, Wanted};
@@ -166,8 +166,8 @@ impl Desk {
         }
         self.tape.close();
         if self.end_motion() {
-            let text = "the motion ended: the scene was changed".to_owned();
-            self.status.notice(NoticeLevel::Info, text);
+            self.status
+                .notice(NoticeLevel::Info, NoticeKind::MotionEnded);
         }
         self.builder.wanted = Wanted { scene, key };
         self.build();
@@ -178,7 +178,9 @@ impl Desk {
     pub(crate) fn build(&mut self) {
         self.status.change();
         if let Err(error) = self.builder.build() {
-            self.fail(format!("no thread to build the body: {error}"));
+            self.fail(Problem::NoThread {
+                reason: error.to_string(),
+            });
         }
     }
 
@@ -196,7 +198,7 @@ impl Desk {
                 }
             }
             Err(error) => {
-                self.fail(one_paragraph(&error));
+                self.fail(refused(&error));
                 if let Some(live) = self.stage.live() {
                     // The previous body stays, and so does its scene.
                     self.builder.wanted = Wanted {
@@ -215,7 +217,7 @@ impl Desk {
         if self.stage.live().is_some() {
             self.describe();
         } else if let Err(error) = &outcome {
-            self.fail(one_paragraph(error));
+            self.fail(refused(error));
             self.build();
         }
         outcome
@@ -229,7 +231,7 @@ impl Desk {
         }
     }
 
-    fn fail(&mut self, problem: String) {
+    fn fail(&mut self, problem: Problem) {
         let is_running = self.stage.live().is_some();
         self.status.fail(problem, is_running);
     }
@@ -382,8 +384,8 @@ impl Desk {
         if is_full {
             // A failure is reported as the session's problem.
             let _ = self.stop_recording();
-            let text = "the recording ended: an hour is the longest".to_owned();
-            self.status.notice(NoticeLevel::Warning, text);
+            self.status
+                .notice(NoticeLevel::Warning, NoticeKind::RecordingFull);
         }
     }
 
@@ -436,17 +438,14 @@ impl Desk {
         let live = self.stage.live();
         let ended = live.map_or_else(Vec::new, |live| live.running.engine.ended());
         let Some(thread) = ended.first() else { return };
-        self.status.notice(
-            NoticeLevel::Error,
-            format!(
-                "{thread} ended by a fault; the force went to zero, and the engine is started anew"
-            ),
-        );
+        let thread = (*thread).to_owned();
+        self.status
+            .notice(NoticeLevel::Error, NoticeKind::ThreadLost { thread });
         self.tape.end();
         self.end_motion();
         match self.stage.restart(&RecorderParams::default()) {
             Ok(()) => self.describe(),
-            Err(error) => self.fail(one_paragraph(&error)),
+            Err(error) => self.fail(refused(&error)),
         }
     }
 
@@ -468,5 +467,11 @@ impl Desk {
     /// Ends the engine and closes a recording.
     pub(crate) fn end(mut self) {
         self.stage.end();
+    }
+}
+
+fn refused(error: &anyhow::Error) -> Problem {
+    Problem::Refused {
+        text: one_paragraph(error),
     }
 }

@@ -9,7 +9,7 @@
 
 use crate::{
     board::{Board, Controller, Picture, json},
-    control::{Envelope, Hello, Message, Notice, NoticeLevel, Reply, Request},
+    control::{Envelope, Hello, Message, Notice, NoticeKind, NoticeLevel, Reply, Request},
     hub::Hub,
     limits::{
         CLOSE_WAIT, Gate, HEIR_WAIT, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY,
@@ -259,7 +259,7 @@ fn send_answer(answers: &Answers, reply: Reply) -> Result<(), ()> {
 fn warn(answers: &Answers) -> Result<(), ()> {
     let notice = Notice {
         level: NoticeLevel::Warning,
-        text: format!("{TOO_MANY}; some were left out"),
+        what: NoticeKind::TooManyRequests,
     };
     answers
         .try_send(json(&Message::Notice(notice)))

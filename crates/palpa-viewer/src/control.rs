@@ -4,10 +4,19 @@
 //! of a scene are those of a scene file, with units ("12 kPa"). The JSON Schema of these types is
 //! the control API's document, and the page's TypeScript types are generated from it.
 
+mod engine;
+
+use std::fmt;
+
 use palpa_scene::ContactShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+pub use self::engine::{
+    DeviceTrouble, EngineFigures, EventInfo, EventKind, ForceLimit, GrantedInfo, InjectedFault,
+    LawFault, LostRecords, PriorityInfo, StepResult,
+};
 
 /// A point or a vector.
 pub type Vec3 = [f64; 3];
@@ -195,8 +204,62 @@ pub struct Reply {
 pub struct Notice {
     /// Severity.
     pub level: NoticeLevel,
-    /// The message, in English.
-    pub text: String,
+    /// What happened.
+    pub what: NoticeKind,
+}
+
+/// What a notice is about: its kind, with the names and numbers in it. Pages have words for each
+/// kind in each of their languages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum NoticeKind {
+    /// A scene could not be built, or the engine stopped.
+    Problem {
+        /// The reason.
+        problem: Problem,
+    },
+    /// The scene's motion ended, because the scene was changed.
+    MotionEnded,
+    /// The recording ended, because it is as long as a recording may be.
+    RecordingFull,
+    /// A thread of the engine ended by a fault. The force went to zero, and the engine is restarted.
+    ThreadLost {
+        /// Name of the thread.
+        thread: String,
+    },
+    /// The client sent too many requests, and some were left out.
+    TooManyRequests,
+    /// An error of the engine.
+    Engine {
+        /// The event.
+        event: EventKind,
+    },
+}
+
+/// Why there is no body, or not the wanted one. `Display` has the English words, for the command
+/// and for `/healthz`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Problem {
+    /// The scene cannot be built, or the engine cannot start.
+    Refused {
+        /// The reason with key, range and advice, in English, as for a scene file.
+        text: String,
+    },
+    /// The system gave no thread to build the body on.
+    NoThread {
+        /// The system's reason.
+        reason: String,
+    },
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused { text } => f.write_str(text),
+            Self::NoThread { reason } => write!(f, "no thread to build the body: {reason}"),
+        }
+    }
 }
 
 /// Severity of a notice.
@@ -258,7 +321,7 @@ pub struct State {
     /// Phase of the engine.
     pub phase: Phase,
     /// Reason why the last scene could not be built, or why the engine stopped.
-    pub problem: Option<String>,
+    pub problem: Option<Problem>,
     /// Remarks on the scene for the user.
     pub notes: Vec<Note>,
     /// Whether the scene's motion runs.
@@ -424,60 +487,4 @@ pub struct FoundLump {
     pub over: Vec3,
     /// Distance from that point to the lump's mark, m; null without a mark.
     pub error: Option<f64>,
-}
-
-/// Figures of the engine.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct EngineFigures {
-    /// Time since the engine's start, s.
-    pub seconds: f64,
-    /// Steps of the tissue per second, since the last figures.
-    pub tissue_rate: f64,
-    /// Ticks of the 1 kHz loop per second, since the last figures.
-    pub tick_rate: f64,
-    /// Missed deadlines: ticks that were skipped since the start.
-    pub missed: u64,
-    /// CPU time of a tick, s: median, 99.9th percentile, maximum.
-    pub tick_cpu: [f64; 3],
-    /// Lateness of ticks, s: median, 99.9th percentile, maximum.
-    pub lateness: [f64; 3],
-    /// CPU time of the tissue's steps, s: median, 99.9th percentile, maximum.
-    pub step_cpu: [f64; 3],
-    /// Histogram of the CPU time of ticks: lower bound (s), upper bound (s), count.
-    pub tick_histogram: Vec<(f64, f64, u64)>,
-    /// Age of the contact patch in use, s: time since its pose was read.
-    pub latency: f64,
-    /// Number of nodes of the body.
-    pub n_nodes: u32,
-    /// Meshes taken up since the start.
-    pub n_meshes: u64,
-    /// Names of the force limits that were reached since the last figures.
-    pub limits: Vec<String>,
-    /// Names of the faults since the last figures.
-    pub faults: Vec<String>,
-    /// Energy taken from the hand since the start, J.
-    pub energy_in: f64,
-    /// Energy given to the hand since the start, J.
-    pub energy_out: f64,
-    /// Energy that the device may still give out beyond the energy taken in, J.
-    pub energy_budget: f64,
-    /// Result of the tissue's last step.
-    pub step_status: String,
-    /// Priorities and cores that the system granted to the threads, in words.
-    pub granted: Vec<String>,
-    /// The latest events, newest last.
-    pub events: Vec<EventInfo>,
-    /// Snapshots per second, since the last figures.
-    pub snapshot_rate: f64,
-}
-
-/// An entry of the engine's log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct EventInfo {
-    /// Time since the engine's start, s.
-    pub time: f64,
-    /// Severity.
-    pub level: NoticeLevel,
-    /// The message.
-    pub text: String,
 }

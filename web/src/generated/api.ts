@@ -615,6 +615,8 @@ export interface components {
              */
             tip_radius: number;
         };
+        /** @description Why a device did not deliver a reading or accept a force. */
+        DeviceTrouble: "unplugged" | "timed_out" | "garbled" | "unusable";
         /** @description A change to one key of the scene file. */
         Edit: {
             /**
@@ -647,10 +649,10 @@ export interface components {
             energy_out: number;
             /** @description The latest events, newest last. */
             events: components["schemas"]["EventInfo"][];
-            /** @description Names of the faults since the last figures. */
-            faults: string[];
-            /** @description Priorities and cores that the system granted to the threads, in words. */
-            granted: string[];
+            /** @description The faults since the last figures. */
+            faults: components["schemas"]["LawFault"][];
+            /** @description Priorities and cores that the system granted to the threads. */
+            granted: components["schemas"]["GrantedInfo"][];
             /**
              * Format: double
              * @description Age of the contact patch in use, s: time since its pose was read.
@@ -658,8 +660,8 @@ export interface components {
             latency: number;
             /** @description Lateness of ticks, s: median, 99.9th percentile, maximum. */
             lateness: number[];
-            /** @description Names of the force limits that were reached since the last figures. */
-            limits: string[];
+            /** @description The force limits that were reached since the last figures. */
+            limits: components["schemas"]["ForceLimit"][];
             /**
              * Format: uint64
              * @description Missed deadlines: ticks that were skipped since the start.
@@ -688,7 +690,7 @@ export interface components {
             /** @description CPU time of the tissue's steps, s: median, 99.9th percentile, maximum. */
             step_cpu: number[];
             /** @description Result of the tissue's last step. */
-            step_status: string;
+            step_status: components["schemas"]["StepResult"];
             /** @description CPU time of a tick, s: median, 99.9th percentile, maximum. */
             tick_cpu: number[];
             /** @description Histogram of the CPU time of ticks: lower bound (s), upper bound (s), count. */
@@ -816,18 +818,144 @@ export interface components {
         EventInfo: {
             /** @description Severity. */
             level: components["schemas"]["NoticeLevel"];
-            /** @description The message. */
-            text: string;
             /**
              * Format: double
              * @description Time since the engine's start, s.
              */
             time: number;
+            /** @description The event. */
+            what: components["schemas"]["EventKind"];
+        };
+        /** @description What happened in the engine. */
+        EventKind: {
+            /** @constant */
+            kind: "loop_started";
+        } | {
+            /** @constant */
+            kind: "loop_stopped";
+            /**
+             * Format: uint64
+             * @description Ticks that it did.
+             */
+            ticks: number;
+        } | {
+            /**
+             * Format: uint32
+             * @description Number of the device.
+             */
+            device: number;
+            /** @constant */
+            kind: "device_lost";
+            /** @description The reason. */
+            why: components["schemas"]["DeviceTrouble"];
+        } | {
+            /**
+             * Format: uint32
+             * @description Number of the device.
+             */
+            device: number;
+            /** @constant */
+            kind: "device_back";
+            /**
+             * Format: uint64
+             * @description Ticks for which it was away.
+             */
+            ticks: number;
+        } | {
+            /**
+             * Format: uint32
+             * @description Number of the device.
+             */
+            device: number;
+            /** @constant */
+            kind: "write_failed";
+            /** @description The reason. */
+            why: components["schemas"]["DeviceTrouble"];
+        } | {
+            /** @constant */
+            kind: "deadline_missed";
+            /**
+             * Format: double
+             * @description Longest time between two ticks since the last such event, s.
+             */
+            longest: number;
+            /**
+             * Format: uint64
+             * @description Number of ticks skipped since the last such event.
+             */
+            skipped: number;
+        } | {
+            /** @description The present faults; empty when they are over. */
+            faults: components["schemas"]["LawFault"][];
+            /** @constant */
+            kind: "law_faults";
+        } | {
+            /** @constant */
+            kind: "tissue_started";
+        } | {
+            /** @constant */
+            kind: "tissue_stopped";
+            /**
+             * Format: uint64
+             * @description Steps that it did.
+             */
+            steps: number;
+        } | {
+            /** @constant */
+            kind: "step_status";
+            /** @description The new status. */
+            status: components["schemas"]["StepResult"];
+            /**
+             * Format: uint64
+             * @description Number of the step.
+             */
+            step: number;
+        } | {
+            /** @constant */
+            kind: "tissue_panicked";
+            /**
+             * Format: uint64
+             * @description Number of the step.
+             */
+            step: number;
+        } | {
+            /** @constant */
+            kind: "time_lost";
+            /**
+             * Format: double
+             * @description Total difference since the last such event, s.
+             */
+            seconds: number;
+        } | {
+            /** @constant */
+            kind: "job_panicked";
+        } | {
+            /** @description The fault. */
+            fault: components["schemas"]["InjectedFault"];
+            /** @constant */
+            kind: "injected";
+        } | {
+            /** @constant */
+            kind: "records_lost";
+            /**
+             * Format: uint64
+             * @description Number of records.
+             */
+            n: number;
+            /** @description What was lost. */
+            records: components["schemas"]["LostRecords"];
+        } | {
+            /** @constant */
+            kind: "file_failed";
+            /** @description The system's reason. */
+            reason: string;
         };
         /** @description A fault that is caused on purpose. */
         FaultKind: "tissue_panic" | "spoilt_patch" | "tissue_pause";
         /** @description A field over the nodes, computed by the engine because it is too costly for a page. */
         Field: "none" | "von_mises" | "pressure" | "stretch";
+        /** @description A limit that a force met. */
+        ForceLimit: "force" | "torque" | "slew" | "ramp" | "energy" | "stiffness" | "transfer" | "sweeps";
         /** @description A lump and the mark that belongs to it. */
         FoundLump: {
             /**
@@ -901,6 +1029,22 @@ export interface components {
              */
             n_stray_marks: number;
         };
+        /** @description Scheduling that a thread requested, and the system's answer. */
+        GrantedInfo: {
+            /**
+             * Format: uint32
+             * @description The requested core; null for any core.
+             */
+            core?: number | null;
+            /** @description The system's reason for refusing the core; null if it was granted. */
+            core_refused?: string | null;
+            /** @description The requested priority. */
+            priority: components["schemas"]["PriorityInfo"];
+            /** @description The system's reason for refusing the priority; null if it was granted. */
+            priority_refused?: string | null;
+            /** @description Name of the thread. */
+            thread: string;
+        };
         /** @description A pose of the hand: the tool's tip goes `depth` below `point`, against `normal`. */
         Hand: {
             /**
@@ -928,6 +1072,10 @@ export interface components {
              */
             snapshot_version: number;
         };
+        /** @description A fault that was caused on purpose. */
+        InjectedFault: "tissue_panics" | "patch_with_nan" | "patch_late" | "tissue_pauses" | "tissue_goes_on" | "loop_late";
+        /** @description A reason why the force is ramped to zero. */
+        LawFault: "no_patch" | "stale_patch" | "bad_patch" | "missed_deadline" | "bad_clock" | "device_lost" | "bad_reading" | "device_stalled" | "device_jumped" | "no_solution";
         /** @description A layer. */
         LayerInfo: {
             /** @description Name of its elastic law. */
@@ -945,6 +1093,8 @@ export interface components {
              */
             thickness: number;
         };
+        /** @description Records that were lost because a ring was full. */
+        LostRecords: "ticks" | "steps" | "events";
         /** @description The shape of a lump. Lengths in m. */
         LumpForm: {
             /** @constant */
@@ -1023,13 +1173,78 @@ export interface components {
         Notice: {
             /** @description Severity. */
             level: components["schemas"]["NoticeLevel"];
-            /** @description The message, in English. */
-            text: string;
+            /** @description What happened. */
+            what: components["schemas"]["NoticeKind"];
+        };
+        /**
+         * @description What a notice is about: its kind, with the names and numbers in it. Pages have words for each
+         *     kind in each of their languages.
+         */
+        NoticeKind: {
+            /** @constant */
+            kind: "problem";
+            /** @description The reason. */
+            problem: components["schemas"]["Problem"];
+        } | {
+            /** @constant */
+            kind: "motion_ended";
+        } | {
+            /** @constant */
+            kind: "recording_full";
+        } | {
+            /** @constant */
+            kind: "thread_lost";
+            /** @description Name of the thread. */
+            thread: string;
+        } | {
+            /** @constant */
+            kind: "too_many_requests";
+        } | {
+            /** @description The event. */
+            event: components["schemas"]["EventKind"];
+            /** @constant */
+            kind: "engine";
         };
         /** @description Severity of a notice. */
         NoticeLevel: "info" | "warning" | "error";
         /** @description Phase of the engine. */
         Phase: "building" | "running" | "stopped";
+        /** @description Scheduling priority of a thread. */
+        PriorityInfo: {
+            /** @constant */
+            kind: "real_time";
+            /**
+             * Format: uint8
+             * @description 1 to 99; a larger number goes first.
+             */
+            priority: number;
+        } | {
+            /** @constant */
+            kind: "normal";
+        } | {
+            /** @constant */
+            kind: "nice";
+            /**
+             * Format: int8
+             * @description 1 to 19 is after other threads, -1 to -20 before them.
+             */
+            niceness: number;
+        };
+        /**
+         * @description Why there is no body, or not the wanted one. `Display` has the English words, for the command
+         *     and for `/healthz`.
+         */
+        Problem: {
+            /** @constant */
+            kind: "refused";
+            /** @description The reason with key, range and advice, in English, as for a scene file. */
+            text: string;
+        } | {
+            /** @constant */
+            kind: "no_thread";
+            /** @description The system's reason. */
+            reason: string;
+        };
         /** @description The recording. */
         RecordingInfo: {
             /**
@@ -1106,7 +1321,7 @@ export interface components {
             /** @description Phase of the engine. */
             phase: components["schemas"]["Phase"];
             /** @description Reason why the last scene could not be built, or why the engine stopped. */
-            problem?: string | null;
+            problem?: components["schemas"]["Problem"] | null;
             /** @description The recording. */
             recording: components["schemas"]["RecordingInfo"];
             /**
@@ -1124,6 +1339,8 @@ export interface components {
              */
             usual_depth: number;
         };
+        /** @description Result of a step of the tissue. */
+        StepResult: "converged" | "unfinished" | "behind" | "settling" | "failed";
         /** @description The tool. In its own frame the tip is the origin, and z points out of the tissue. */
         ToolInfo: {
             /**
@@ -1142,30 +1359,41 @@ export interface components {
     pathItems: never;
 }
 export type ContactShape = components['schemas']['ContactShape'];
+export type DeviceTrouble = components['schemas']['DeviceTrouble'];
 export type Edit = components['schemas']['Edit'];
 export type EngineFigures = components['schemas']['EngineFigures'];
 export type Envelope = components['schemas']['Envelope'];
 export type EventInfo = components['schemas']['EventInfo'];
+export type EventKind = components['schemas']['EventKind'];
 export type FaultKind = components['schemas']['FaultKind'];
 export type Field = components['schemas']['Field'];
+export type ForceLimit = components['schemas']['ForceLimit'];
 export type FoundLump = components['schemas']['FoundLump'];
 export type GalleryEntry = components['schemas']['GalleryEntry'];
 export type GameInfo = components['schemas']['GameInfo'];
 export type GameResult = components['schemas']['GameResult'];
+export type GrantedInfo = components['schemas']['GrantedInfo'];
 export type Hand = components['schemas']['Hand'];
 export type Hello = components['schemas']['Hello'];
+export type InjectedFault = components['schemas']['InjectedFault'];
+export type LawFault = components['schemas']['LawFault'];
 export type LayerInfo = components['schemas']['LayerInfo'];
+export type LostRecords = components['schemas']['LostRecords'];
 export type LumpForm = components['schemas']['LumpForm'];
 export type LumpInfo = components['schemas']['LumpInfo'];
 export type Message = components['schemas']['Message'];
 export type Method = components['schemas']['Method'];
 export type Note = components['schemas']['Note'];
 export type Notice = components['schemas']['Notice'];
+export type NoticeKind = components['schemas']['NoticeKind'];
 export type NoticeLevel = components['schemas']['NoticeLevel'];
 export type Phase = components['schemas']['Phase'];
+export type PriorityInfo = components['schemas']['PriorityInfo'];
+export type Problem = components['schemas']['Problem'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type Reply = components['schemas']['Reply'];
 export type State = components['schemas']['State'];
+export type StepResult = components['schemas']['StepResult'];
 export type ToolInfo = components['schemas']['ToolInfo'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

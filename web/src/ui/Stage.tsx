@@ -2,7 +2,8 @@
 
 import { effect, signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { t } from '../i18n';
+import { language, t } from '../i18n';
+import { problemWords } from '../i18n/events';
 import { HandControl } from '../hand';
 import { BodyView, NoWebGL2, type Vec3 } from '../scene';
 import {
@@ -184,7 +185,7 @@ function NoBody({ isWebGL }: { isWebGL: boolean }) {
   );
 }
 
-/** The last problem that the user dismissed. */
+/** The last problem that the user dismissed, as JSON: each state has an object of its own. */
 const dismissed = signal<string | null>(null);
 
 function Phase() {
@@ -193,13 +194,13 @@ function Phase() {
   if (now.phase === 'building') {
     return <p class="chip building" role="status" data-testid="building"><span class="spinner" aria-hidden="true" />{t('phase.building_long')}</p>;
   }
-  if (now.phase !== 'stopped' && (now.problem == null || now.problem === dismissed.value)) return null;
+  if (now.phase !== 'stopped' && (now.problem == null || JSON.stringify(now.problem) === dismissed.value)) return null;
   return (
     <div class={`problem ${now.phase}`} role="alert" data-testid="problem">
       <strong>{t(now.phase === 'stopped' ? 'phase.stopped_long' : 'phase.not_built')}</strong>
-      {now.problem != null && <p>{now.problem}</p>}
+      {now.problem != null && <p>{problemWords(now.problem, language.value)}</p>}
       {now.phase === 'running' && (
-        <Button onClick={() => (dismissed.value = now.problem ?? null)}>{t('notices.dismiss')}</Button>
+        <Button onClick={() => (dismissed.value = JSON.stringify(now.problem))}>{t('notices.dismiss')}</Button>
       )}
       {now.phase === 'stopped' && (
         <Button kind="primary" disabled={!isController.value} onClick={() => void askAloud({ type: 'restart' })} testid="restart">

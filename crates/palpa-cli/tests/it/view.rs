@@ -375,9 +375,10 @@ fn what_is_wrong_is_said_and_the_body_goes_on() {
     let too_deep =
         json!({ "type": "edit", "edits": [{ "path": "/motion/depth", "value": "30 mm" }] });
     viewer.ask(&too_deep);
-    let state = viewer.wait_until(|state| state["problem"].is_string());
+    let state = viewer.wait_until(|state| state["problem"]["kind"] == "refused");
+    let text = &state["problem"]["text"];
     assert!(
-        state["problem"].as_str().unwrap().contains("depth"),
+        text.as_str().unwrap().contains("depth"),
         "{}",
         state["problem"]
     );

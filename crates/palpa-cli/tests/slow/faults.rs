@@ -5,9 +5,10 @@
 use palpa::live::{LiveScene, device_model, grip};
 use palpa_device::{Fault, FaultSwitch, Faulty, HapticDevice, LiveTarget, SimulatedDevice, Vec3};
 use palpa_rt::{
-    Engine, EngineParams, FaultHooks, Log, RecorderParams, ReplayParams, TickEntry, Verdict, replay,
+    Engine, EngineParams, FaultHooks, Happening, Injection, Log, RecorderParams, ReplayParams,
+    Report, TickEntry, Verdict, replay,
 };
-use palpa_servo::{DeviceSpec, ServoParams};
+use palpa_servo::{DeviceSpec, Faults, ServoParams};
 use palpa_testkit::{Layer, Scene as SceneText, wait_for};
 
 use crate::resolved;
@@ -52,15 +53,18 @@ impl Run {
         self.until("ticks go on", |tick| tick.tick.tick >= begin + n);
     }
 
-    /// Waits until the log has so many more events with a text than before `act`.
-    fn until_said(&mut self, text: &str, n: usize, act: impl FnOnce(&FaultHooks)) {
+    /// Waits until this fault was caused so many times more than before `act`.
+    fn until_said(&mut self, fault: Injection, n: usize, act: impl FnOnce(&FaultHooks)) {
         let count = |engine: &Engine| {
             let events = engine.report().events;
-            events.iter().filter(|e| e.text.contains(text)).count()
+            let said = (events.iter()).filter(|e| e.what == Happening::Injected(fault));
+            said.count()
         };
         let before = count(&self.engine);
         act(self.engine.faults());
-        wait_for(text, || (count(&self.engine) >= before + n).then_some(()));
+        wait_for(&fault.to_string(), || {
+            (count(&self.engine) >= before + n).then_some(())
+        });
     }
 
     /// Waits until the force was there, whole, steady and without a fault for a while, and returns
@@ -121,39 +125,42 @@ fn check_limits(log: &Log, spec: &DeviceSpec) {
 const LET_GO: f64 = 0.09;
 
 /// Without a device, or once the patch of a paused tissue is stale, nothing presses on.
-fn check_let_go(log: &Log, usual: f64) {
-    let said = |text: &str, from: f64| {
-        let mut events = log.events.iter();
-        events
-            .find(|e| e.time >= from && e.text.contains(text))
-            .unwrap()
-            .time
+fn check_let_go(log: &Log, report: &Report, usual: f64) {
+    let said = |is: &dyn Fn(&Happening) -> bool, from: f64| {
+        let mut events = report.events.iter();
+        events.find(|e| e.time >= from && is(&e.what)).unwrap().time
     };
-    let paused = said("the tissue pauses", 0.0);
-    for (text, from) in [
-        ("reading not a number", 0.0),
-        ("device lost", 0.0),
-        ("stale patch", paused),
+    let paused = said(&|e| *e == Happening::Injected(Injection::TissuePauses), 0.0);
+    for (fault, from) in [
+        (Faults::BAD_READING, 0.0),
+        (Faults::DEVICE_LOST, 0.0),
+        (Faults::STALE_PATCH, paused),
     ] {
-        let end = said(text, from) + LET_GO;
+        let end = said(&|e| has(e, fault), from) + LET_GO;
         let k = (log.ticks).partition_point(|t| t.tick.now < end);
         let there = log.ticks[k].devices[0].force[2];
-        assert!(there.abs() < 0.7 * usual, "{text}: {there} N");
+        assert!(there.abs() < 0.7 * usual, "{fault:?}: {there} N");
     }
 }
 
-fn check_said(log: &Log) {
-    let said: Vec<&str> = log.events.iter().map(|e| e.text.as_str()).collect();
-    for text in [
-        "the tissue pauses",
-        "stale patch",
-        "patch is late",
-        "a patch with NaN",
-        "no fault any more",
-    ] {
+/// Whether the law says that it has this fault.
+fn has(what: &Happening, fault: Faults) -> bool {
+    matches!(what, Happening::LawFaults(faults) if faults.contains(fault))
+}
+
+fn check_said(report: &Report) {
+    let is_said: [fn(&Happening) -> bool; 5] = [
+        |e| *e == Happening::Injected(Injection::TissuePauses),
+        |e| has(e, Faults::STALE_PATCH),
+        |e| *e == Happening::Injected(Injection::PatchLate),
+        |e| *e == Happening::Injected(Injection::PatchWithNan),
+        |e| *e == Happening::LawFaults(Faults::NONE),
+    ];
+    for (k, is) in is_said.iter().enumerate() {
         assert!(
-            said.iter().any(|s| s.contains(text)),
-            "{text:?} is not said: {said:#?}"
+            report.events.iter().any(|e| is(&e.what)),
+            "number {k} is not said: {:#?}",
+            report.events
         );
     }
 }
@@ -216,11 +223,13 @@ fn faults_while_real_tissue_is_pressed() {
     run.ticks(200);
     run.engine.faults().pause_tissue(false);
     settled.push(("a tissue that paused", run.settle()));
-    run.until_said("patch is late", 1, |faults| faults.delay_tissue(0.1));
+    run.until_said(Injection::PatchLate, 1, |faults| faults.delay_tissue(0.1));
     settled.push(("a late patch", run.settle()));
-    run.until_said("a patch with NaN", 20, |faults| faults.spoil_patches(20));
+    run.until_said(Injection::PatchWithNan, 20, |faults| {
+        faults.spoil_patches(20);
+    });
     settled.push(("spoilt patches", run.settle()));
-    run.until_said("wakes up late", 1, |faults| faults.delay_loop(0.05));
+    run.until_said(Injection::LoopLate, 1, |faults| faults.delay_loop(0.05));
     settled.push(("a loop that slept", run.settle()));
     // The hand's own: out and in at 1 m/s.
     hand.set(above);
@@ -251,8 +260,8 @@ fn faults_while_real_tissue_is_pressed() {
             "after {after}: {mean} N, {usual} N before"
         );
     }
-    check_let_go(&log, usual.unwrap());
-    check_said(&log);
+    check_let_go(&log, &report, usual.unwrap());
+    check_said(&report);
     let again = replay(&log, live.tissue().unwrap(), &ReplayParams::default());
     assert_eq!(again.verdict, Verdict::Same, "{again:?}");
 }

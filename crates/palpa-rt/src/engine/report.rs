@@ -1,8 +1,12 @@
 //! Reports of an engine while it runs and at its end.
 
 use crate::{
-    event::Level, histogram::Quantiles, record::StepRecord, recorder::EventRow,
-    servo_loop::TickEntry, smoothness::ForceReport, threads::Granted,
+    event::{Event, Level},
+    histogram::Quantiles,
+    record::StepRecord,
+    servo_loop::TickEntry,
+    smoothness::ForceReport,
+    threads::Granted,
 };
 use std::path::PathBuf;
 
@@ -55,7 +59,7 @@ pub struct Report {
     /// Threads that panicked.
     pub panicked: Vec<&'static str>,
     /// Events, in order.
-    pub events: Vec<EventRow>,
+    pub events: Vec<Event>,
     /// Scheduling that the system granted to each thread.
     pub granted: Vec<Granted>,
     /// Whether memory was locked; the reason if not.
@@ -66,7 +70,7 @@ pub struct Report {
 
 impl Report {
     /// The events that are warnings or errors.
-    pub fn warnings(&self) -> impl Iterator<Item = &EventRow> {
-        self.events.iter().filter(|e| e.level >= Level::Warning)
+    pub fn warnings(&self) -> impl Iterator<Item = &Event> {
+        (self.events.iter()).filter(|e| e.what.level() >= Level::Warning)
     }
 }

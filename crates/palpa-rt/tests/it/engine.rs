@@ -87,7 +87,9 @@ pub(crate) fn check_records(report: &Report, log: &Log) {
         assert_eq!(step.step, k as u64 + 1);
         assert!(step.dt > 0.0 && step.dt <= 0.02);
     }
-    assert_eq!(log.events.len(), report.events.len());
+    let said = (report.events.iter()).map(|e| (e.time, e.what.level(), e.what.to_string()));
+    let written = (log.events.iter()).map(|e| (e.time, e.level, e.text.clone()));
+    assert!(said.eq(written), "{:#?}", log.events);
 }
 
 #[test]

@@ -8,7 +8,11 @@ use crate::{
     engine::{check_records, go_on, params, recorder, run},
     toy::Bed,
 };
-use palpa_rt::{Engine, Level, Log, ReplayParams, Report, Verdict, replay};
+use palpa_device::DeviceFault;
+use palpa_rt::{
+    Engine, Happening, Injection, Level, Log, ReplayParams, Report, StepStatus, Verdict, replay,
+};
+use palpa_servo::Faults;
 
 use std::sync::atomic::Ordering;
 
@@ -41,44 +45,59 @@ fn faulty(bed: &Bed, act: impl FnOnce(&mut Engine, &Hand)) -> (Report, Log) {
     (report, log)
 }
 
-/// The events that hold a text, all texts in this order.
-fn check_said(log: &Log, texts: &[&str]) {
-    let mut events = log.events.iter();
-    for text in texts {
+/// Whether an event is the wanted one.
+type Is = fn(&Happening) -> bool;
+
+/// The report has all these events, in this order.
+fn check_said(report: &Report, wanted: &[Is]) {
+    let mut events = report.events.iter();
+    for (k, is) in wanted.iter().enumerate() {
         assert!(
-            events.any(|e| e.text.contains(text)),
-            "{text:?} is not said, or not there:\n{:#?}",
-            log.events
+            events.any(|e| is(&e.what)),
+            "number {k} is not said, or not there:\n{:#?}",
+            report.events
         );
     }
 }
 
+/// Whether the law says that it has this fault.
+fn has(what: &Happening, fault: Faults) -> bool {
+    matches!(what, Happening::LawFaults(faults) if faults.contains(fault))
+}
+
+const IS_STALE: Is = |e| has(e, Faults::STALE_PATCH);
+const IS_WELL: Is = |e| *e == Happening::LawFaults(Faults::NONE);
+const IS_LATE: Is = |e| *e == Happening::Injected(Injection::PatchLate);
+
 #[test]
 fn a_tissue_that_stops_lets_the_force_go_and_brings_it_back() {
-    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+    let (report, log) = faulty(&Bed::new(), |engine, hand| {
         engine.faults().pause_tissue(true);
         until_zero(hand);
         engine.faults().pause_tissue(false);
         until_felt(hand);
     });
     check_said(
-        &log,
+        &report,
         &[
-            "the tissue pauses",
-            "stale patch",
-            "the tissue goes on",
-            "no fault any more",
+            |e| *e == Happening::Injected(Injection::TissuePauses),
+            IS_STALE,
+            |e| *e == Happening::Injected(Injection::TissueGoesOn),
+            IS_WELL,
         ],
     );
     // The pause is not made up for: its time is lost, and said to be.
     let lost: f64 = log.steps.iter().map(|s| s.lost).sum();
     assert!(lost > 0.02, "{lost} s");
-    check_said(&log, &["of time lost"]);
+    check_said(
+        &report,
+        &[|e| matches!(e, Happening::TimeLost(s) if *s > 0.0)],
+    );
 }
 
 #[test]
 fn a_patch_that_comes_late_is_a_stall_and_no_jump() {
-    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+    let (report, _) = faulty(&Bed::new(), |engine, hand| {
         engine.faults().delay_tissue(0.1);
         until("the late patch came", || {
             engine.tissue_stats().wall.max() > 0.1
@@ -89,21 +108,12 @@ fn a_patch_that_comes_late_is_a_stall_and_no_jump() {
         until_zero(hand);
         until_felt(hand);
     });
-    check_said(
-        &log,
-        &[
-            "patch is late",
-            "stale patch",
-            "no fault any more",
-            "patch is late",
-            "stale patch",
-        ],
-    );
+    check_said(&report, &[IS_LATE, IS_STALE, IS_WELL, IS_LATE, IS_STALE]);
 }
 
 #[test]
 fn patches_with_nan_never_reach_the_hand() {
-    let (_, log) = faulty(&Bed::new(), |engine, hand| {
+    let (report, log) = faulty(&Bed::new(), |engine, hand| {
         engine.faults().spoil_patches(400);
         until_zero(hand);
         engine.faults().spoil_patches(0);
@@ -116,8 +126,12 @@ fn patches_with_nan_never_reach_the_hand() {
         until_felt(hand);
     });
     check_said(
-        &log,
-        &["a patch with NaN", "patch not usable", "no fault any more"],
+        &report,
+        &[
+            |e| *e == Happening::Injected(Injection::PatchWithNan),
+            |e| has(e, Faults::BAD_PATCH),
+            IS_WELL,
+        ],
     );
     assert!(log.steps.iter().filter(|s| s.spoilt == 1).count() > 1);
     let all = log.ticks.iter().flat_map(|e| e.devices[0].force);
@@ -126,25 +140,26 @@ fn patches_with_nan_never_reach_the_hand() {
 
 #[test]
 fn a_tissue_that_panics_is_gone_and_the_loop_is_not() {
-    let (report, log) = faulty(&Bed::new(), |engine, hand| {
+    let (report, _) = faulty(&Bed::new(), |engine, hand| {
         engine.faults().panic_tissue();
         until_zero(hand);
         // Unwinding takes far longer than a patch to go stale; nothing orders the two.
         until("the panic is told", || {
             let report = engine.report();
-            report.warnings().any(|e| e.text.contains("panicked"))
+            (report.warnings()).any(|e| matches!(e.what, Happening::TissuePanicked(_)))
         });
         assert!(hand.force() < 1e-9);
     });
-    for said in ["tissue panicked", "stale patch"] {
-        let texts = [
-            "fault on purpose: the tissue panics",
+    let is_gone: Is = |e| matches!(e, Happening::TissuePanicked(_));
+    for said in [is_gone, IS_STALE] {
+        let events: [Is; 3] = [
+            |e| *e == Happening::Injected(Injection::TissuePanics),
             said,
-            "haptic loop stopped",
+            |e| matches!(e, Happening::LoopStopped(_)),
         ];
-        check_said(&log, &texts);
+        check_said(&report, &events);
     }
-    assert!(report.warnings().any(|e| e.level == Level::Error));
+    assert!(report.warnings().any(|e| e.what.level() == Level::Error));
     // Caught: the thread ended by itself.
     assert!(report.panicked.is_empty());
 }
@@ -169,8 +184,11 @@ fn steps_that_fail_are_held_back_and_said() {
             .all(|e| !(300..320).contains(&e.tick.patch))
     );
     check_said(
-        &log,
-        &["tissue step 300: failed", "tissue step 320: converged"],
+        &report,
+        &[
+            |e| *e == Happening::StepStatus(300, StepStatus::Failed),
+            |e| *e == Happening::StepStatus(320, StepStatus::Converged),
+        ],
     );
 }
 
@@ -181,14 +199,20 @@ fn a_job_that_panics_is_said_and_the_next_one_runs() {
     let (report, log) = faulty(&bed, |engine, _| {
         until("jobs ran after it", || engine.snapshot().step.factor > 5);
     });
-    check_said(&log, &["a background job panicked", "tissue stopped"]);
+    check_said(
+        &report,
+        &[
+            |e| *e == Happening::JobPanicked,
+            |e| matches!(e, Happening::TissueStopped(_)),
+        ],
+    );
     assert!(log.steps.iter().all(|s| s.factor != 3));
     assert!(report.panicked.is_empty());
 }
 
 #[test]
 fn devices_fail_in_all_ways_and_come_back() {
-    let (_, log) = faulty(&Bed::new(), |_, hand| {
+    let (report, log) = faulty(&Bed::new(), |_, hand| {
         for ill in [Ill::Unplugged, Ill::NaN, Ill::Stalled, Ill::Jumped] {
             hand.make(ill);
             until_zero(hand);
@@ -197,15 +221,15 @@ fn devices_fail_in_all_ways_and_come_back() {
         }
     });
     check_said(
-        &log,
+        &report,
         &[
-            "device 0 lost: not connected",
-            "device lost",
-            "device 0 is back",
-            "reading not a number",
-            "device stalled",
-            "device jumped",
-            "no fault any more",
+            |e| *e == Happening::DeviceLost(0, DeviceFault::Unplugged),
+            |e| has(e, Faults::DEVICE_LOST),
+            |e| matches!(e, Happening::DeviceBack(0, _)),
+            |e| has(e, Faults::BAD_READING),
+            |e| has(e, Faults::DEVICE_STALLED),
+            |e| has(e, Faults::DEVICE_JUMPED),
+            IS_WELL,
         ],
     );
     // What could not be read is recorded as such, and the tissue never sees a pose that is no
@@ -245,12 +269,12 @@ fn what_takes_too_long_leaves_ticks_out_and_never_bunches_them() {
         until_felt(hand);
     });
     check_said(
-        &log,
+        &report,
         &[
-            "the loop wakes up late",
-            "ticks left out",
-            "missed deadline",
-            "no fault any more",
+            |e| *e == Happening::Injected(Injection::LoopLate),
+            |e| matches!(e, Happening::DeadlineMissed { .. }),
+            |e| has(e, Faults::MISSED_DEADLINE),
+            IS_WELL,
         ],
     );
     assert!(report.skipped >= 49 + 50, "{}", report.skipped);

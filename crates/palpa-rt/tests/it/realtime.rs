@@ -7,7 +7,7 @@ use crate::{
     toy::Bed,
 };
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use palpa_rt::{Engine, EngineParams, RecorderParams, TissueParams};
+use palpa_rt::{Engine, EngineParams, Happening, RecordKind, RecorderParams, TissueParams};
 use std::thread;
 
 #[global_allocator]
@@ -61,12 +61,9 @@ fn a_tick_never_allocates() {
     assert_eq!(report.ticks, 30_000);
     // 27 000 ticks came faster than any recorder drains them: what was lost is counted and said.
     let said: u64 = (report.events.iter())
-        .filter_map(|e| {
-            e.text
-                .strip_prefix("ring full: ")?
-                .strip_suffix(" ticks not recorded")?
-                .parse::<u64>()
-                .ok()
+        .filter_map(|e| match e.what {
+            Happening::RecordsLost(RecordKind::Ticks, n) => Some(n),
+            _ => None,
         })
         .sum();
     assert_eq!(said, report.lost_records[0]);

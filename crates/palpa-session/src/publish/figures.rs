@@ -2,9 +2,11 @@
 
 use std::time::Instant;
 
-use palpa_rt::{Level, Quantiles, Report, StepRecord, StepStatus, TickEntry};
+use palpa_rt::{Level, Quantiles, Report, StepRecord, TickEntry};
 use palpa_servo::{Faults, Limits};
-use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeLevel};
+use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeKind, NoticeLevel};
+
+use super::events;
 
 /// Number of events that a page receives.
 const LATEST: usize = 30;
@@ -54,12 +56,6 @@ impl Figures {
         let seconds = (now - self.at).as_secs_f64().max(1e-3);
         let rate = |n: u64, before: u64| n.saturating_sub(before) as f64 / seconds;
         let device = &entry.devices[0];
-        let mut limits = Vec::new();
-        self.limits
-            .for_each_name(|name| limits.push(name.to_owned()));
-        let mut faults = Vec::new();
-        self.faults
-            .for_each_name(|name| faults.push(name.to_owned()));
         let events = report
             .events
             .iter()
@@ -76,28 +72,30 @@ impl Figures {
             latency: finite(entry.tick.patch_age),
             n_nodes: n_nodes as u32,
             n_meshes: step.mesh,
-            limits,
-            faults,
+            limits: events::limits(self.limits),
+            faults: events::faults(self.faults),
             energy_in: device.energy_in,
             energy_out: device.energy_out,
             energy_budget: entry.tick.energy_budget,
-            step_status: status_name(step.status).to_owned(),
-            granted: report.granted.iter().map(ToString::to_string).collect(),
+            step_status: events::recorded(step.status),
+            granted: report.granted.iter().map(events::granted).collect(),
             events: events
                 .map(|event| EventInfo {
                     time: event.time,
-                    level: level(event.level),
-                    text: event.text.clone(),
+                    level: level(event.what.level()),
+                    what: events::shown(&event.what),
                 })
                 .collect(),
             snapshot_rate: rate(snapshots, self.snapshots),
         };
         let notices = report.events[self.n_events.min(report.events.len())..]
             .iter()
-            .filter(|event| event.level >= Level::Error)
+            .filter(|event| event.what.level() >= Level::Error)
             .map(|event| Notice {
                 level: NoticeLevel::Error,
-                text: event.text.clone(),
+                what: NoticeKind::Engine {
+                    event: events::shown(&event.what),
+                },
             })
             .collect();
         *self = Self {
@@ -128,16 +126,4 @@ fn level(level: Level) -> NoticeLevel {
         Level::Warning => NoticeLevel::Warning,
         Level::Error => NoticeLevel::Error,
     }
-}
-
-fn status_name(status: u8) -> &'static str {
-    let all = [
-        StepStatus::Converged,
-        StepStatus::Unfinished,
-        StepStatus::Behind,
-        StepStatus::Settling,
-        StepStatus::Failed,
-    ];
-    all.get(usize::from(status))
-        .map_or("", |status| status.name())
 }

@@ -7,6 +7,7 @@
 //!  state, problem ────► Status ── state, figures, notices ─────┘
 //! ```
 
+mod events;
 mod fields;
 mod figures;
 mod frame;

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use palpa_scene::Scene;
 use palpa_viewer::Publisher;
 use palpa_viewer::control::{
-    EngineFigures, Field, GameInfo, Notice, NoticeLevel, Phase, RecordingInfo, State,
+    EngineFigures, Field, GameInfo, Notice, NoticeKind, NoticeLevel, Phase, Problem, RecordingInfo,
+    State,
 };
 
 use crate::veil::Veil;
@@ -98,8 +99,11 @@ impl Status {
 
     /// Reports a problem, which stays until [`Self::well`] is called. `is_running` says whether a
     /// body is running nevertheless.
-    pub(crate) fn fail(&mut self, problem: String, is_running: bool) {
-        self.notice(NoticeLevel::Error, problem.clone());
+    pub(crate) fn fail(&mut self, problem: Problem, is_running: bool) {
+        let what = NoticeKind::Problem {
+            problem: problem.clone(),
+        };
+        self.notice(NoticeLevel::Error, what);
         self.set_problem(Some(problem), is_running);
     }
 
@@ -108,17 +112,17 @@ impl Status {
         self.set_problem(None, true);
     }
 
-    fn set_problem(&mut self, problem: Option<String>, is_running: bool) {
+    fn set_problem(&mut self, problem: Option<Problem>, is_running: bool) {
         self.is_changed = true;
         self.state.problem.clone_from(&problem);
         // For the server, the session works as long as a body is running.
-        let shown = problem.filter(|_| !is_running);
+        let shown = (problem.filter(|_| !is_running)).map(|problem| problem.to_string());
         *self.problem.lock().unwrap_or_else(PoisonError::into_inner) = shown;
     }
 
     /// Sends a notice.
-    pub(crate) fn notice(&self, level: NoticeLevel, text: String) {
-        self.publisher.notice(Notice { level, text });
+    pub(crate) fn notice(&self, level: NoticeLevel, what: NoticeKind) {
+        self.publisher.notice(Notice { level, what });
     }
 
     /// Sends the engine's figures, and notices of its errors.

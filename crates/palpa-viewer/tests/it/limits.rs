@@ -5,7 +5,7 @@ use crate::{
     session::Session,
 };
 use futures_util::{SinkExt, StreamExt};
-use palpa_viewer::control::{Message, NoticeLevel, Request};
+use palpa_viewer::control::{Message, NoticeKind, NoticeLevel, Request};
 use std::time::Duration;
 use tokio::time::timeout;
 use tokio_tungstenite::{
@@ -136,7 +136,7 @@ async fn too_many_requests_are_left_out_and_then_the_end() {
     loop {
         if let Told::Message(Message::Notice(notice)) = page.hear().await {
             assert_eq!(notice.level, NoticeLevel::Warning);
-            assert!(notice.text.contains("too many requests"));
+            assert_eq!(notice.what, NoticeKind::TooManyRequests);
             break;
         }
     }

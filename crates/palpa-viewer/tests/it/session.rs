@@ -4,7 +4,9 @@
 use palpa_scene::ContactShape;
 use palpa_viewer::{
     Answer, Clients, Host, HostFile, Publisher, Server, ServerParams,
-    control::{Field, Hand, LayerInfo, Method, Phase, RecordingInfo, Request, State, ToolInfo},
+    control::{
+        Field, Hand, LayerInfo, Method, Phase, Problem, RecordingInfo, Request, State, ToolInfo,
+    },
     wire::{FrameSnapshot, MeshSnapshot},
 };
 use serde_json::{Value, json};
@@ -204,7 +206,7 @@ impl Inner {
             max_force: 8.0,
             method: Method::Tissue,
             phase: Phase::Running,
-            problem: self.problem.clone(),
+            problem: (self.problem.clone()).map(|text| Problem::Refused { text }),
             notes: vec![],
             is_motion_running: false,
             field: Field::None,

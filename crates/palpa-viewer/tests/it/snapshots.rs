@@ -4,7 +4,7 @@ use crate::{
     page::{Page, Told},
     session::Session,
 };
-use palpa_viewer::control::{EngineFigures, Message, Notice, NoticeLevel};
+use palpa_viewer::control::{EngineFigures, EventKind, Message, Notice, NoticeKind, NoticeLevel};
 
 #[tokio::test]
 async fn a_new_page_is_told_all_in_order() {
@@ -77,7 +77,9 @@ async fn figures_and_notices_are_told() {
     );
     let notice = Notice {
         level: NoticeLevel::Warning,
-        text: "hot".into(),
+        what: NoticeKind::Engine {
+            event: EventKind::TimeLost { seconds: 0.02 },
+        },
     };
     publisher.notice(notice.clone());
     assert!(matches!(page.hear().await, Told::Message(Message::Notice(n)) if n == notice));

@@ -1,6 +1,7 @@
 // The engine: rates, deadlines, limits, energy.
 
-import { t } from '../../i18n';
+import { language, t } from '../../i18n';
+import { eventWords, grantedWords } from '../../i18n/events';
 import { askAloud, figures, isController, state } from '../../store';
 import type { EngineFigures, FaultKind } from '../../generated/api';
 import { firstBodyMs } from '../body';
@@ -40,7 +41,7 @@ function Figures({ now }: { now: EngineFigures }) {
     [t('engine.snapshot_rate'), `${formatNumber(now.snapshot_rate)} Hz`],
     [t('engine.nodes'), now.n_nodes.toLocaleString()],
     [t('engine.meshes'), now.n_meshes.toLocaleString()],
-    [t('engine.step'), now.step_status],
+    [t('engine.step'), t(`step_result.${now.step_status}`), 'step-status'],
   ];
   if (firstBodyMs.value !== null) rows.push([t('engine.first_body'), `${formatNumber(firstBodyMs.value / 1e3)} s`]);
   return (
@@ -68,18 +69,18 @@ function Figures({ now }: { now: EngineFigures }) {
         <Energy now={now} />
       </Section>
       <Section title={t('engine.limits_and_faults')}>
-        <Words words={now.limits} none={t('engine.no_limits')} />
-        <Words words={now.faults} none={t('engine.no_faults')} />
+        <Words words={now.limits.map((limit) => t(`limit.${limit}`))} none={t('engine.no_limits')} />
+        <Words words={now.faults.map((fault) => t(`law_fault.${fault}`))} none={t('engine.no_faults')} />
       </Section>
       <Section title={t('engine.granted')}>
-        <Words words={now.granted} none="–" />
+        <Words words={now.granted.map((granted) => grantedWords(granted, language.value))} none="–" />
       </Section>
       <Section title={t('engine.events')}>
         {now.events.length === 0 && <p class="empty">{t('engine.no_events')}</p>}
         <ol class="events">
           {[...now.events].reverse().map((event, index) => (
             <li key={index} class={event.level}>
-              <span class="time">{event.time.toFixed(1)} s</span> {event.text}
+              <span class="time">{event.time.toFixed(1)} s</span> {eventWords(event.what, language.value)}
             </li>
           ))}
         </ol>

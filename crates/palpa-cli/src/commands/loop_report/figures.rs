@@ -244,7 +244,7 @@ impl Figures {
             events: report
                 .events
                 .iter()
-                .map(|e| format!("{:.3} s: {}", e.time, e.text))
+                .map(|e| format!("{:.3} s: {}", e.time, e.what))
                 .collect(),
         }
     }

@@ -1,0 +1,294 @@
+//! The engine's figures and events: kinds and numbers. Pages have words for each kind in each of
+//! their languages.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::NoticeLevel;
+
+/// Figures of the engine.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct EngineFigures {
+    /// Time since the engine's start, s.
+    pub seconds: f64,
+    /// Steps of the tissue per second, since the last figures.
+    pub tissue_rate: f64,
+    /// Ticks of the 1 kHz loop per second, since the last figures.
+    pub tick_rate: f64,
+    /// Missed deadlines: ticks that were skipped since the start.
+    pub missed: u64,
+    /// CPU time of a tick, s: median, 99.9th percentile, maximum.
+    pub tick_cpu: [f64; 3],
+    /// Lateness of ticks, s: median, 99.9th percentile, maximum.
+    pub lateness: [f64; 3],
+    /// CPU time of the tissue's steps, s: median, 99.9th percentile, maximum.
+    pub step_cpu: [f64; 3],
+    /// Histogram of the CPU time of ticks: lower bound (s), upper bound (s), count.
+    pub tick_histogram: Vec<(f64, f64, u64)>,
+    /// Age of the contact patch in use, s: time since its pose was read.
+    pub latency: f64,
+    /// Number of nodes of the body.
+    pub n_nodes: u32,
+    /// Meshes taken up since the start.
+    pub n_meshes: u64,
+    /// The force limits that were reached since the last figures.
+    pub limits: Vec<ForceLimit>,
+    /// The faults since the last figures.
+    pub faults: Vec<LawFault>,
+    /// Energy taken from the hand since the start, J.
+    pub energy_in: f64,
+    /// Energy given to the hand since the start, J.
+    pub energy_out: f64,
+    /// Energy that the device may still give out beyond the energy taken in, J.
+    pub energy_budget: f64,
+    /// Result of the tissue's last step.
+    pub step_status: StepResult,
+    /// Priorities and cores that the system granted to the threads.
+    pub granted: Vec<GrantedInfo>,
+    /// The latest events, newest last.
+    pub events: Vec<EventInfo>,
+    /// Snapshots per second, since the last figures.
+    pub snapshot_rate: f64,
+}
+
+/// A limit that a force met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceLimit {
+    /// Largest force of the device.
+    Force,
+    /// Largest moment of the device.
+    Torque,
+    /// Largest rate of change of the force.
+    Slew,
+    /// The ramp held the force back.
+    Ramp,
+    /// The energy observer injected damping.
+    Energy,
+    /// The coupling softened a contact that is too stiff for the device.
+    Stiffness,
+    /// The difference in force to a new patch was larger than the transfer bridges.
+    Transfer,
+    /// The sweeps ended before the tolerance was met.
+    Sweeps,
+}
+
+/// A reason why the force is ramped to zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawFault {
+    /// There was no patch yet.
+    NoPatch,
+    /// The newest patch is too old.
+    StalePatch,
+    /// The newest patch holds values that cannot be a contact.
+    BadPatch,
+    /// The time since the last tick was too long.
+    MissedDeadline,
+    /// The clock went back, stood still, or was not a number.
+    BadClock,
+    /// A device gave no reading.
+    DeviceLost,
+    /// A device gave a reading that is not a number.
+    BadReading,
+    /// A device repeats the same reading.
+    DeviceStalled,
+    /// A position jumped faster than a hand can move.
+    DeviceJumped,
+    /// The contact problem gave no finite force.
+    NoSolution,
+}
+
+/// Result of a step of the tissue.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StepResult {
+    /// The step converged within its tolerance.
+    #[default]
+    Converged,
+    /// The residual is above the tolerance, but the state is usable.
+    Unfinished,
+    /// The step did not reach the poses of the tools.
+    Behind,
+    /// The forces are not fit to be felt yet; the patch is not published.
+    Settling,
+    /// There is no usable state; the patch is not published.
+    Failed,
+}
+
+/// Scheduling that a thread requested, and the system's answer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct GrantedInfo {
+    /// Name of the thread.
+    pub thread: String,
+    /// The requested priority.
+    pub priority: PriorityInfo,
+    /// The system's reason for refusing the priority; null if it was granted.
+    pub priority_refused: Option<String>,
+    /// The requested core; null for any core.
+    pub core: Option<u32>,
+    /// The system's reason for refusing the core; null if it was granted.
+    pub core_refused: Option<String>,
+}
+
+/// Scheduling priority of a thread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum PriorityInfo {
+    /// Real-time, before all ordinary threads.
+    RealTime {
+        /// 1 to 99; a larger number goes first.
+        priority: u8,
+    },
+    /// Ordinary.
+    Normal,
+    /// Ordinary, with a niceness.
+    Nice {
+        /// 1 to 19 is after other threads, -1 to -20 before them.
+        niceness: i8,
+    },
+}
+
+/// An entry of the engine's log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EventInfo {
+    /// Time since the engine's start, s.
+    pub time: f64,
+    /// Severity.
+    pub level: NoticeLevel,
+    /// The event.
+    pub what: EventKind,
+}
+
+/// What happened in the engine.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum EventKind {
+    /// The 1 kHz loop began.
+    LoopStarted,
+    /// The 1 kHz loop ended.
+    LoopStopped {
+        /// Ticks that it did.
+        ticks: u64,
+    },
+    /// A device could not be read; its force goes to zero.
+    DeviceLost {
+        /// Number of the device.
+        device: u32,
+        /// The reason.
+        why: DeviceTrouble,
+    },
+    /// A device can be read again.
+    DeviceBack {
+        /// Number of the device.
+        device: u32,
+        /// Ticks for which it was away.
+        ticks: u64,
+    },
+    /// A device did not accept its force.
+    WriteFailed {
+        /// Number of the device.
+        device: u32,
+        /// The reason.
+        why: DeviceTrouble,
+    },
+    /// Ticks were skipped because one took too long.
+    DeadlineMissed {
+        /// Number of ticks skipped since the last such event.
+        skipped: u64,
+        /// Longest time between two ticks since the last such event, s.
+        longest: f64,
+    },
+    /// The law's faults changed.
+    LawFaults {
+        /// The present faults; empty when they are over.
+        faults: Vec<LawFault>,
+    },
+    /// The tissue thread began.
+    TissueStarted,
+    /// The tissue thread ended.
+    TissueStopped {
+        /// Steps that it did.
+        steps: u64,
+    },
+    /// The status of the tissue's steps changed.
+    StepStatus {
+        /// Number of the step.
+        step: u64,
+        /// The new status.
+        status: StepResult,
+    },
+    /// The tissue panicked; its thread is gone and the force goes to zero.
+    TissuePanicked {
+        /// Number of the step.
+        step: u64,
+    },
+    /// The tissue was moved on by less time than passed.
+    TimeLost {
+        /// Total difference since the last such event, s.
+        seconds: f64,
+    },
+    /// A background job panicked; the tissue continues without its result.
+    JobPanicked,
+    /// A fault was caused on purpose.
+    Injected {
+        /// The fault.
+        fault: InjectedFault,
+    },
+    /// A ring was full, and records were lost.
+    RecordsLost {
+        /// What was lost.
+        records: LostRecords,
+        /// Number of records.
+        n: u64,
+    },
+    /// The log file could not be written; the recording ends.
+    FileFailed {
+        /// The system's reason.
+        reason: String,
+    },
+}
+
+/// Why a device did not deliver a reading or accept a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DeviceTrouble {
+    /// The device is not connected.
+    Unplugged,
+    /// The device did not answer in time.
+    TimedOut,
+    /// The answer of the device makes no sense.
+    Garbled,
+    /// Another reason.
+    Unusable,
+}
+
+/// A fault that was caused on purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InjectedFault {
+    /// The tissue panics.
+    TissuePanics,
+    /// A patch has a force that is not a number.
+    PatchWithNan,
+    /// The tissue's patch is late.
+    PatchLate,
+    /// The tissue pauses.
+    TissuePauses,
+    /// The pause of the tissue is over.
+    TissueGoesOn,
+    /// The 1 kHz loop wakes up late.
+    LoopLate,
+}
+
+/// Records that were lost because a ring was full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LostRecords {
+    /// Ticks of the 1 kHz loop.
+    Ticks,
+    /// Steps of the tissue.
+    Steps,
+    /// Events.
+    Events,
+}
