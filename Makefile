@@ -1,12 +1,12 @@
 # make run        the viewer: a forearm to be touched, in a browser
-# make test       all tests that need nothing but this tree and a browser, which is installed where there is none
+# make test       all tests that need nothing but this tree and a browser (it installs one)
 # make dist       one binary with the page inside, packed for others
-# make test-slow  tests of minutes, with optimisation: forces while moving, faults, verification by formula
-# make test-data  tests on real and awkward meshes (SHARED=…), and our files opened by meshio and pyvista
+# make test-slow  tests of minutes, optimised: forces while moving, faults, verification by formula
+# make test-data  tests on real and awkward meshes (SHARED=…); meshio and pyvista open our files
 # make hunt       property tests with fresh seeds and fuzz targets, for HUNT_MINUTES=20
 # make lint       format, clippy, the fuzz targets compile; licences, spelling and unused dependencies where their tools are installed
 # make docs       the API documentation without a warning, the book of docs/, and all links checked
-# make cross      cargo check for Windows and for Linux on ARM, with the standard library that can be had here
+# make cross      cargo check for Windows and for Linux on ARM
 # make loop       a minute of the 1 kHz loop in real time, and the same minute run again
 # make bench      the thesis's table and the moving step, measured here
 
@@ -18,7 +18,8 @@ HUNT_MINUTES ?= 20
 SHOTS   ?= $(TARGET)/tmp/screenshots
 PAGE    := web/dist/index.html
 BOOK    := $(TARGET)/book
-# Where mdBook is installed if it is not on the path; a folder that outlives the tree saves building it again.
+# Where mdBook is installed if it is not on the path; a folder that outlives the tree saves
+# building it again.
 BOOK_TOOLS ?= $(abspath $(TARGET))/tools
 MDBOOK  := $(or $(shell command -v mdbook 2>/dev/null),$(BOOK_TOOLS)/bin/mdbook)
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
@@ -85,7 +86,8 @@ lint:
 	$(call with,cargo-machete,cargo machete)
 	$(call with,typos,typos)
 
-# Runs the second argument if the first is installed, and says so if it is not: building these tools takes minutes.
+# Runs the second argument if the first is installed, and says so if it is not: building these
+# tools takes minutes.
 define with
 @if command -v $(1) >/dev/null; then echo "$(2)"; $(2); else echo "lint: $(1) is not installed, left out"; fi
 endef

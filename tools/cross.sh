@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# cargo check of all crates for systems that this machine is not: TARGETS, or Windows and Linux on ARM.
+# cargo check of all crates for systems that this machine is not: TARGETS, or
+# Windows and Linux on ARM.
 #
 # The standard library of a target is taken from rustup; where rustup does not have it, it is checked from source: that of
 # the toolchain, or that of Debian's rustc-web and rust-web-src, unpacked below target/ and not installed. A check needs no linker
@@ -15,8 +16,8 @@ has_target() {
     compgen -G "$(rustc --print target-libdir --target "$1")/libcore-*.rlib" >/dev/null
 }
 
-# Debian's compiler with the source of its standard library, into $debian. Its version need not be the toolchain's: it
-# compiles everything here.
+# Debian's compiler with the source of its standard library, into $debian. Its version need not be
+# the toolchain's: it compiles everything here.
 unpack_debian() {
     [ -x "$debian/rustc" ] && return
     command -v apt-get dpkg >/dev/null || return 1
@@ -63,7 +64,8 @@ if [ ${#with_std[@]} -gt 0 ]; then
 fi
 
 if [ ${#from_source[@]} -gt 0 ]; then
-    # `-Z build-std` is cargo's way to compile the standard library; RUSTC_BOOTSTRAP lets a stable cargo take it.
+    # `-Z build-std` is cargo's way to compile the standard library; RUSTC_BOOTSTRAP lets a
+    # stable cargo take it.
     check=(cargo check --workspace -Z build-std=std,panic_unwind "${quick[@]}" "${from_source[@]}")
     export RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR="$folder/target"
     if [ -f "$(rustc --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Packs the release binary, which has the page inside, with what belongs to it: dist.sh TARGET-FOLDER VERSION
+# Packs the release binary, which has the page inside, with what belongs to it.
+# Usage: tools/dist.sh TARGET-FOLDER VERSION
 set -euo pipefail
 target=$1 version=$2
 host=$(rustc --version --verbose | sed -n 's/^host: //p')

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Looks for bugs for some minutes: property tests with fresh seeds over and over, then the fuzz targets.
+# Looks for bugs for some minutes: property tests with fresh seeds over and over,
+# then the fuzz targets.
 # Usage: tools/hunt.sh [minutes, 20] [folder for what it finds, out/hunt]
 #
 # The minutes are shared half and half; without cargo-fuzz the property tests get them all. Building

@@ -14,7 +14,11 @@ const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.mi
 const JAPANESE = /[\u3040-\u30ff\u4e00-\u9fff]/;
 const TABS = ['scene', 'view', 'tissues', 'lumps', 'tool', 'device', 'motion', 'record', 'game', 'engine'];
 
-/** What axe finds that is serious or critical. @param {PalpaPage} palpa @returns {Promise<string[]>} */
+/**
+ * What axe finds that is serious or critical.
+ * @param {PalpaPage} palpa
+ * @returns {Promise<string[]>}
+ */
 async function findings(palpa) {
   return palpa.page.evaluate(async () => {
     const { axe } = /** @type {any} */ (window);
@@ -67,7 +71,8 @@ test('every control can be reached by Tab', async () => {
 test('pictures in both themes, and in Japanese', async () => {
   const palpa = await sharedPage();
   await palpa.have('forearm_lump');
-  // Menus take the focus from the hand, so the motion of the scene presses while pictures are taken.
+  // Menus take the focus from the hand, so the motion of the scene presses while
+  // pictures are taken.
   await palpa.tab('motion');
   await palpa.by('motion-kind').selectOption('press');
   await palpa.viewer.running('the motion is a press', (state) => sceneOf(state).motion?.kind === 'press');

@@ -1,6 +1,8 @@
-// The browser that the tests drive: one that is installed, Debian's Chromium for one; none is downloaded.
+// The browser that the tests drive: one that is installed, Debian's Chromium for one;
+// none is downloaded.
 //
-// `node e2e/browser.mjs` says which it is; with `--install` it asks Debian for one when there is none.
+// `node e2e/browser.mjs` says which it is; with `--install` it asks Debian for one
+// when there is none.
 
 import { execFileSync, spawnSync } from 'node:child_process';
 import { accessSync, constants, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -56,9 +58,10 @@ function findBrowser() {
 }
 
 /**
- * A program that runs the browser behind everything else. Drawing in software takes all cores, and as root Chromium would
- * even put itself before the engine's tissue, which then answers too late to be felt. Where the kernel shares the cores
- * out by terminal sessions first (autogroups), it is the session that has to be behind; the browser has one of its own.
+ * A program that runs the browser behind everything else. Drawing in software takes all cores, and
+ * as root Chromium would even put itself before the engine's tissue, which then answers too late to
+ * be felt. Where the kernel shares the cores out by terminal sessions first (autogroups), it is the
+ * session that has to be behind; the browser has one of its own.
  * @param {string} browser
  */
 function behind(browser) {

@@ -8,7 +8,10 @@ import { PalpaPage } from './page.mjs';
 import { endShared, sharedBrowser } from './session.mjs';
 import { Viewer, until } from './viewer.mjs';
 
-/** The viewer of this file, which is stopped, killed and made to fail. The block builds fastest. @type {Viewer | undefined} */
+/**
+ * The viewer of this file, which is stopped, killed and made to fail. The block builds fastest.
+ * @type {Viewer | undefined}
+ */
 let viewer;
 /** Pages that a test opened. @type {PalpaPage[]} */
 let pages = [];
@@ -156,7 +159,8 @@ test('malformed, huge or too many messages disturb nobody', async () => {
       const one = socket();
       one.on('open', () => {
         talk(one);
-        // Messages are read in order: after the pong, or an end of the connection, the engine has had all of them.
+        // Messages are read in order: after the pong, or an end of the connection, the engine
+        // has had all of them.
         one.ping();
       });
       one.on('pong', () => one.terminate());

@@ -17,7 +17,10 @@ async function exported(palpa) {
   return readBody(await palpa.viewer.body());
 }
 
-/** Where the slider's position puts the plane, m: the way goes through the body at rest. @param {import('./vtu.mjs').Body & { displacement: import('./vtu.mjs').Vec3[] | null }} body */
+/**
+ * Where the slider's position puts the plane, m: the way goes through the body at rest.
+ * @param {import('./vtu.mjs').Body & { displacement: import('./vtu.mjs').Vec3[] | null }} body
+ */
 function planeAt(body, axis = 0, position = 0.5) {
   const { displacement } = body;
   assert.ok(displacement, 'the file tells displacements');
@@ -26,7 +29,11 @@ function planeAt(body, axis = 0, position = 0.5) {
   return low + (high - low) * (MARGIN + (1 - 2 * MARGIN) * position);
 }
 
-/** Compares the shown section with the slice of the body exported now. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis */
+/**
+ * Compares the shown section with the slice of the body exported now.
+ * @param {import('./page.mjs').PalpaPage} palpa
+ * @param {number} axis
+ */
 async function compared(palpa, axis) {
   const position = Number(await palpa.by('cutaway-position').inputValue());
   const body = await exported(palpa);
@@ -44,7 +51,12 @@ async function compared(palpa, axis) {
   return { shown, slice, off: Math.abs(shown.total - slice) / slice, worstLayer };
 }
 
-/** The page draws a section some frames after it was asked for. @param {import('./page.mjs').PalpaPage} palpa @param {number} axis @param {string} when */
+/**
+ * The page draws a section some frames after it was asked for.
+ * @param {import('./page.mjs').PalpaPage} palpa
+ * @param {number} axis
+ * @param {string} when
+ */
 async function assertSameArea(palpa, axis, when) {
   let words = '';
   const look = async () => {

@@ -93,7 +93,13 @@ class Client {
   }
 }
 
-/** Presses in and out by a millimetre, so that there is work for the tissue. @param {Hand} home @param {number} depth @param {number} seconds @returns {Hand} */
+/**
+ * Presses in and out by a millimetre, so that there is work for the tissue.
+ * @param {Hand} home
+ * @param {number} depth
+ * @param {number} seconds
+ * @returns {Hand}
+ */
 function handAt({ point, normal }, depth, seconds) {
   return { point, normal, depth: depth + 1e-3 * Math.sin(2 * Math.PI * seconds) };
 }

@@ -122,7 +122,8 @@ export class PalpaPage {
     });
   }
 
-  /** Waits until the force is steady: the hand is at rest and the force is not reduced. `tolerance` is a share of the force. */
+  /** Waits until the force is steady: the hand is at rest and the force is not reduced. `tolerance`
+   * is a share of the force. */
   async steady(tolerance = 0.01) {
     /** @type {Readout[]} */
     let last = [];
@@ -144,7 +145,10 @@ export class PalpaPage {
     return this.reads('no force', ({ newtons, metres }) => newtons === 0 && metres < 0);
   }
 
-  /** Reads every frame for so many ticks of the loop and asserts that none has a force. @param {number} ticks */
+  /**
+   * Reads every frame for so many ticks of the loop and asserts that none has a force.
+   * @param {number} ticks
+   */
   async feelsNothing(ticks) {
     const { tick: begin } = await this.readout();
     await this.reads('frames without a force', ({ newtons, tick }) => {

@@ -1,4 +1,5 @@
-// One viewer, one browser and one page that all tests share, because each of them takes seconds to start.
+// One viewer, one browser and one page that all tests share, because each of them
+// takes seconds to start.
 
 import { after } from 'node:test';
 import { launch } from './browser.mjs';

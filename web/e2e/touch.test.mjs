@@ -37,7 +37,8 @@ test('the wheel presses deeper, and the force grows', async () => {
   const before = await palpa.steady();
   for (let k = 0; k < 4; k++) await palpa.page.mouse.wheel(0, -100);
   await palpa.reads('another depth', ({ metres }) => Math.abs(metres - before.metres) > 0.5e-3);
-  // A machine that stops for a moment lets the hand sink in, too: what counts is where it comes to rest.
+  // A machine that stops for a moment lets the hand sink in, too: what counts is
+  // where it comes to rest.
   const after = await palpa.steady();
   await palpa.release();
   const deeper = after.metres - before.metres;

@@ -43,7 +43,10 @@ export async function until(what, look, timeout = LONG) {
   }
 }
 
-/** The scene of a state, as its file writes it. @param {import('../src/generated/api').State} state */
+/**
+ * The scene of a state, as its file writes it.
+ * @param {import('../src/generated/api').State} state
+ */
 export const sceneOf = (state) => /** @type {import('../src/generated/scene').SceneTable} */ (state.scene);
 
 export class Viewer {

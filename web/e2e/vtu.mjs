@@ -53,7 +53,11 @@ const ENDS = [[0, 2, 1], [3, 4, 5]];
 /** @param {Vec3[]} points @returns {Vec3} */
 const mean = (points) => /** @type {Vec3} */ ([0, 1, 2].map((c) => points.reduce((sum, p) => sum + p[c], 0) / points.length));
 
-/** A wedge as tetrahedra round its middle; each four-sided face as four triangles round the face's: the same from both sides. @param {Vec3[]} corners */
+/**
+ * A wedge as tetrahedra round its middle; each four-sided face as four triangles round the face's:
+ * the same from both sides.
+ * @param {Vec3[]} corners
+ */
 function tetrahedra(corners) {
   const middle = mean(corners);
   const faces = ENDS.map((face) => face.map((k) => corners[k]));
@@ -70,7 +74,11 @@ const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 /** @param {Vec3} a @param {Vec3} b @returns {Vec3} */
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-/** Area of the slice of a tetrahedron with heights over a plane. @param {Vec3[]} corners @param {number[]} heights */
+/**
+ * Area of the slice of a tetrahedron with heights over a plane.
+ * @param {Vec3[]} corners
+ * @param {number[]} heights
+ */
 function slice(corners, heights) {
   const above = [0, 1, 2, 3].filter((k) => heights[k] > 0);
   const below = [0, 1, 2, 3].filter((k) => heights[k] <= 0);
@@ -107,7 +115,12 @@ export function sliceAreas({ points, wedges, layer }, axis, at) {
   return Array.from(areas, (area) => area ?? 0);
 }
 
-/** Least and greatest coordinate along an axis. @param {Vec3[]} points @param {number} axis @returns {[number, number]} */
+/**
+ * Least and greatest coordinate along an axis.
+ * @param {Vec3[]} points
+ * @param {number} axis
+ * @returns {[number, number]}
+ */
 export function extent(points, axis) {
   let [low, high] = [Infinity, -Infinity];
   for (const point of points) {

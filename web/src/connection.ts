@@ -21,9 +21,11 @@ interface ConnectionListener {
 /** Before a new attempt to connect, ms; doubled after each failure. */
 const FIRST_WAIT = 500;
 const LONGEST_WAIT = 5000;
-/** Silence after which a connection counts as lost, ms: the engine sends something twice a second. */
+/** Silence after which a connection counts as lost, ms: the engine sends
+ * something twice a second. */
 const SILENCE = 6000;
-/** Then for messages that wait to be read, ms: after a page has stood still its timers may come before them. */
+/** Then for messages that wait to be read, ms: after a page has stood still its timers
+ * may come before them. */
 const GRACE = 1000;
 /** ms. */
 const REPLY_WAIT = 35_000;

@@ -69,7 +69,8 @@ export function dismissToast(key: number): void {
   if (toasts.value.includes(key)) toasts.value = toasts.value.filter((other) => other !== key);
 }
 
-// Snapshots come up to 60 times a second. They go to the drawing code directly, not through signals.
+// Snapshots come up to 60 times a second. They go to the drawing code directly,
+// not through signals.
 
 export const history = new History();
 let latestMesh: MeshSnapshot | null = null;
@@ -160,7 +161,8 @@ export function connect(): void {
   });
 }
 
-/** Sends a request; resolves to the reason of a refusal, or null. Shows nothing: fields show the reason themselves. */
+/** Sends a request; resolves to the reason of a refusal, or null. Shows nothing: fields show the
+ * reason themselves. */
 export async function ask(request: Request): Promise<string | null> {
   const isScene = request.type === 'load_text';
   if (isScene) awaitScene();

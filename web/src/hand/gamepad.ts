@@ -11,7 +11,8 @@ export class Gamepads {
   private wasUsed = false;
   private readonly stop = new AbortController();
 
-  /** `onUse` gets the stick (right and down, −1 to 1), the trigger (0 to 1), and the time since the last call, s. */
+  /** `onUse` gets the stick (right and down, −1 to 1), the trigger (0 to 1), and the time
+   * since the last call, s. */
   constructor(private readonly onUse: (dx: number, dy: number, pull: number, dt: number) => void) {
     const { signal } = this.stop;
     // Gamepads must be polled. There is no polling while there is none.

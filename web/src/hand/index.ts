@@ -1,4 +1,5 @@
-// The hand that holds the tool, by mouse, finger, keys or gamepad: tells the engine where the tool is to be.
+// The hand that holds the tool, by mouse, finger, keys or gamepad: tells the engine where
+// the tool is to be.
 
 import type { Request } from '../connection';
 import type { BodyView, Vec3 } from '../scene';
@@ -38,7 +39,8 @@ export class HandControl implements Held {
       wheel: (event) => this.wheel(event),
       release: () => this.lift(),
     };
-    // A tool that keys hold stays where it is while other parts of the page are used. Escape lifts it from anywhere.
+    // A tool that keys hold stays where it is while other parts of the page are used. Escape
+    // lifts it from anywhere.
     view.canvas.addEventListener('blur', () => this.stepping.isHolding || this.lift(), { signal });
     window.addEventListener('keydown', (e) => e.key === 'Escape' && this.stepping.isHolding && this.lift(), { signal });
     window.addEventListener('blur', () => this.lift(), { signal });

@@ -3,7 +3,8 @@
 import type { Request } from '../connection';
 import type { Target } from './target';
 
-/** Shortest time between two messages, and longest while the tool is held, ms. The engine lifts after a second of silence. */
+/** Shortest time between two messages, and longest while the tool is held, ms. The engine lifts
+ * after a second of silence. */
 const LEAST_WAIT = 1000 / 60;
 const MOST_WAIT = 150;
 

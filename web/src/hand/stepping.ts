@@ -27,7 +27,8 @@ export class SteppingHand {
     hand.view.canvas.addEventListener('keydown', (event) => this.key(event), { signal });
   }
 
-  /** Moves by the stick (right and down, −1 to 1) and presses by the trigger (0 to 1); `dt` in s. */
+  /** Moves by the stick (right and down, −1 to 1) and presses by the trigger
+   * (0 to 1); `dt` in s. */
   gamepad(dx: number, dy: number, pull: number, dt: number): void {
     const { enabled, mode, pressDepth } = this.hand.settings;
     if (!enabled || mode === 'orbit' || this.isTaken()) return;

@@ -1,5 +1,5 @@
-// Words of the engine's notes. The engine sends kind and numbers; each kind has an entry for each language here, so that a
-// new kind does not compile without its words.
+// Words of the engine's notes. The engine sends kind and numbers; each kind has an entry for each
+// language here, so that a new kind does not compile without its words.
 
 import type { Format, ImprintError, Note, Outcome, Place, ReadNote, Tool } from '../generated/notes';
 import { inMillimetres } from '../ui/quantity';

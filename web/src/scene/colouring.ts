@@ -9,7 +9,8 @@ import { QUANTITIES, type ColourBy, type Quantity } from './quantities';
 
 /** The time in which an automatic range shrinks by a half, s. */
 const HALF_LIFE = 3;
-/** Share of the nodes that an automatic range covers: single nodes at edges of the contact would darken all else. */
+/** Share of the nodes that an automatic range covers: single nodes at edges of the contact
+ * would darken all else. */
 const SHARE = 0.995;
 
 export class Colouring {

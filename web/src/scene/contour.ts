@@ -17,7 +17,8 @@ export function planeAxes(n: readonly number[]): [[number, number, number], [num
   return [u, [n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]]];
 }
 
-/** Loops in which a plane cuts a triangulated surface: x, y, z one after the other. Loops left open by holes are closed straight. */
+/** Loops in which a plane cuts a triangulated surface: x, y, z one after the other. Loops left open
+ * by holes are closed straight. */
 export function contourLoops(positions: Float32Array, triangles: Uint32Array, plane: CutPlane): number[][] {
   const [nx, ny, nz] = plane.normal;
   const nNodes = positions.length / 3;
@@ -64,7 +65,8 @@ export function contourLoops(positions: Float32Array, triangles: Uint32Array, pl
   return loops;
 }
 
-/** Triangles that fill loops of a plane by the even-odd rule: x, y, z of corners one after the other. */
+/** Triangles that fill loops of a plane by the even-odd rule: x, y, z of corners
+ * one after the other. */
 export function fillLoops(loops: number[][], plane: CutPlane): number[] {
   const [u, v] = planeAxes(plane.normal);
   const flat = loops.map((loop) => {

@@ -1,4 +1,5 @@
-// The cutaway as it is drawn: the clipped body, the section that closes it, the frame of the plane and its grip.
+// The cutaway as it is drawn: the clipped body, the section that closes it, the frame of the
+// plane and its grip.
 
 import { Plane, Vector3, type Vector2 } from 'three';
 import type { LumpInfo } from '../generated/api';

@@ -1,4 +1,5 @@
-// Rotating, moving and zooming the view by mouse and fingers. The hand may claim gestures that begin on the body.
+// Rotating, moving and zooming the view by mouse and fingers. The hand may claim gestures that
+// begin on the body.
 
 import type { CameraRig } from './rig';
 

@@ -5,10 +5,12 @@ import type { ViewOptions } from './options';
 import { layerColours } from './palette';
 import type { LayerLook } from './surfaces';
 
-/** Greatest opacity of layers while a game shows its result: the lumps must be seen through all of them. */
+/** Greatest opacity of layers while a game shows its result: the lumps must be seen
+ * through all of them. */
 const RESULT_OPACITY = 0.38;
 
-/** A layer that lets something through shows more of itself in the section, where nothing lies behind it. */
+/** A layer that lets something through shows more of itself in the section, where
+ * nothing lies behind it. */
 const SECTION_BONUS = 0.25;
 
 export interface NamedLook extends LayerLook {
@@ -30,7 +32,8 @@ export function sectionOpacity({ opacity }: LayerLook): number {
   return opacity < 1 ? Math.min(1, opacity + SECTION_BONUS) : 1;
 }
 
-/** The lumps that may be shown: during a game none, and those of the game once it shows its result. */
+/** The lumps that may be shown: during a game none, and those of the game once
+ * it shows its result. */
 export function knownLumps(state: State | null): LumpInfo[] {
   const result = state?.game?.result;
   return result ? result.lumps.map(({ lump }) => lump) : (state?.lumps ?? []);

@@ -1,4 +1,5 @@
-// When to draw: once after a change, as fast as the GPU keeps up, and once more in full detail when nothing moves.
+// When to draw: once after a change, as fast as the GPU keeps up, and once more in full detail
+// when nothing moves.
 
 import type { Detail, Quality } from './quality';
 

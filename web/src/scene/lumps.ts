@@ -87,7 +87,8 @@ function shape({ shape: form, axes, centre }: LumpInfo): BufferGeometry {
   return geometry.applyMatrix4(new Matrix4().makeBasis(a, b, c).setPosition(...(centre as [number, number, number])));
 }
 
-/** Finds the tetrahedron of the body at rest around each point, and the point's shares of its corners. Points outside get none. */
+/** Finds the tetrahedron of the body at rest around each point, and the point's shares of its
+ * corners. Points outside get none. */
 function locate(body: Body, points: Float32Array, nodes: Int32Array, shares: Float32Array): void {
   const { rest: x, triangles, nLevels } = body;
   const n = points.length / 3;

@@ -1,8 +1,9 @@
 // Colours of tissues by their names, colour maps, and the two themes.
 //
-// To add a colour map: one entry in `MAPS` below with its source, its colours evenly spaced from the least value to the
-// greatest, and the lines that are seen on it. To use it: name it in `MAP_OF` at the quantity that it shows. Nothing else of
-// the page names a map, and none needs words: the legend shows the quantity.
+// To add a colour map: one entry in `MAPS` below with its source, its colours evenly spaced from
+// the least value to the greatest, and the lines that are seen on it. To use it: name it in
+// `MAP_OF` at the quantity that it shows. Nothing else of the page names a map, and none needs
+// words: the legend shows the quantity.
 // To add a tissue's colour: one line in `TISSUES`.
 
 import { DataTexture, LinearFilter, RGBAFormat, SRGBColorSpace } from 'three';
@@ -14,7 +15,8 @@ export const SKIN = '#dba17b';
 /** Skin as a surface is paler than its section. */
 export const SKIN_IN_LIGHT = '#dcae98';
 
-/** Parts of tissue names, mostly of the catalogue; the first that occurs in a layer's name counts. */
+/** Parts of tissue names, mostly of the catalogue; the first that occurs in a
+ * layer's name counts. */
 const TISSUES: [string, string][] = [
   ['epidermis', '#e3b08d'],
   ['dermis', '#d9a07c'],
@@ -42,7 +44,8 @@ export const BONE = '#e9e2cf';
 export const CORE = '#c3b7a3';
 export const LUMP = '#7d5ba6';
 
-/** A colour for every layer, from the skin down: the same on the body, in its section and in legends. */
+/** A colour for every layer, from the skin down: the same on the body, in its
+ * section and in legends. */
 export function layerColours(layers: readonly Pick<LayerInfo, 'name'>[]): string[] {
   const taken = new Set<string>();
   return layers.map(({ name }, i) => {
@@ -65,7 +68,8 @@ interface ColourMap {
 }
 
 const MAPS = {
-  /** YlGnBu (Brewer, 2002), safe for colour-blind eyes; small values are light, so that a body at rest shows its shape. */
+  /** YlGnBu (Brewer, 2002), safe for colour-blind eyes; small values are light, so that a body at
+   * rest shows its shape. */
   ylgnbu: {
     stops: ['#fbf8d0', '#edf4b1', '#c7e9b4', '#7fcdbb', '#41b6c4', '#1d91c0', '#225ea8', '#253494', '#081d58'],
     lines: 'white',

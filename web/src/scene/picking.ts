@@ -106,7 +106,8 @@ function pickSection(ray: Ray, section: Section, plane: CutPlane): Hit | null {
   return { ...hit, point, normal: plane.normal.map((c) => side * c) as Vec3 };
 }
 
-/** The place of the skin at rest that is nearest to a point: its triangle's first index, and shares of the corners. */
+/** The place of the skin at rest that is nearest to a point: its triangle's first index, and
+ * shares of the corners. */
 export function nearestOnSkin(body: Body, p: Vec3): { triangle: number; shares: Vec3; point: Vec3; normal: Vec3 } {
   const { triangles, rest, nLevels } = body;
   let best = Infinity, triangle = 0;

@@ -1,5 +1,5 @@
-// The detail of pictures, so that slow GPUs and software WebGL stay usable: less while the body moves, all of it when it
-// stands still.
+// The detail of pictures, so that slow GPUs and software WebGL stay usable: less while the body
+// moves, all of it when it stands still.
 
 /** A picture that takes longer is slow, one that takes less is fast, ms. */
 const SLOW = 38;
@@ -8,7 +8,8 @@ const FAST = 14;
 const STILL_MS = 350;
 /** The same where a full picture takes long and would delay the next movement. */
 const STILL_MS_SLOW = 900;
-/** Pixel ratios for still pictures in software WebGL, which has no multisampling. If one takes too long, the next is used. */
+/** Pixel ratios for still pictures in software WebGL, which has no multisampling. If one takes too
+ * long, the next is used. */
 const STILL_RATIOS = [2, 1.5, 1];
 /** ms. */
 const STILL_TOO_LONG = 350;
@@ -82,7 +83,8 @@ export class Quality {
     }
   }
 
-  /** The detail of the next picture: full when nothing has changed for a while, less while pictures follow each other. */
+  /** The detail of the next picture: full when nothing has changed for a while, less while pictures
+   * follow each other. */
   begin(isRefinement: boolean): Detail {
     this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);
     const usual = Math.min(window.devicePixelRatio || 1, 2);

@@ -1,13 +1,15 @@
 // The quantities that a body can be coloured by, beside its tissues and layers.
 //
-// To add one: an entry in `QUANTITIES` below, its colour map in palette.ts (the compiler asks for it), and its name,
-// `colour.…`, in i18n/en.ts and i18n/ja.ts. One that the engine computes needs a name in `Field` and a number in the
-// snapshots as well; one that the page computes needs its values in colouring.ts.
+// To add one: an entry in `QUANTITIES` below, its colour map in palette.ts (the compiler asks for
+// it), and its name, `colour.…`, in i18n/en.ts and i18n/ja.ts. One that the engine computes needs a
+// name in `Field` and a number in the snapshots as well; one that the page computes needs its
+// values in colouring.ts.
 
 import type { Field } from '../generated/api';
 
 interface QuantityInfo {
-  /** The engine's field and its number in snapshots; null where the page computes the values itself. */
+  /** The engine's field and its number in snapshots; null where the page computes
+   * the values itself. */
   field: { name: Exclude<Field, 'none'>; number: number } | null;
   /** The value of a body that nothing presses, SI. */
   rest: number;

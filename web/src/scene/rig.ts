@@ -58,7 +58,8 @@ export class CameraRig {
   }
 
   private distanceFor(box: Box3, centre: Vector3, direction: Vector3): number {
-    // The corners of the box as seen: the nearest distance from which all are in the picture, with a margin.
+    // The corners of the box as seen: the nearest distance from which all are in the
+    // picture, with a margin.
     const up = new Vector3(0, 0, 1);
     const right = new Vector3().crossVectors(up, direction).normalize();
     up.crossVectors(direction, right);

@@ -1,4 +1,5 @@
-// The section of a body of prisms by a plane: polygons, one or more per prism, exact for its straight edges.
+// The section of a body of prisms by a plane: polygons, one or more per prism, exact for
+// its straight edges.
 //
 // ```text
 //        2                  Nodes and edges of a prism. The plane cuts edges; walking round every face, from each edge
@@ -104,7 +105,8 @@ export class Section {
     if (this.state.length < nVertices) this.state = new Uint8Array(nVertices);
     const { height, state } = this;
     const [nx, ny, nz] = plane.normal;
-    // Columns that lie wholly on one side (1 or 2) are found first, so that their prisms are skipped.
+    // Columns that lie wholly on one side (1 or 2) are found first, so that their
+    // prisms are skipped.
     for (let v = 0, node = 0; v < nVertices; v++) {
       let sides = 0;
       for (let l = 0; l < nLevels; l++, node++) {
@@ -128,7 +130,8 @@ export class Section {
         nodes[0] = a + i; nodes[1] = b + i; nodes[2] = c + i;
         nodes[3] = a + i + 1; nodes[4] = b + i + 1; nodes[5] = c + i + 1;
         const layer = intervalLayer[i];
-        // Faces on which a line between layers runs: above where a layer begins, below at the base, sides on rims.
+        // Faces on which a line between layers runs: above where a layer begins, below at the
+        // base, sides on rims.
         const isLast = i === nLevels - 2 || (intervalLayer[i + 1] !== layer && shown[intervalLayer[i + 1]] === false);
         const lined = (i === 0 || intervalLayer[i - 1] !== layer ? 1 : 0) | (isLast ? 2 : 0) | (rimBits[t] << 2);
         for (const loop of CASES[mask]) {

@@ -1,5 +1,6 @@
-// The surroundings of the body: light, and a soft shadow on the ground. The background is CSS behind a transparent canvas:
-// painting it with software WebGL would take a third of the time of a picture.
+// The surroundings of the body: light, and a soft shadow on the ground. The background is
+// CSS behind a transparent canvas: painting it with software WebGL would take a third of the
+// time of a picture.
 
 import {
   CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, Vector3,
@@ -41,7 +42,8 @@ export class Stage {
     return theme;
   }
 
-  /** Sets light and shadow for a body. The ground's shadow is painted once, since a press does not change it visibly. */
+  /** Sets light and shadow for a body. The ground's shadow is painted once, since a press does not
+   * change it visibly. */
   setBody(body: Body): void {
     const { centre, radius, box } = body;
     this.key.position.copy(LIGHT).multiplyScalar(4 * radius).add(centre);

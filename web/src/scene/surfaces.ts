@@ -1,4 +1,5 @@
-// The surfaces of a body: where each layer begins and ends, the walls at open rims, the core, the bones.
+// The surfaces of a body: where each layer begins and ends, the walls at open rims,
+// the core, the bones.
 
 import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, DynamicDrawUsage, Group, LineBasicMaterial, LineSegments, Mesh, Sphere, type Plane } from 'three';
 import type { Body } from './body';
@@ -23,7 +24,8 @@ interface SurfacesLook {
   wire: { on: boolean; colour: string; opacity: number };
 }
 
-/** Materials by the part they belong to. They outlive meshes, because compiling one takes much longer than a new mesh. */
+/** Materials by the part they belong to. They outlive meshes, because compiling one takes much
+ * longer than a new mesh. */
 export type Materials = Map<string, SurfaceMaterial>;
 
 export class Surfaces {

@@ -45,7 +45,8 @@ export class ToolView {
     this.group.visible = false;
   }
 
-  /** Shape of the tool, null for a single node, and scale of the arrow: the device's largest force, N, and the body's radius, m. */
+  /** Shape of the tool, null for a single node, and scale of the arrow: the device's largest force,
+   * N, and the body's radius, m. */
   set(form: ContactShape | null, maxForce: number, bodyRadius: number): void {
     this.maxForce = maxForce > 0 ? maxForce : 10;
     this.longest = 0.85 * bodyRadius;
@@ -71,7 +72,8 @@ export class ToolView {
     this.arrow.visible = force && this.force.length() > LEAST_FORCE;
   }
 
-  /** Gives point and arrow the same size on the screen at any distance; `pixel` is a pixel's size, m. */
+  /** Gives point and arrow the same size on the screen at any distance; `pixel` is
+   * a pixel's size, m. */
   scale(pixel: number): void {
     this.point.scale.setScalar(pixel * (this.isNode ? 7 : 5));
     const force = this.force.length();

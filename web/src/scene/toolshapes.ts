@@ -1,8 +1,9 @@
 // The shapes of tools: how each is drawn, and which fields the tool panel has for it.
 //
 // To add a shape: once palpa-scene has it, `npm run generate` puts it into `ToolShape`, and the
-// compiler asks for its entry in `TOOL_SHAPES` below and for its name, `tool_shape.…`, in i18n/en.ts and i18n/ja.ts. A size
-// that no other shape has needs a field below and its label there too, `tool.…`. Nothing else of the page names a shape.
+// compiler asks for its entry in `TOOL_SHAPES` below and for its name, `tool_shape.…`, in
+// i18n/en.ts and i18n/ja.ts. A size that no other shape has needs a field below and its label there
+// too, `tool.…`. Nothing else of the page names a shape.
 
 import {
   BufferGeometry, CapsuleGeometry, CylinderGeometry, LatheGeometry, SphereGeometry, Vector2,
@@ -12,8 +13,8 @@ import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js
 import type { ContactShape } from '../generated/api';
 import type { ToolShape, ToolTable } from '../generated/scene';
 
-/** A size of a tool, as a key of the scene: one length or angle with the range of its slider, m or rad, or three
- * lengths. */
+/** A size of a tool, as a key of the scene: one length or angle with the range of its slider, m
+ * or rad, or three lengths. */
 export type ToolField =
   | { key: 'radius' | 'length' | 'edge_radius' | 'tip_radius' | 'opening_angle'; dimension: 'length' | 'angle'; min: number; max: number }
   | { key: 'size' | 'radii'; names: [string, string, string] };
@@ -35,9 +36,11 @@ interface Entry<S extends ToolShape> {
   /** Null where the engine sends another form in its place. */
   draw: [FormOf<S>] extends [never] ? null : Draw<FormOf<S>>;
   fields: ToolField[];
-  /** The sizes with which it begins when it is chosen; `radius` is that of the tool before, if it had one. */
+  /** The sizes with which it begins when it is chosen; `radius` is that of the tool
+   * before, if it had one. */
   begin: (radius: string) => Omit<ToolTable, 'shape' | 'friction'>;
-  /** Whether it presses by contact. The others hold the skin and need a scene of their own: they are not offered. */
+  /** Whether it presses by contact. The others hold the skin and need a scene of their own:
+   * they are not offered. */
   isContact: boolean;
 }
 
@@ -93,7 +96,8 @@ export const TOOL_SHAPE_NAMES = Object.keys(TOOL_SHAPES) as ToolShape[];
 /** The shape where a scene names none. */
 export const DEFAULT_SHAPE: ToolShape = 'disc';
 
-/** The tool in another shape. Only its own sizes are kept: the engine refuses those of another shape. */
+/** The tool in another shape. Only its own sizes are kept: the engine refuses
+ * those of another shape. */
 export function reshaped({ radius = '10 mm', friction }: ToolTable, shape: ToolShape): ToolTable {
   const { begin, isContact } = TOOL_SHAPES[shape];
   return { shape, ...begin(radius), ...(isContact && friction !== undefined && { friction }) };

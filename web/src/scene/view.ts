@@ -24,9 +24,11 @@ import { Stage } from './stage';
 import { Surfaces, type Materials } from './surfaces';
 import { ToolView } from './tool';
 
-/** How long a new mesh waits for its first frame, ms: shown without it, a pressed body would jump to rest and back. */
+/** How long a new mesh waits for its first frame, ms: shown without it, a pressed body would
+ * jump to rest and back. */
 const MESH_WAIT = 400;
-/** Two meshes whose boxes differ by less than this share of the body's radius are of the same body. */
+/** Two meshes whose boxes differ by less than this share of the body's radius
+ * are of the same body. */
 const SAME_BODY = 0.06;
 
 export class BodyView {
@@ -185,7 +187,8 @@ export class BodyView {
     return pickNearest(this.rayAt(clientX, clientY), body, { section, bones: options.bones, isKept: cutaway.isKept() });
   }
 
-  /** The skin at rest under a place of the picture: it stays where it is while the skin gives way. */
+  /** The skin at rest under a place of the picture: it stays where it is while
+   * the skin gives way. */
   pickRest(clientX: number, clientY: number): { point: Vec3; normal: Vec3 } | null {
     return this.body && pickSkin(this.rayAt(clientX, clientY), this.body, true, this.cutaway.isKept());
   }

@@ -167,7 +167,8 @@ function labels(unit: string): uPlot.Axis.Values {
     });
 }
 
-/** Draws force over depth, which is no function of the depth: pale where it is old, with a dot at the newest point. */
+/** Draws force over depth, which is no function of the depth: pale where it is old, with a dot
+ * at the newest point. */
 function drawPhase(colour: string) {
   return (plot: uPlot, _series: number): null => {
     const n = history.length;

@@ -1,4 +1,5 @@
-// Ends of the axes of the curves: round numbers that grow at once, and shrink when most of an axis is empty.
+// Ends of the axes of the curves: round numbers that grow at once, and shrink when most
+// of an axis is empty.
 
 /** The next of …, 1, 2, 5, 10, … that is not smaller. */
 export function roundUp(value: number): number {

@@ -1,4 +1,5 @@
-// The force as sound and vibration, for users without a haptic device. Both are off until they are switched on.
+// The force as sound and vibration, for users without a haptic device. Both are off until
+// they are switched on.
 
 import { effect } from '@preact/signals';
 import { onFrame, state } from '../store';
@@ -42,7 +43,8 @@ function beginTone(): Tone {
   return { context, oscillator, gain };
 }
 
-/** Strength of sound and vibration, 0 to 1; its square root makes small forces easy to tell apart. */
+/** Strength of sound and vibration, 0 to 1; its square root makes small forces
+ * easy to tell apart. */
 function strength(force: number): number {
   if (force < DEAD_BAND) return 0;
   return Math.min(1, Math.sqrt(force / Math.min(state.value?.max_force ?? 8, 8)));

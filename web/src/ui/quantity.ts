@@ -64,7 +64,8 @@ export function withUnit(text: string, dimension: Dimension): string {
   return `${match[1]} ${defaultUnit(dimension)}`;
 }
 
-/** The text as written, unless it is a zero or too long to read, such as 0.00030000000000000003 m. */
+/** The text as written, unless it is a zero or too long to read, such as
+ * 0.00030000000000000003 m. */
 export function tidied(text: string, dimension: Dimension): string {
   const value = parseQuantity(text, dimension);
   if (value === null || (value !== 0 && text.length <= 9)) return text;

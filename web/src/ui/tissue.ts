@@ -1,8 +1,10 @@
-// The tissue of a layer or a lump as the scene writes it: by its name in the catalogue, or as a table of values.
+// The tissue of a layer or a lump as the scene writes it: by its name in the catalogue, or as
+// a table of values.
 //
-// To add a law: once the scene's schema has it, `npm run generate` puts it into `LawName`, and the compiler asks for its
-// entry in `LAWS` below and for its name, `law.…`, in i18n/en.ts and i18n/ja.ts. A parameter that no other law has needs
-// its label there too, `tissues.…`. Nothing else of the page names a law.
+// To add a law: once the scene's schema has it, `npm run generate` puts it into `LawName`, and the
+// compiler asks for its entry in `LAWS` below and for its name, `law.…`, in i18n/en.ts and
+// i18n/ja.ts. A parameter that no other law has needs its label there too, `tissues.…`. Nothing
+// else of the page names a law.
 
 import type { LawName, LayerTable, TissueTable } from '../generated/scene';
 import { formatQuantity, type Dimension } from './quantity';
@@ -60,7 +62,8 @@ export function tissueName(tissue: Tissue, unnamed: string): string {
   return (typeof tissue === 'string' ? tissue : tissue.name) ?? unnamed;
 }
 
-/** A tissue of the catalogue written out as a table, from what the engine reports about its layer. */
+/** A tissue of the catalogue written out as a table, from what the engine
+ * reports about its layer. */
 export function writtenOut(name: string, law: string | undefined, young = UNKNOWN_YOUNG): TissueTable {
   const known = LAW_NAMES.find((one) => one === law) ?? DEFAULT_LAW;
   return { name, law: known, young: formatQuantity(young, 'pressure', 4), poisson: DEFAULT_POISSON, ...starts(known, young) };

@@ -1,4 +1,5 @@
-// The material of the section: layers with their grain, and lumps with their outline, finer than the mesh.
+// The material of the section: layers with their grain, and lumps with their outline,
+// finer than the mesh.
 
 import { Color, DoubleSide, Matrix3, ShaderMaterial, Vector3, Vector4 } from 'three';
 import type { LumpInfo } from '../../generated/api';

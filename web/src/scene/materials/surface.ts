@@ -1,5 +1,5 @@
-// The material of surfaces: one key light with a shadow, a sky and a rim. The light wraps round the terminator and
-// reddens there, as it does under skin.
+// The material of surfaces: one key light with a shadow, a sky and a rim. The light wraps round the
+// terminator and reddens there, as it does under skin.
 
 import { BackSide, Color, DoubleSide, FrontSide, type Plane, ShaderMaterial, type Side, UniformsLib, UniformsUtils, type Vector3 } from 'three';
 import { MAP, NOISE, type SharedUniforms } from './shared';
@@ -51,7 +51,8 @@ void main() {
   #include <clipping_planes_fragment>
   vec3 V = normalize(vView);
   vec3 N = isFlat > 0.5 ? normalize(cross(dFdx(vView), dFdy(vView))) : normalize(vNormal);
-  // Turned by the drawn side, not by the angle: at silhouettes the normal may lean away a little without being dark.
+  // Turned by the drawn side, not by the angle: at silhouettes the normal may lean away a little
+  // without being dark.
   if (isFlat < 0.5 && !gl_FrontFacing) N = -N;
   vec3 L = normalize((viewMatrix * vec4(light, 0.0)).xyz);
   vec3 up = normalize((viewMatrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz);
@@ -62,7 +63,8 @@ void main() {
     base = mapped(vValue);
     shine = 0.05;
   } else if (skin > 0.0) {
-    // Mottling of blood under skin, broad and fine. By the place at rest, so that it moves with the tissue.
+    // Mottling of blood under skin, broad and fine. By the place at rest, so that it
+    // moves with the tissue.
     float broad = noise(vRest * 55.0) + 0.5 * noise(vRest * 130.0) - 0.75;
     float fine = noise(vRest * 900.0) - 0.5;
     base *= 1.0 + skin * (vec3(0.05, -0.06, -0.06) * broad + 0.045 * fine);

@@ -16,7 +16,8 @@ const SLIDE_PERIOD = 100;
 /** ms. */
 const LONGEST_BUILD = 3000;
 
-/** Waits until the last body asked for is built, or takes too long: while a slider moves, no queue of bodies may grow. */
+/** Waits until the last body asked for is built, or takes too long: while a slider moves, no queue
+ * of bodies may grow. */
 async function settled(): Promise<void> {
   const begin = performance.now();
   do {

@@ -6,7 +6,8 @@ import { defaultUnit, formatQuantity, parseQuantity, tidied, withUnit, type Dime
 import { useLatest, type Commit } from './commit';
 import { fromSlider, SLIDER_STEPS, toSlider, type Range } from './sliders';
 
-/** A quantity with its unit. It is sent on Enter, on leaving the field and while the slider moves; a refusal is shown at the field. */
+/** A quantity with its unit. It is sent on Enter, on leaving the field and while the slider moves;
+ * a refusal is shown at the field. */
 export function QuantityField(props: {
   label: string;
   /** As the scene writes it; empty where the scene has no such key. */
