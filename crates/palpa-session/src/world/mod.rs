@@ -91,8 +91,9 @@ impl World {
         Ok(Self { lumps, ..world })
     }
 
-    fn of_springs(scene: Scene, notes: Vec<Note>) -> anyhow::Result<Self> {
+    fn of_springs(scene: Scene, mut notes: Vec<Note>) -> anyhow::Result<Self> {
         let springs = SpringScene::build(&scene)?;
+        notes.extend(springs.notes.iter().cloned());
         let built = Arc::clone(springs.built());
         let frame = springs.scene_from_device;
         Self::around(scene, &built, frame, notes, Kind::Springs(springs))
