@@ -12,9 +12,9 @@ folder=${2:-out/hunt}
 mkdir -p "$folder"
 folder=$(cd "$folder" && pwd)
 
-# Eight times the cases of `make test`: properties with proptest's 256 get 2000, and those with a
-# number of their own (`palpa_testkit::cases`) multiply it by the factor.
-export PROPTEST_CASES=2000 PALPA_HUNT_FACTOR=8
+# Properties with a number of cases of their own (`palpa_testkit::cases`) draw this many times as
+# many; the others draw proptest's 256 in each round. (PROPTEST_CASES would override both.)
+export PALPA_HUNT_FACTOR=8
 # A run that takes longer than this hangs, s.
 HANG=1200
 
@@ -55,7 +55,7 @@ while ((SECONDS < properties_end || n_rounds == 0)); do
         log="$folder/$package-$seed.log"
         # Word splitting is meant: each module is a filter of its own.
         # shellcheck disable=SC2086
-        again="PROPTEST_RNG_SEED=$seed PROPTEST_CASES=$PROPTEST_CASES PALPA_HUNT_FACTOR=$PALPA_HUNT_FACTOR cargo test --release --package $package -- ${modules[$package]# }"
+        again="PROPTEST_RNG_SEED=$seed PALPA_HUNT_FACTOR=$PALPA_HUNT_FACTOR cargo test --release --package $package -- ${modules[$package]# }"
         # shellcheck disable=SC2086
         if PROPTEST_RNG_SEED=$seed timeout "$HANG" \
             cargo test --quiet --release --lib --tests --package "$package" -- ${modules[$package]} >"$log" 2>&1; then

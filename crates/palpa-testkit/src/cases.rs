@@ -4,7 +4,8 @@
 const FACTOR: &str = "PALPA_HUNT_FACTOR";
 
 /// Number of cases of a property test that says itself how many: `n`, times the environment's
-/// `PALPA_HUNT_FACTOR`, which `make hunt` sets. (`PROPTEST_CASES` does not reach these tests.)
+/// `PALPA_HUNT_FACTOR`, which `make hunt` sets. (`PROPTEST_CASES` is no factor: it would set the
+/// number of every property, quick or slow.)
 ///
 /// # Panics
 /// If the variable is no whole number above 0, or the product is too large.
