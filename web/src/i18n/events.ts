@@ -5,10 +5,8 @@ import type { EventKind, GrantedInfo, NoticeKind, PriorityInfo, Problem } from '
 import { withPrefix } from '../ui/quantity';
 import { en as enNames } from './en';
 import { ja as jaNames } from './ja';
+import { said, type Of, type Words } from './kinds';
 import type { Dictionary, Language } from '.';
-
-type Of<Union extends { kind: string }, K> = Extract<Union, { kind: K }>;
-type Words<Union extends { kind: string }> = { [K in Union['kind']]: (of: Of<Union, K>) => string };
 
 interface Vocabulary {
   events: Words<EventKind>;
@@ -20,7 +18,7 @@ interface Vocabulary {
   core: (core: number, outcome: string) => string;
 }
 
-const list = (names: Dictionary, of: EventKind & { kind: 'law_faults' }, comma: string): string =>
+const list = (names: Dictionary, of: Of<EventKind, 'law_faults'>, comma: string): string =>
   of.faults.map((fault) => names[`law_fault.${fault}`]).join(comma);
 
 const en: Vocabulary = {
@@ -106,10 +104,6 @@ const ja: Vocabulary = {
 };
 
 const WORDS: Record<Language, Vocabulary> = { en, ja };
-
-function said<Union extends { kind: string }>(words: Words<Union>, of: Union): string {
-  return (words[of.kind as Union['kind']] as (of: Union) => string)(of);
-}
 
 /** An event of the engine in a language. */
 export function eventWords(event: EventKind, language: Language): string {

@@ -5,26 +5,17 @@ import type { Format, ImprintError, Note, Outcome, Place, ReadNote, Tool } from 
 import { inMillimetres } from '../ui/quantity';
 import { en as enNames } from './en';
 import { ja as jaNames } from './ja';
+import { said, type Of, type Words } from './kinds';
 import type { Dictionary, Language } from '.';
-
-type Kind = Note['kind'];
-type Of<K extends Kind> = Extract<Note, { kind: K }>;
-type Words = { [K in Kind]: (note: Of<K>) => string };
 
 const percent = (share: number) => `${Math.round(100 * share)} %`;
 const place = (at: readonly number[]) => `(${at.map((x) => (x * 1e3).toFixed(1)).join(', ')}) mm`;
 const mm = inMillimetres;
 
 /** The repairs that were made, with their counts. */
-function repairs(note: Of<'repaired'>, names: readonly string[]): string {
+function repairs(note: Of<Note, 'repaired'>, names: readonly string[]): string {
   const counts = [note.n_welded, note.n_degenerate, note.n_duplicate, note.n_unused, note.n_flipped];
   return counts.flatMap((n, i) => (n > 0 ? [`${names[i]} ${n}`] : [])).join(', ');
-}
-
-type Inner<Union extends { kind: string }> = { [K in Union['kind']]: (of: Extract<Union, { kind: K }>) => string };
-
-function said<Union extends { kind: string }>(words: Inner<Union>, of: Union): string {
-  return (words[of.kind as Union['kind']] as (of: Union) => string)(of);
 }
 
 const FORMATS: Record<Format, string> = { obj: 'OBJ', stl: 'STL', ply: 'PLY', off: 'OFF', gltf: 'glTF' };
@@ -47,7 +38,7 @@ function toolWords(tool: Tool, names: Dictionary, sized: (name: string, radius: 
   return 'radius' in shape ? sized(name, mm(shape.radius)) : name;
 }
 
-const enReads: Inner<ReadNote> = {
+const enReads: Words<ReadNote> = {
   'extension-mismatch': ({ extension, format }) => `named .${extension}, but its content is ${FORMATS[format]}; read as ${FORMATS[format]}`,
   utf16: () => 'the text is UTF-16; save it as UTF-8 for other programs',
   'short-faces': ({ count, first }) => `${count} face(s) with fewer than three corners were left out, the first at ${inFile(first, PLACES.en)}`,
@@ -57,13 +48,13 @@ const enReads: Inner<ReadNote> = {
   'trailing-bytes': ({ bytes }) => `${bytes} byte(s) after the last record were not read`,
 };
 
-const enImprints: Inner<ImprintError> = {
+const enImprints: Words<ImprintError> = {
   'no-circle': ({ radius }) => `a circle of radius ${mm(radius)} is not possible about the tool's axis`,
   'over-rim': () => 'it crosses the rim of the skin; move it inward or make it smaller',
   'too-coarse': ({ radius }) => `the triangles are too large for a circle of radius ${mm(radius, 2)}; refine the skin there to a third of it`,
 };
 
-const enOutcomes: Inner<Outcome> = {
+const enOutcomes: Words<Outcome> = {
   converged: () => '',
   iteration_limit: ({ at }) => ` No equilibrium was found; the largest imbalance is near ${place(at)}.`,
   inverted: ({ at }) => ` The tissue would turn inside out near ${place(at)}.`,
@@ -72,7 +63,7 @@ const enOutcomes: Inner<Outcome> = {
 
 const enTool = (tool: Tool) => toolWords(tool, enNames, (name, radius) => `${name} of radius ${radius}`).toLowerCase();
 
-const en: Words = {
+const en: Words<Note> = {
   file_read: ({ file, note }) => `${file}: ${said(enReads, note)}.`,
   unusual_size: ({ file, size }) => `${file} measures ${size.toFixed(4)} m from corner to corner. No body part has that size: check “unit” in the scene.`,
   repaired: (note) => `${note.file} was repaired: ${repairs(note, ['vertices welded:', 'triangles without area dropped:', 'double triangles dropped:', 'unused vertices dropped:', 'triangles turned outward:'])}`,
@@ -107,7 +98,7 @@ const en: Words = {
   few_touching: ({ n_vertices, radius, edge }) => `At most ${n_vertices} skin vertices touch the tool, over a circle of radius ${mm(radius)} with edges of ${mm(edge)}: the force depends on the mesh.`,
 };
 
-const jaReads: Inner<ReadNote> = {
+const jaReads: Words<ReadNote> = {
   'extension-mismatch': ({ extension, format }) => `拡張子は .${extension} ですが、内容は ${FORMATS[format]} です。${FORMATS[format]} として読み込みました`,
   utf16: () => 'テキストが UTF-16 です。ほかのプログラムで使うには UTF-8 で保存してください',
   'short-faces': ({ count, first }) => `頂点が 3 個未満の面 ${count} 個を除きました（最初：${inFile(first, PLACES.ja)}）`,
@@ -117,13 +108,13 @@ const jaReads: Inner<ReadNote> = {
   'trailing-bytes': ({ bytes }) => `最後のレコードの後の ${bytes} バイトは読み込みませんでした`,
 };
 
-const jaImprints: Inner<ImprintError> = {
+const jaImprints: Words<ImprintError> = {
   'no-circle': ({ radius }) => `圧子の軸のまわりに半径 ${mm(radius)} の円を置けません`,
   'over-rim': () => '円が皮膚の縁にかかっています。内側へ移すか、小さくしてください',
   'too-coarse': ({ radius }) => `半径 ${mm(radius, 2)} の円に対して三角形が大きすぎます。その付近の皮膚を半径の 3 分の 1 まで細かくしてください`,
 };
 
-const jaOutcomes: Inner<Outcome> = {
+const jaOutcomes: Words<Outcome> = {
   converged: () => '',
   iteration_limit: ({ at }) => `釣り合いが見つかりません（最大の不釣り合いは ${place(at)} の付近）。`,
   inverted: ({ at }) => `${place(at)} の付近で組織が裏返ります。`,
@@ -132,7 +123,7 @@ const jaOutcomes: Inner<Outcome> = {
 
 const jaTool = (tool: Tool) => toolWords(tool, jaNames, (name, radius) => `${name}、半径 ${radius}`);
 
-const ja: Words = {
+const ja: Words<Note> = {
   file_read: ({ file, note }) => `${file}：${said(jaReads, note)}。`,
   unusual_size: ({ file, size }) => `${file} の大きさは ${size.toFixed(4)} m です。この大きさの体の部位はありません。シーンの unit を確認してください。`,
   repaired: (note) => `${note.file} を修復しました：${repairs(note, ['結合した頂点', '面積のない三角形の削除', '重複した三角形の削除', '未使用の頂点の削除', '外向きに直した三角形'])}`,
@@ -167,7 +158,7 @@ const ja: Words = {
   few_touching: ({ n_vertices, radius, edge }) => `圧子に触れる皮膚の頂点は最大 ${n_vertices} 個です（半径 ${mm(radius)}、辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
 };
 
-const WORDS: Record<Language, Words> = { en, ja };
+const WORDS: Record<Language, Words<Note>> = { en, ja };
 
 /** A note of the engine in a language; its English words where the page knows no such kind. */
 export function noteWords(note: { kind: string; values: Record<string, unknown>; text: string }, language: Language): string {
