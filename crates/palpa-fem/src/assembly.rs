@@ -1,11 +1,15 @@
-//! Energy, forces and stiffness of the whole body, summed over its groups in their order.
+//! Energy, forces and stiffness of the whole body, summed over its groups.
 
 use palpa_mesh::Vec3;
+use rayon::prelude::*;
 
 use crate::Mat3;
+use crate::batch::{Batches, Slots, Sums, Tangent};
+use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt, evaluate};
 use crate::model::Model;
 use crate::state::Memory;
+use crate::system::{LinearSystem, Region};
 
 /// The place where the body is inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,10 +18,139 @@ pub(crate) struct Inverted {
     pub(crate) at: Vec3,
 }
 
-/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given. The
-/// forces are `∂W/∂u`.
-///
-/// Groups are stored interval by interval, so consecutive groups have the material of one layer.
+/// Sums forces and stiffness over the body, outside a region and inside it.
+#[derive(Debug)]
+pub(crate) struct Assembler {
+    outer: Option<Batches>,
+    inner: Batches,
+    slots: Slots,
+}
+
+impl Assembler {
+    /// An assembler for a model, with the region of its linear system, if there is one.
+    pub(crate) fn new(model: &Model, memory: &Memory, region: Option<&Region>) -> Self {
+        let part = |keep: &dyn Fn(&SurfaceGroup) -> bool| {
+            let pattern = &model.structure.pattern;
+            Batches::new(model, memory, pattern, keep, Tangent::Double)
+        };
+        let is_inner = |region: &Region, group: &SurfaceGroup| {
+            let mut vertices = group.vertices[..group.n_columns()].iter();
+            vertices.all(|&v| region.contains(v as usize))
+        };
+        Self {
+            outer: region.map(|r| part(&|group| !is_inner(r, group))),
+            inner: part(&|group| region.is_none_or(|r| is_inner(r, group))),
+            slots: Slots::new(),
+        }
+    }
+
+    /// Starts a step, for which `memory` is set up.
+    pub(crate) fn begin(&mut self, model: &Model, memory: &Memory) {
+        for part in self.outer.iter_mut().chain([&mut self.inner]) {
+            part.begin_with(model, memory);
+        }
+    }
+
+    /// The forces `∂W/∂u` at the given displacements.
+    pub(crate) fn forces(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        forces: &mut [Vec3],
+    ) -> Result<(), Inverted> {
+        forces.fill(Vec3::zeros());
+        let mut sums = Sums {
+            forces,
+            blocks: None,
+        };
+        for part in self.outer.iter().chain([&self.inner]) {
+            part.add_to(model, memory, displacements, &mut self.slots, &mut sums)?;
+        }
+        Ok(())
+    }
+
+    /// The forces, and the stiffness in the blocks of the linear system.
+    pub(crate) fn stiffness(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        forces: &mut [Vec3],
+        system: &mut LinearSystem,
+    ) -> Result<(), Inverted> {
+        forces.fill(Vec3::zeros());
+        system.blocks.fill(Mat3::zeros());
+        for (part, is_outer) in
+            (self.outer.iter().map(|part| (part, true))).chain([(&self.inner, false)])
+        {
+            let mut sums = Sums {
+                forces,
+                blocks: Some(&mut system.blocks),
+            };
+            part.add_to(model, memory, displacements, &mut self.slots, &mut sums)?;
+            if is_outer {
+                system.note_outer_share();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Strain energy at the given displacements, J. The sum does not depend on the number of threads.
+pub(crate) fn energy(model: &Model, memory: &Memory, displacements: &[Vec3]) -> f64 {
+    /// Groups that are summed up by one thread.
+    const TOGETHER: usize = 256;
+    let indices: Vec<usize> = (0..model.geometries.len()).collect();
+    let parts: Vec<f64> = indices
+        .par_chunks(TOGETHER)
+        .map(|indices| {
+            let mut response = GroupResponse::new();
+            let mut phases = Vec::with_capacity(4);
+            let of = |&index: &usize| {
+                evaluate_group(
+                    model,
+                    memory,
+                    index,
+                    displacements,
+                    &mut phases,
+                    &mut response,
+                    false,
+                );
+                response.energy
+            };
+            indices.iter().map(of).sum()
+        })
+        .collect();
+    parts.iter().sum()
+}
+
+/// Evaluates one group.
+fn evaluate_group<'a>(
+    model: &'a Model,
+    memory: &'a Memory,
+    index: usize,
+    displacements: &[Vec3],
+    phases: &mut Vec<PhaseAt<'a>>,
+    response: &mut GroupResponse,
+    with_tangent: bool,
+) {
+    let (i, g) = (index / model.n_groups(), index % model.n_groups());
+    phases_at(model, memory, index, phases);
+    evaluate(
+        model.structure.groups[g].shape,
+        &model.geometries[index],
+        &model.group_nodes(g, i).map(|n| displacements[n]),
+        phases,
+        model.params.alpha,
+        with_tangent,
+        response,
+    );
+}
+
+/// Sums energy and forces at the given displacements, and stiffness if `blocks` is given, one group
+/// after the other. The forces are `∂W/∂u`.
+#[cfg(test)]
 pub(crate) fn assemble(
     model: &Model,
     memory: &Memory,
@@ -33,34 +166,32 @@ pub(crate) fn assemble(
     let mut energy = 0.0;
     let mut phases: Vec<PhaseAt<'_>> = Vec::with_capacity(4);
     let n_groups = model.n_groups();
-    for i in 0..model.body.n_levels - 1 {
-        for (g, group) in model.structure.groups.iter().enumerate() {
-            let index = i * n_groups + g;
-            let nodes = model.group_nodes(g, i);
-            let local = nodes.map(|n| displacements[n]);
-            phases_at(model, memory, index, &mut phases);
-            evaluate(
-                group.shape,
-                &model.geometries[index],
-                &local,
-                &phases,
-                model.params.alpha,
-                blocks.is_some(),
-                &mut response,
-            );
-            if !response.energy.is_finite() {
-                let middle = nodes.iter().map(|&n| model.body.positions[n]).sum::<Vec3>() / 8.0;
-                return Err(Inverted { at: middle });
-            }
-            energy += response.energy;
-            for (local, &node) in nodes.iter().enumerate().take(group.n_nodes()) {
-                forces[node] += response.forces[local];
-            }
-            if let Some(blocks) = &mut blocks {
-                model
-                    .structure
-                    .scatter(group, i, &response.stiffness, blocks);
-            }
+    for index in 0..model.geometries.len() {
+        let (i, g) = (index / n_groups, index % n_groups);
+        let with_tangent = blocks.is_some();
+        evaluate_group(
+            model,
+            memory,
+            index,
+            displacements,
+            &mut phases,
+            &mut response,
+            with_tangent,
+        );
+        let nodes = model.group_nodes(g, i);
+        if !response.energy.is_finite() {
+            let middle = nodes.iter().map(|&n| model.body.positions[n]).sum::<Vec3>() / 8.0;
+            return Err(Inverted { at: middle });
+        }
+        energy += response.energy;
+        let group = &model.structure.groups[g];
+        for (local, &node) in nodes.iter().enumerate().take(group.n_nodes()) {
+            forces[node] += response.forces[local];
+        }
+        if let Some(blocks) = &mut blocks {
+            model
+                .structure
+                .scatter(group, i, &response.stiffness, blocks);
         }
     }
     Ok(energy)

@@ -11,9 +11,10 @@
 use palpa_mesh::Vec3;
 
 use crate::Mat3;
-use crate::assembly::assemble;
+use crate::assembly::Assembler;
 use crate::model::Model;
 use crate::state::{Memory, State};
+use crate::system::LinearSystem;
 
 const GAMMA: f64 = 0.6;
 const BETA: f64 = (GAMMA + 0.5) * (GAMMA + 0.5) / 4.0;
@@ -48,14 +49,16 @@ impl Inertia {
         dynamics: &Dynamics,
         state: &State,
         duration: f64,
+        assembler: &mut Assembler,
+        system: &mut LinearSystem,
     ) -> Self {
         let mut stiffness = Vec::new();
         if dynamics.stiffness_damping > 0.0 {
-            stiffness = vec![Mat3::zeros(); model.structure.n_blocks()];
             let mut forces = vec![Vec3::zeros(); model.n_nodes()];
             let u = &state.displacements;
             // If the state is inverted, the first assembly ends the step.
-            let _ = assemble(model, memory, u, &mut forces, Some(&mut stiffness));
+            let _ = assembler.stiffness(model, memory, u, &mut forces, system);
+            stiffness.clone_from(&system.blocks);
         }
         Self {
             stiffness,

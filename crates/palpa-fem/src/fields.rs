@@ -1,6 +1,7 @@
 //! Results inside a pressed body: stress, stretch, energy, and the forces between layers.
 
 use palpa_mesh::Vec3;
+use rayon::prelude::*;
 
 use crate::Mat3;
 use crate::assembly::phases_at;
@@ -59,35 +60,44 @@ fn fields_with(model: &Model, displacements: &[Vec3], memory: &Memory) -> Vec<Pr
         volume_ratio: 1.0,
         energy: 0.0,
     };
-    let mut fields = vec![none; model.body.n_prisms()];
-    let mut phases = Vec::with_capacity(4);
-    for i in 0..n_intervals {
-        for (g, group) in model.structure.groups.iter().enumerate() {
-            let index = i * model.n_groups() + g;
-            phases_at(model, memory, index, &mut phases);
+    let n_groups = model.n_groups();
+    let indices: Vec<usize> = (0..model.geometries.len()).collect();
+    let of_groups: Vec<[PrismField; 2]> = indices
+        .par_iter()
+        .map_init(Vec::new, |phases, &index| {
+            let (i, g) = (index / n_groups, index % n_groups);
+            let group = &model.structure.groups[g];
+            phases_at(model, memory, index, phases);
             let local = model.group_nodes(g, i).map(|n| displacements[n]);
             let geometry = &model.geometries[index];
-            let wedges = element_fields(group.shape, geometry, &local, &phases, model.params.alpha);
-            for (w, &(cauchy, f, volume_ratio, energy)) in wedges
-                .iter()
-                .enumerate()
-                .take(usize::from(group.shape.n_wedges))
-            {
-                let mut stretches: [f64; 3] = (f.transpose() * f)
-                    .symmetric_eigenvalues()
-                    .map(|x| x.max(0.0).sqrt())
-                    .into();
-                stretches.sort_by(f64::total_cmp);
-                fields[group.triangles[w] as usize * n_intervals + i] = PrismField {
-                    cauchy,
-                    stretches,
-                    volume_ratio,
-                    energy,
-                };
-            }
+            let wedges = element_fields(group.shape, geometry, &local, phases, model.params.alpha);
+            wedges.map(|(cauchy, f, volume_ratio, energy)| PrismField {
+                cauchy,
+                stretches: stretches(&f),
+                volume_ratio,
+                energy,
+            })
+        })
+        .collect();
+    let mut fields = vec![none; model.body.n_prisms()];
+    for (index, of_group) in of_groups.into_iter().enumerate() {
+        let (i, group) = (index / n_groups, &model.structure.groups[index % n_groups]);
+        let triangles = &group.triangles[..usize::from(group.shape.n_wedges)];
+        for (&triangle, field) in triangles.iter().zip(of_group) {
+            fields[triangle as usize * n_intervals + i] = field;
         }
     }
     fields
+}
+
+/// Principal stretches of a deformation gradient, ascending.
+fn stretches(f: &Mat3) -> [f64; 3] {
+    let mut stretches: [f64; 3] = (f.transpose() * f)
+        .symmetric_eigenvalues()
+        .map(|x| x.max(0.0).sqrt())
+        .into();
+    stretches.sort_by(f64::total_cmp);
+    stretches
 }
 
 /// For each level, the force of the tissue below on it, N; for the deepest level, that of the bone.

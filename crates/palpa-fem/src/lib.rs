@@ -5,6 +5,7 @@
 mod one_of;
 
 mod assembly;
+mod batch;
 mod columns;
 mod dynamics;
 mod element;

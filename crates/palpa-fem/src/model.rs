@@ -54,6 +54,8 @@ pub struct Model {
     pub(crate) phases: Vec<Phase>,
     /// First phase of each group, and one past the last. `[interval × n_groups + 1]`
     pub(crate) first_phase: Vec<u32>,
+    /// The group of each phase, as an index of `geometries`.
+    pub(crate) phase_group: Vec<u32>,
     pub(crate) supports: Vec<Hold>,
     /// Lumped mass of every node, kg.
     pub(crate) masses: Vec<f64>,
@@ -97,6 +99,10 @@ impl Model {
         let structure = Structure::build(&body.skin, &pairing, body.n_levels, n_free_levels)?;
         let geometries = geometries(body, &structure)?;
         let (phases, first_phase) = assign(body, &structure, &geometries, materials);
+        let mut phase_group = vec![0; phases.len()];
+        for (g, range) in first_phase.windows(2).enumerate() {
+            phase_group[range[0] as usize..range[1] as usize].fill(g as u32);
+        }
         let masses = masses(body, &structure, &geometries, materials);
         Ok(Self {
             skin_areas: skin_areas(body),
@@ -111,6 +117,7 @@ impl Model {
             geometries,
             phases,
             first_phase,
+            phase_group,
             supports: holds,
             masses,
             params,

@@ -1,6 +1,7 @@
 //! The state of a body: everything that evolves while it is pressed.
 
 use palpa_mesh::Vec3;
+use rayon::prelude::*;
 
 use crate::Mat3;
 use crate::element::{N_POINTS, Overstress, elastic_stresses};
@@ -161,9 +162,11 @@ impl Memory {
             return;
         }
         self.begin_materials(model, dt);
-        for g in 0..model.geometries.len() {
-            self.begin_group(model, state, g);
-        }
+        let steps = &self.steps;
+        let overstress = self.overstress.par_iter_mut().enumerate();
+        overstress.for_each(|(p, overstress)| {
+            *overstress = constant_stresses(model, steps, p, &state.history[p]);
+        });
     }
 
     /// Factors of every material, without the constant stresses of the groups.
@@ -191,22 +194,8 @@ impl Memory {
 
     /// Constant stresses of a group in the step that has begun.
     pub(crate) fn begin_group(&mut self, model: &Model, state: &State, g: usize) {
-        let in_plane = in_plane(model, g);
         for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
-            let index = model.phases[p].material as usize;
-            let material = &model.materials[index];
-            let overstress = &mut self.overstress[p];
-            overstress.points = [in_plane * material.prestress; N_POINTS];
-            overstress.volume = 0.0;
-            if let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) {
-                let history = &state.history[p];
-                for (point, rows) in history.points.chunks(prony.n_rows()).enumerate() {
-                    overstress.points[point] += symmetric(&step.memory(rows));
-                }
-                if prony.relaxes_volume() {
-                    overstress.volume = step.memory(&history.volume)[0];
-                }
-            }
+            self.overstress[p] = constant_stresses(model, &self.steps, p, &state.history[p]);
         }
     }
 
@@ -220,37 +209,65 @@ impl Memory {
         if self.steps.iter().all(Option::is_none) {
             return;
         }
-        for g in 0..model.geometries.len() {
-            self.commit_group(model, state, g);
-        }
+        let displacements = &state.displacements;
+        let histories = state.history.par_iter_mut().enumerate();
+        histories.for_each(|(p, history)| self.advance(model, displacements, p, history));
     }
 
     /// Ends the step for one group.
     pub(crate) fn commit_group(&self, model: &Model, state: &mut State, g: usize) {
-        let (i, group) = (g / model.n_groups(), g % model.n_groups());
-        let nodes = model.group_nodes(group, i);
-        let displacements = nodes.map(|n| state.displacements[n]);
         for p in model.first_phase[g] as usize..model.first_phase[g + 1] as usize {
-            let index = model.phases[p].material as usize;
-            let material = &model.materials[index];
-            let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) else {
-                continue;
-            };
-            let stresses = elastic_stresses(
-                model.structure.groups[group].shape,
-                &model.geometries[g],
-                &displacements,
-                &material.law,
-            );
-            // An accepted step has no inverted point.
-            let Some(stresses) = stresses else { continue };
-            let history = &mut state.history[p];
-            for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {
-                step.advance(rows, &components(&stresses.points[point]));
-            }
-            step.advance(&mut history.volume, &[stresses.volume]);
+            self.advance(model, &state.displacements, p, &mut state.history[p]);
         }
     }
+
+    /// Updates the memory of a phase.
+    fn advance(&self, model: &Model, displacements: &[Vec3], p: usize, history: &mut PhaseHistory) {
+        let index = model.phases[p].material as usize;
+        let material = &model.materials[index];
+        let (Some(step), Some(prony)) = (&self.steps[index], &material.prony) else {
+            return;
+        };
+        let g = model.phase_group[p] as usize;
+        let (i, group) = (g / model.n_groups(), g % model.n_groups());
+        let stresses = elastic_stresses(
+            model.structure.groups[group].shape,
+            &model.geometries[g],
+            &model.group_nodes(group, i).map(|n| displacements[n]),
+            &material.law,
+        );
+        // An accepted step has no inverted point.
+        let Some(stresses) = stresses else { return };
+        for (point, rows) in history.points.chunks_mut(prony.n_rows()).enumerate() {
+            step.advance(rows, &components(&stresses.points[point]));
+        }
+        step.advance(&mut history.volume, &[stresses.volume]);
+    }
+}
+
+/// Constant stresses of a phase in a step: tension, and memory of earlier steps.
+fn constant_stresses(
+    model: &Model,
+    steps: &[Option<PronyStep>],
+    p: usize,
+    history: &PhaseHistory,
+) -> Overstress {
+    let index = model.phases[p].material as usize;
+    let material = &model.materials[index];
+    let tension = in_plane(model, model.phase_group[p] as usize) * material.prestress;
+    let mut overstress = Overstress {
+        points: [tension; N_POINTS],
+        volume: 0.0,
+    };
+    if let (Some(step), Some(prony)) = (&steps[index], &material.prony) {
+        for (point, rows) in history.points.chunks(prony.n_rows()).enumerate() {
+            overstress.points[point] += symmetric(&step.memory(rows));
+        }
+        if prony.relaxes_volume() {
+            overstress.volume = step.memory(&history.volume)[0];
+        }
+    }
+    overstress
 }
 
 /// The projection on the plane of a group's layer.

@@ -1,20 +1,33 @@
 //! The linear system of a Newton iteration: blocks assembled, constraints put on, factored and
 //! solved.
+//!
+//! The factor is in single precision, which takes half the time; it preconditions a system whose
+//! matrix is in double precision. Only if single precision is not enough, for instance where
+//! tissue is all but incompressible, the factor is in double precision.
+//!
+//! With a [`Region`], the columns near the tools are eliminated last. Contact and stiffness change
+//! most there, and only this part of the factor is computed again in every iteration.
 
 use palpa_mesh::Vec3;
-use palpa_sparse::{Factor, Singular};
+use palpa_sparse::fronts::{
+    Exterior, FactorScratch, Half, Number, SolveScratch, Tree, Zone, back_substitute, least_pivot,
+    substitute,
+};
+use palpa_sparse::{Block, Singular, TooLarge};
 
 use crate::Mat3;
 use crate::columns::Structure;
 
-/// A pivot smaller than this, relative to its original diagonal entry, counts as zero.
+/// A pivot smaller than this, relative to its original diagonal entry, counts as zero: in double
+/// precision, and in single precision.
 const SINGULAR_PIVOT: f64 = 1e-13;
+const SINGLE_PIVOT: f64 = 1e-6;
 
 /// First shift of a matrix that is not positive definite, relative to its diagonal; its growth
 /// factor; and the largest number of increases.
 const FIRST_SHIFT: f64 = 1e-3;
 const SHIFT_GROWTH: f64 = 4.0;
-const MOST_SHIFTS: usize = 9;
+const MOST_SHIFTS: i32 = 9;
 
 /// Directions in which a node is held.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,35 +108,130 @@ impl Hold {
     }
 }
 
+/// Columns whose part of the factor is computed again in every iteration, and an order of
+/// elimination in which they come last.
+#[derive(Debug)]
+pub(crate) struct Region {
+    tree: Tree,
+    /// Whether a column is in the region. `[n_vertices]`
+    is_inside: Vec<bool>,
+    /// Whether a column is outside, or touches a column outside. `[n_vertices]`
+    is_outer: Vec<bool>,
+    /// Blocks between columns of the ring, to which prisms inside and outside contribute.
+    ring_blocks: Vec<u32>,
+}
+
+impl Region {
+    /// The region of the marked columns; `places` are positions of all columns.
+    pub(crate) fn new(
+        structure: &Structure,
+        places: &[[f64; 3]],
+        is_inside: Vec<bool>,
+    ) -> Result<Self, TooLarge> {
+        let pattern = &structure.pattern;
+        let tree = Tree::zone_last(pattern, places, &is_inside)?;
+        let is_outer: Vec<bool> = (0..pattern.n_columns())
+            .map(|v| {
+                let mut around = pattern.neighbours(v).iter();
+                !is_inside[v] || around.any(|&w| !is_inside[w as usize])
+            })
+            .collect();
+        let mut ring_blocks = Vec::new();
+        for_each_ring_block(structure, &is_inside, &is_outer, &mut |block, _, _| {
+            ring_blocks.push(block as u32);
+        });
+        Ok(Self {
+            tree,
+            is_inside,
+            is_outer,
+            ring_blocks,
+        })
+    }
+
+    /// Calls `visit` for every block of the ring, with its row node and column node.
+    fn for_each_ring_block(
+        &self,
+        structure: &Structure,
+        visit: &mut impl FnMut(usize, usize, usize),
+    ) {
+        for_each_ring_block(structure, &self.is_inside, &self.is_outer, visit);
+    }
+
+    /// Whether a column is in the region.
+    pub(crate) fn contains(&self, column: usize) -> bool {
+        self.is_inside[column]
+    }
+}
+
+/// Visits the blocks between columns that are both inside and outer.
+fn for_each_ring_block(
+    structure: &Structure,
+    is_inside: &[bool],
+    is_outer: &[bool],
+    visit: &mut impl FnMut(usize, usize, usize),
+) {
+    let pattern = &structure.pattern;
+    let is_ring = |v: usize| is_inside[v] && is_outer[v];
+    for v in (0..pattern.n_columns()).filter(|&v| is_ring(v)) {
+        structure.for_each_own(v, visit);
+    }
+    for pair in 0..pattern.n_pairs() {
+        if pattern.pair(pair).iter().all(|&v| is_ring(v as usize)) {
+            structure.for_each_between(pair, visit);
+        }
+    }
+}
+
 /// The matrix and its factor, in memory that is reused.
 #[derive(Debug)]
 pub(crate) struct LinearSystem {
     /// Stiffness between nodes, in the order of [`Structure`].
     pub(crate) blocks: Vec<Mat3>,
-    values: Vec<f64>,
-    scale: Vec<f64>,
-    diagonal: Vec<usize>,
-    right_side: Vec<f64>,
-    factor: Factor,
+    pub(crate) region: Option<Region>,
+    /// The part of prisms outside the region in its ring's blocks.
+    outer_share: Vec<Mat3>,
+    factors: Factors,
     /// The constraints of the factor.
     holds: Vec<Hold>,
     /// Whether there is a factor.
     pub(crate) is_factored: bool,
+    /// Shift of the factor, relative to the diagonal.
+    pub(crate) shift: f64,
+}
+
+/// A factor in one of two precisions.
+#[derive(Debug)]
+enum Factors {
+    Single(Numbers<f32>),
+    Double(Numbers<f64>),
 }
 
 impl LinearSystem {
-    pub(crate) fn new(structure: &Structure, n_nodes: usize) -> Self {
-        let pattern = structure.pattern();
-        let n = structure.n_dofs();
+    pub(crate) fn new(structure: &Structure, n_nodes: usize, region: Option<Region>) -> Self {
+        let tree = region.as_ref().map_or(&structure.tree, |r| &r.tree);
+        let n_ring_blocks = region.as_ref().map_or(0, |r| r.ring_blocks.len());
         Self {
             blocks: vec![Mat3::zeros(); structure.n_blocks()],
-            values: vec![0.0; pattern.n_entries()],
-            scale: vec![0.0; n],
-            diagonal: (0..n).map(|i| pattern.diagonal(i)).collect(),
-            right_side: vec![0.0; n],
-            factor: Factor::new(pattern),
+            outer_share: vec![Mat3::zeros(); n_ring_blocks],
+            factors: Factors::Single(Numbers::new(structure, tree, region.is_some())),
+            region,
             holds: vec![Hold::free(); n_nodes],
             is_factored: false,
+            shift: 0.0,
+        }
+    }
+
+    /// Whether the factor alone solves a system, without iterations.
+    pub(crate) fn is_exact(&self) -> bool {
+        matches!(self.factors, Factors::Double(_)) || self.shift > 0.0
+    }
+
+    /// Takes note of the blocks to which only prisms outside the region have been added so far.
+    pub(crate) fn note_outer_share(&mut self) {
+        if let Some(region) = &self.region {
+            for (share, &block) in self.outer_share.iter_mut().zip(&region.ring_blocks) {
+                *share = self.blocks[block as usize];
+            }
         }
     }
 
@@ -136,64 +244,78 @@ impl LinearSystem {
     ) -> Result<f64, Singular> {
         self.holds.copy_from_slice(holds);
         self.is_factored = false;
-        self.fill(structure);
-        let mut shift = 0.0;
-        for attempt in 0..=MOST_SHIFTS {
-            let result = self.factor.refactor(
-                structure.pattern(),
-                &mut self.values,
-                &self.scale,
-                SINGULAR_PIVOT,
-            );
-            if result.is_ok() {
-                self.is_factored = true;
-                return Ok(shift);
+        self.shift = 0.0;
+        if self.factor_all(structure, 0.0).is_err() {
+            let mut unshifted = None;
+            if let Factors::Single(_) = self.factors {
+                let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
+                let numbers = Numbers::new(structure, tree, self.region.is_some());
+                self.factors = Factors::Double(numbers);
+                unshifted = Some(0.0);
             }
-            let next = if attempt == 0 {
-                FIRST_SHIFT
-            } else {
-                shift * SHIFT_GROWTH
-            };
-            for (&entry, scale) in self.diagonal.iter().zip(&self.scale) {
-                self.values[entry] += (next - shift) * scale.abs();
-            }
-            shift = next;
+            let shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
+            self.shift = (unshifted.into_iter().chain(shifts))
+                .find(|&shift| self.factor_all(structure, shift).is_ok())
+                .ok_or(Singular)?;
         }
-        Err(Singular)
+        self.is_factored = true;
+        Ok(self.shift)
     }
 
-    fn fill(&mut self, structure: &Structure) {
-        self.values.fill(0.0);
-        for (i, row, column, entries) in structure.blocks() {
-            let (row_hold, column_hold) = (&self.holds[row], &self.holds[column]);
-            let mut block = self.blocks[i];
-            if row_hold.n > 0 || column_hold.n > 0 {
-                block = row_hold.frame.transpose() * block * column_hold.frame;
-                for r in 0..usize::from(row_hold.n) {
-                    block.row_mut(r).fill(0.0);
-                }
-                for c in 0..usize::from(column_hold.n) {
-                    block.column_mut(c).fill(0.0);
-                }
-            }
-            let is_diagonal = row == column;
-            if is_diagonal {
-                // Any positive number works for a held direction; one of the size of the matrix
-                // keeps pivots similar.
-                let size = self.blocks[i].trace().abs() / 3.0;
-                for r in 0..usize::from(row_hold.n) {
-                    block[(r, r)] = if size > 0.0 { size } else { 1.0 };
-                }
-            }
-            for (c, &entry) in entries.iter().enumerate() {
-                let first = if is_diagonal { c } else { 0 };
-                for r in first..3 {
-                    self.values[entry + r - first] = block[(r, c)];
-                }
-            }
+    /// Factors the region's blocks only, under constraints. Returns false if that is not enough:
+    /// there is no region, the constraints have changed outside it, or the matrix would need a
+    /// shift.
+    pub(crate) fn refactor_region(&mut self, structure: &Structure, holds: &[Hold]) -> bool {
+        let Some(region) = self.region.as_ref().filter(|_| self.is_factored) else {
+            return false;
+        };
+        let n_levels = holds.len() / region.is_outer.len();
+        let is_kept = (region
+            .is_outer
+            .iter()
+            .enumerate()
+            .filter(|(_, outer)| **outer))
+        .all(|(v, _)| {
+            let nodes = v * n_levels..(v + 1) * n_levels;
+            self.holds[nodes.clone()] == holds[nodes]
+        });
+        if !is_kept || self.shift > 0.0 {
+            return false;
         }
-        for (scale, &entry) in self.scale.iter_mut().zip(&self.diagonal) {
-            *scale = self.values[entry];
+        self.holds.copy_from_slice(holds);
+        let view = View {
+            structure,
+            region: self.region.as_ref(),
+            blocks: &self.blocks,
+            outer_share: &self.outer_share,
+            holds: &self.holds,
+            shift: 0.0,
+        };
+        self.is_factored = match &mut self.factors {
+            Factors::Single(numbers) => numbers.factor_zone(&view).is_ok(),
+            Factors::Double(numbers) => numbers.factor_zone(&view).is_ok(),
+        };
+        self.is_factored
+    }
+
+    fn factor_all(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
+        let view = View {
+            structure,
+            region: self.region.as_ref(),
+            blocks: &self.blocks,
+            outer_share: &self.outer_share,
+            holds: &self.holds,
+            shift,
+        };
+        match &mut self.factors {
+            Factors::Single(numbers) => {
+                numbers.factor_exterior(&view)?;
+                numbers.factor_zone(&view)
+            }
+            Factors::Double(numbers) => {
+                numbers.factor_exterior(&view)?;
+                numbers.factor_zone(&view)
+            }
         }
     }
 
@@ -206,30 +328,240 @@ impl LinearSystem {
         right_side: &[Vec3],
         solution: &mut [Vec3],
     ) {
-        for (node, force) in right_side.iter().enumerate() {
-            if !structure.is_free_level(node) {
-                continue;
-            }
-            let hold = &self.holds[node];
-            let dof = structure.dof(node);
-            let local = if hold.n == 0 {
-                *force
-            } else {
-                hold.frame.tr_mul(force)
-            };
-            self.right_side[dof..dof + 3].copy_from_slice(local.as_slice());
+        let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
+        match &mut self.factors {
+            Factors::Single(n) => n.solve(structure, tree, &self.holds, right_side, solution),
+            Factors::Double(n) => n.solve(structure, tree, &self.holds, right_side, solution),
         }
-        self.factor
-            .solve(structure.pattern(), &self.values, &mut self.right_side);
-        for (node, out) in solution.iter_mut().enumerate() {
-            if !structure.is_free_level(node) {
-                *out = Vec3::zeros();
-                continue;
+    }
+}
+
+/// All that a factor depends on.
+struct View<'a> {
+    structure: &'a Structure,
+    region: Option<&'a Region>,
+    blocks: &'a [Mat3],
+    outer_share: &'a [Mat3],
+    holds: &'a [Hold],
+    /// Shift of the diagonal, relative to it.
+    shift: f64,
+}
+
+impl View<'_> {
+    fn tree(&self) -> &Tree {
+        self.region.map_or(&self.structure.tree, |r| &r.tree)
+    }
+
+    /// A block under the constraints of its nodes. `is_whole` says whether `block` is the whole
+    /// block, or a part whose rest is added elsewhere.
+    fn constrained<T: Number>(
+        &self,
+        mut block: Mat3,
+        row: usize,
+        column: usize,
+        is_whole: bool,
+    ) -> Block<T> {
+        let (row_hold, column_hold) = (&self.holds[row], &self.holds[column]);
+        let is_diagonal = row == column;
+        // Any positive number works for a held direction; one of the size of the matrix keeps
+        // pivots similar.
+        let size = block.trace().abs() / 3.0;
+        if row_hold.n > 0 || column_hold.n > 0 {
+            block = row_hold.frame.transpose() * block * column_hold.frame;
+            for r in 0..usize::from(row_hold.n) {
+                block.row_mut(r).fill(0.0);
             }
-            let hold = &self.holds[node];
-            let dof = structure.dof(node);
-            let local = Vec3::from_column_slice(&self.right_side[dof..dof + 3]);
-            *out = if hold.n == 0 {
+            for c in 0..usize::from(column_hold.n) {
+                block.column_mut(c).fill(0.0);
+            }
+            if is_diagonal && is_whole {
+                for r in 0..usize::from(row_hold.n) {
+                    block[(r, r)] = if size > 0.0 { size } else { 1.0 };
+                }
+            }
+        }
+        if is_diagonal {
+            for r in 0..3 {
+                block[(r, r)] += self.shift * block[(r, r)].abs();
+            }
+        }
+        std::array::from_fn(|i| T::nearest(block.as_slice()[i]))
+    }
+}
+
+/// A factor in one precision, and scratch memory.
+#[derive(Debug)]
+struct Numbers<T> {
+    /// The factor outside the region, if there is one.
+    exterior: Option<(Exterior<T>, FactorScratch<T>)>,
+    zone: Zone<T>,
+    scratch: FactorScratch<T>,
+    substitution: SolveScratch<T>,
+    /// Blocks under constraints.
+    blocks: Vec<Block<T>>,
+    /// Diagonal of the matrix, in the order of elimination.
+    diagonal: Vec<T>,
+    x: Vec<T>,
+}
+
+impl<T: Number + Send + Sync> Numbers<T> {
+    fn new(structure: &Structure, tree: &Tree, has_region: bool) -> Self {
+        let exterior = has_region.then(|| {
+            (
+                Exterior::new(tree),
+                FactorScratch::in_parallel(tree, Half::Exterior),
+            )
+        });
+        Self {
+            exterior,
+            zone: Zone::new(tree),
+            scratch: FactorScratch::in_parallel(tree, Half::Zone),
+            substitution: SolveScratch::in_parallel(tree),
+            blocks: vec![[T::default(); 9]; structure.n_blocks()],
+            diagonal: vec![T::default(); structure.n_dofs()],
+            x: vec![T::default(); structure.n_dofs()],
+        }
+    }
+
+    fn factor_exterior(&mut self, view: &View<'_>) -> Result<(), Singular> {
+        let Some((exterior, scratch)) = &mut self.exterior else {
+            return Ok(());
+        };
+        let Some(region) = view.region else {
+            return Ok(());
+        };
+        let (structure, pattern) = (view.structure, &view.structure.pattern);
+        let blocks = &mut self.blocks;
+        let mut put = |block: usize, row: usize, column: usize| {
+            blocks[block] = view.constrained(view.blocks[block], row, column, true);
+        };
+        for v in (0..pattern.n_columns()).filter(|&v| !region.contains(v)) {
+            structure.for_each_own(v, &mut put);
+        }
+        for pair in 0..pattern.n_pairs() {
+            if pattern
+                .pair(pair)
+                .iter()
+                .any(|&v| !region.contains(v as usize))
+            {
+                structure.for_each_between(pair, &mut put);
+            }
+        }
+        let mut shares = view.outer_share.iter();
+        let mut put_share = |block: usize, row: usize, column: usize| {
+            let share = shares.next().copied().unwrap_or_default();
+            blocks[block] = view.constrained(share, row, column, false);
+        };
+        region.for_each_ring_block(structure, &mut put_share);
+        exterior.factor(&region.tree, blocks, scratch)?;
+        self.note_diagonal(view, |v| !region.contains(v));
+        self.check(view, Half::Exterior)
+    }
+
+    fn factor_zone(&mut self, view: &View<'_>) -> Result<(), Singular> {
+        let (structure, pattern) = (view.structure, &view.structure.pattern);
+        let contains = |v: usize| view.region.is_none_or(|r| r.contains(v));
+        let blocks = &mut self.blocks;
+        let mut put = |block: usize, row: usize, column: usize| {
+            blocks[block] = view.constrained(view.blocks[block], row, column, true);
+        };
+        for v in (0..pattern.n_columns()).filter(|&v| contains(v)) {
+            structure.for_each_own(v, &mut put);
+        }
+        for pair in 0..pattern.n_pairs() {
+            if pattern.pair(pair).iter().all(|&v| contains(v as usize)) {
+                structure.for_each_between(pair, &mut put);
+            }
+        }
+        self.note_diagonal(view, contains);
+        if let Some(region) = view.region {
+            let blocks = &mut self.blocks;
+            let mut shares = view.outer_share.iter();
+            let mut take_share = |block: usize, row: usize, column: usize| {
+                let share = shares.next().copied().unwrap_or_default();
+                let share: Block<T> = view.constrained(share, row, column, false);
+                for (whole, share) in blocks[block].iter_mut().zip(share) {
+                    *whole -= share;
+                }
+            };
+            region.for_each_ring_block(structure, &mut take_share);
+        }
+        let exterior = self.exterior.as_ref().map(|(exterior, _)| exterior);
+        self.zone
+            .factor(view.tree(), &self.blocks, exterior, &mut self.scratch)?;
+        self.check(view, Half::Zone)
+    }
+
+    fn note_diagonal(&mut self, view: &View<'_>, keep: impl Fn(usize) -> bool) {
+        let (structure, tree) = (view.structure, view.tree());
+        for v in (0..structure.pattern.n_columns()).filter(|&v| keep(v)) {
+            let (own, first) = (structure.pattern.own(v), tree.first_dof(v));
+            for l in 0..structure.n_free_levels {
+                for c in 0..3 {
+                    self.diagonal[first + 3 * l + c] = self.blocks[own + 2 * l][4 * c];
+                }
+            }
+        }
+    }
+
+    /// Refuses a factor with a pivot that is only rounding.
+    fn check(&self, view: &View<'_>, half: Half) -> Result<(), Singular> {
+        let tree = view.tree();
+        let least = match (half, &self.exterior) {
+            (Half::Exterior, Some((exterior, _))) => {
+                least_pivot(tree, half, exterior, &self.diagonal)
+            }
+            _ => least_pivot(tree, half, &self.zone, &self.diagonal),
+        };
+        let limit = if size_of::<T>() == size_of::<f64>() {
+            SINGULAR_PIVOT
+        } else {
+            SINGLE_PIVOT
+        };
+        (least > limit).then_some(()).ok_or(Singular)
+    }
+
+    fn solve(
+        &mut self,
+        structure: &Structure,
+        tree: &Tree,
+        holds: &[Hold],
+        right_side: &[Vec3],
+        solution: &mut [Vec3],
+    ) {
+        let n_levels = holds.len() / structure.pattern.n_columns();
+        let nodes = || {
+            (0..structure.pattern.n_columns()).flat_map(|v| {
+                let first = tree.first_dof(v);
+                (0..structure.n_free_levels).map(move |l| (v * n_levels + l, first + 3 * l))
+            })
+        };
+        let x = &mut self.x;
+        for (node, dof) in nodes() {
+            let hold = &holds[node];
+            let local = if hold.n == 0 {
+                right_side[node]
+            } else {
+                hold.frame.tr_mul(&right_side[node])
+            };
+            for c in 0..3 {
+                x[dof + c] = T::nearest(local[c]);
+            }
+        }
+        let scratch = &mut self.substitution;
+        if let Some((exterior, _)) = &self.exterior {
+            substitute(tree, Half::Exterior, exterior, x, scratch);
+        }
+        substitute(tree, Half::Zone, &self.zone, x, scratch);
+        back_substitute(tree, Half::Zone, &self.zone, x, scratch);
+        if let Some((exterior, _)) = &self.exterior {
+            back_substitute(tree, Half::Exterior, exterior, x, scratch);
+        }
+        solution.fill(Vec3::zeros());
+        for (node, dof) in nodes() {
+            let local = Vec3::from_fn(|c, _| x[dof + c].wide());
+            let hold = &holds[node];
+            solution[node] = if hold.n == 0 {
                 local
             } else {
                 hold.frame * local

@@ -7,11 +7,11 @@ use palpa_sparse::fronts::{
 use palpa_sparse::{Block, ColumnPattern};
 
 use super::MOST_CANDIDATES;
-use super::batch::Batches;
 use super::candidate::Candidate;
 use super::contact_problem::ContactProblem;
 use super::outside::Outside;
 use super::plan::{Plan, Trouble};
+use crate::batch::{Batches, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -45,7 +45,13 @@ impl Inside {
         let tree = &plan.tree;
         let most = 3 * MOST_CANDIDATES;
         Self {
-            batches: Batches::new(model, memory, pattern, &|group| plan.holds(group), true),
+            batches: Batches::new(
+                model,
+                memory,
+                pattern,
+                &|group| plan.holds(group),
+                Tangent::Single,
+            ),
             blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
             factor: Zone::new(tree),
             scratch: FactorScratch::new(tree, Half::Zone),

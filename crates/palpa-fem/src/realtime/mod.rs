@@ -15,18 +15,16 @@
 //! candidate ─► contact_problem ─────────────────────────────────────────┘
 //! ```
 
-mod batch;
 mod candidate;
 mod contact_problem;
-mod elementary;
+
 mod inside;
-mod kernel;
-mod lanes;
+
 mod live;
 mod local;
 mod outside;
 mod plan;
-mod principal;
+
 #[cfg(test)]
 mod tests;
 
@@ -36,25 +34,5 @@ pub use live::{
 };
 pub use local::{LocalContact, LocalModel, LocalTool};
 
-use palpa_sparse::ColumnPattern;
-
-use crate::model::Model;
-
 /// Largest number of contact candidates.
 pub const MOST_CANDIDATES: usize = 160;
-
-/// The columns of a body's skin, and their neighbours.
-fn column_pattern(model: &Model) -> ColumnPattern {
-    let edges = model.structure.groups.iter().flat_map(|group| {
-        let vertices = &group.vertices[..group.n_columns()];
-        vertices
-            .iter()
-            .enumerate()
-            .flat_map(move |(i, &a)| vertices[..i].iter().map(move |&b| (a as usize, b as usize)))
-    });
-    ColumnPattern::new(
-        model.body.n_vertices(),
-        model.structure.n_free_levels,
-        edges,
-    )
-}

@@ -7,8 +7,8 @@ use palpa_sparse::fronts::{
 use palpa_sparse::{Block, ColumnPattern};
 use pulp::{Simd, WithSimd};
 
-use super::batch::Batches;
 use super::plan::{Plan, Trouble};
+use crate::batch::{Batches, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -211,16 +211,10 @@ impl Follower {
         memory: &Memory,
         pattern: &ColumnPattern,
         plan: &Plan,
-        with_tangent: bool,
+        tangent: Tangent,
     ) -> Self {
         Self {
-            batches: Batches::new(
-                model,
-                memory,
-                pattern,
-                &|group| !plan.holds(group),
-                with_tangent,
-            ),
+            batches: Batches::new(model, memory, pattern, &|group| !plan.holds(group), tangent),
             forces: vec![Vec3::zeros(); model.n_nodes()],
             before: vec![Vec3::zeros(); model.n_nodes()],
             share: 1.0,

@@ -1,8 +1,8 @@
 //! The kernel against the element.
 
-use super::batch::{Batches, History};
-use super::column_pattern;
+use crate::assembly::Assembler;
 use crate::assembly::assemble;
+use crate::batch::{Batches, History, Tangent};
 use crate::columns::SurfaceGroup;
 use crate::law::{
     Fung, Gent, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm,
@@ -10,6 +10,7 @@ use crate::law::{
 };
 use crate::model::Model;
 use crate::state::Memory;
+use crate::system::LinearSystem;
 use crate::{Mat3, Material, Materials, ModelParams, State, Supports};
 use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
 use palpa_mesh::{LayeredBody, Vec3};
@@ -176,7 +177,7 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
             .unwrap();
             let size = expected.iter().map(Vec3::norm).fold(0.0, f64::max);
 
-            let pattern = column_pattern(&model);
+            let pattern = model.structure.pattern.clone();
             // Made of two parts, as zone and exterior are.
             let mut forces = vec![Vec3::zeros(); n];
             let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
@@ -184,7 +185,7 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
             let mut own = Memory::new(&model);
             let mut fresh = State::new(&model);
             fresh.displacements.clone_from(&state.displacements);
-            let mut all = Batches::new(&model, &own, &pattern, &|_| true, false);
+            let mut all = Batches::new(&model, &own, &pattern, &|_| true, Tangent::None);
             own.begin_materials(&model, STEPS[0]);
             all.begin(&model, &mut own, &fresh);
             all.commit(&model, &own, &mut fresh);
@@ -194,7 +195,7 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
             own.begin_materials(&model, STEPS[1]);
             for is_first in [true, false] {
                 let keep = |group: &SurfaceGroup| group.triangles[0].is_multiple_of(3) == is_first;
-                let mut batches = Batches::new(&model, &own, &pattern, &keep, true);
+                let mut batches = Batches::new(&model, &own, &pattern, &keep, Tangent::Single);
                 batches.load(&history);
                 batches.begin(&model, &mut own, &fresh);
                 batches.add_forces(&model, &own, &u, &mut forces).unwrap();
@@ -211,24 +212,25 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
             }
             let largest = expected_blocks.iter().map(Mat3::norm).fold(0.0, f64::max);
             let (mut worst, mut compared) = (0.0_f64, 0);
-            for (i, row, column, _) in model.structure.blocks() {
-                let (v, w) = (row / model.body.n_levels, column / model.body.n_levels);
-                let (k, l) = (row % model.body.n_levels, column % model.body.n_levels);
-                let (place, is_turned) = if v == w {
-                    (pattern.own(v) + 2 * l.min(k) + k.abs_diff(l), k < l)
-                } else {
-                    let (a, b, ka, kb) = if v > w { (v, w, k, l) } else { (w, v, l, k) };
-                    let pair = pattern.find(a, b).unwrap();
-                    (pattern.between(pair) + 3 * kb + ka + 1 - kb, v < w)
-                };
-                let block = Mat3::from_fn(|r, c| {
-                    let at = if is_turned { c + 3 * r } else { r + 3 * c };
-                    f64::from(blocks[place][at])
-                });
+            model.structure.for_each_block(|i, _, _| {
+                let block = Mat3::from_fn(|r, c| f64::from(blocks[i][r + 3 * c]));
                 worst = worst.max((block - expected_blocks[i]).norm());
                 compared += 1;
-            }
+            });
             assert!(compared > 500);
+            let mut system = LinearSystem::new(&model.structure, n, None);
+            let mut assembler = Assembler::new(&model, &memory, None);
+            assembler.begin(&model, &memory);
+            assembler
+                .stiffness(&model, &memory, &u, &mut forces, &mut system)
+                .unwrap();
+            let differs = |a: f64, of: f64| assert!(a < 1e-12 * of, "{name}: {a:e} of {of:e}");
+            for (force, expected) in forces.iter().zip(&expected) {
+                differs((force - expected).norm(), size.max(1.0));
+            }
+            for (block, expected) in system.blocks.iter().zip(&expected_blocks) {
+                differs((block - expected).norm(), largest);
+            }
             assert!(
                 worst < 3e-6 * largest,
                 "{name}, {strain:?}: {worst:e} of {largest:e}"
@@ -244,8 +246,8 @@ fn prisms_that_are_inside_out_are_found() {
         let supports = Supports::on_base(&body);
         let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
         let memory = Memory::new(&model);
-        let pattern = column_pattern(&model);
-        let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, true);
+        let pattern = model.structure.pattern.clone();
+        let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, Tangent::Single);
         let mut u = vec![Vec3::zeros(); model.n_nodes()];
         let node = model.body.node(20, 0);
         // Through the level below it.

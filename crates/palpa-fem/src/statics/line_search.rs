@@ -1,8 +1,10 @@
 //! The line search: the share of a Newton step that is taken.
 
+use palpa_mesh::Vec3;
+
 use super::newton::{Imbalance, Newton};
 use super::workspace::Workspace;
-use crate::assembly::{Inverted, assemble};
+use crate::assembly::{Inverted, energy};
 use crate::state::State;
 
 /// Number of halvings after which a Newton step has failed.
@@ -30,18 +32,14 @@ impl Newton<'_> {
             {
                 *trial = u + delta * share;
             }
-            let result = assemble(
-                self.model,
-                &ws.memory,
-                &ws.trial,
-                &mut ws.trial_forces,
-                None,
-            );
+            let result =
+                ws.assembler
+                    .forces(self.model, &ws.memory, &ws.trial, &mut ws.trial_forces);
             match result {
                 Err(inverted) => last = Some(inverted),
-                Ok(energy) => {
+                Ok(()) => {
                     let is_good = self.keeps_touch(ws, share)
-                        && (!must_fall || self.is_better(ws, energy, imbalance.free));
+                        && (!must_fall || self.is_better(state, ws, imbalance.free));
                     if is_good {
                         std::mem::swap(&mut state.displacements, &mut ws.trial);
                         return Ok(share);
@@ -72,7 +70,7 @@ impl Newton<'_> {
     }
 
     /// Whether the trial has less energy, or smaller free forces.
-    fn is_better(&self, ws: &mut Workspace, energy: f64, free_before: f64) -> bool {
+    fn is_better(&self, state: &State, ws: &mut Workspace, free_before: f64) -> bool {
         let mut forces = std::mem::take(&mut ws.trial_forces);
         for (force, load) in forces.iter_mut().zip(self.load.forces) {
             *force -= load;
@@ -87,6 +85,9 @@ impl Newton<'_> {
             .sum();
         ws.trial_forces = forces;
         free_sq.sqrt() <= free_before * 1.000_1
-            || (ws.contacts.active.is_empty() && energy < self.energy)
+            || (ws.contacts.active.is_empty() && {
+                let energy = |u: &[Vec3]| energy(self.model, &ws.memory, u);
+                energy(&ws.trial) < energy(&state.displacements)
+            })
     }
 }

@@ -49,10 +49,10 @@ impl Newton<'_> {
             *carried = hold.free_part(&-(*force + *carried));
         }
         let mut is_solved = true;
-        if sliding.is_empty() && !is_stale {
+        if sliding.is_empty() && !is_stale && system.is_exact() {
             system.solve(structure, &carried, delta);
         } else {
-            let (tolerance, most) = if is_stale {
+            let (tolerance, most) = if is_stale || sliding.is_empty() {
                 (STALE_TOLERANCE, STALE_VECTORS)
             } else {
                 (GMRES_TOLERANCE, GMRES_VECTORS)

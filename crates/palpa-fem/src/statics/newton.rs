@@ -9,7 +9,7 @@ use super::constraints::ForcesBy;
 use super::load::{Load, SolveParams};
 use super::report::{Outcome, StepReport};
 use super::workspace::Workspace;
-use crate::assembly::{Inverted, assemble};
+use crate::assembly::Inverted;
 use crate::dynamics::Inertia;
 use crate::model::Model;
 use crate::state::State;
@@ -70,8 +70,6 @@ pub(super) struct Newton<'a> {
     pub(super) shift: f64,
     /// Residual: unbalanced forces relative to the forces that hold the body.
     pub(super) residual: f64,
-    /// Strain energy, J.
-    pub(super) energy: f64,
 }
 
 /// The distance of a state from equilibrium.
@@ -100,10 +98,20 @@ impl<'a> Newton<'a> {
     ) -> Self {
         ws.memory.begin(model, state, load.duration);
         ws.contacts.smoothing = 0.0;
+        ws.assembler.begin(model, &ws.memory);
         let inertia = load
             .dynamics
             .filter(|_| load.duration > 0.0 && load.duration.is_finite())
-            .map(|dynamics| Inertia::new(model, &ws.memory, &dynamics, state, load.duration));
+            .map(|dynamics| {
+                let Workspace {
+                    memory,
+                    assembler,
+                    system,
+                    ..
+                } = ws;
+                let dt = load.duration;
+                Inertia::new(model, memory, &dynamics, state, dt, assembler, system)
+            });
         ws.given.clone_from(&model.supports);
         for &(node, _) in load.held {
             ws.given[node] = Hold::all();
@@ -119,7 +127,6 @@ impl<'a> Newton<'a> {
             iterations: 0,
             shift: 0.0,
             residual: f64::INFINITY,
-            energy: 0.0,
         }
     }
 }
@@ -184,15 +191,15 @@ impl Newton<'_> {
             &mut state.touches,
             self.params.gap_tolerance,
         );
-        match assemble(
+        let assembled = ws.assembler.stiffness(
             self.model,
             &ws.memory,
             &state.displacements,
             &mut ws.forces,
-            Some(&mut ws.system.blocks),
-        ) {
-            Ok(energy) => self.energy = energy,
-            Err(inverted) => return ControlFlow::Break(inverted.into()),
+            &mut ws.system,
+        );
+        if let Err(inverted) = assembled {
+            return ControlFlow::Break(inverted.into());
         }
         ws.added.clear();
         self.add_loads(state, ws);
@@ -240,14 +247,17 @@ impl Newton<'_> {
         }
     }
 
-    /// Solves the linear system with a new factor or, in a large body, with that of an earlier
-    /// iteration while it works well enough.
+    /// Solves the linear system, with as little of a new factor as works: with a new factor of the
+    /// region round the tools; in a large body without a region, with the factor of an earlier
+    /// iteration; else with a new factor of everything.
     fn find_step(&mut self, ws: &mut Workspace) -> ControlFlow<Outcome> {
         let model = self.model;
         let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
         // The first step of a load is the largest. After it, the stiffness is near that at the end.
-        let is_kept = is_large && ws.system.is_factored && self.iterations != 2;
-        if !(is_kept && self.solve(ws, true)) {
+        let is_kept =
+            is_large && ws.system.region.is_none() && ws.system.is_factored && self.iterations != 2;
+        let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.holds);
+        if !(is_usable && self.solve(ws, true)) {
             match ws.system.refactor(&model.structure, &ws.holds) {
                 Ok(shift) => self.shift = self.shift.max(shift),
                 Err(_) => return ControlFlow::Break(Outcome::Singular),

@@ -5,6 +5,7 @@ use palpa_mesh::Vec3;
 use super::active_set::ContactResiduals;
 use super::newton::Newton;
 use super::workspace::Workspace;
+use crate::assembly::energy;
 use crate::posed_tool::PosedTool;
 use crate::state::{State, Touch};
 
@@ -71,7 +72,7 @@ impl Newton<'_> {
             residual: self.residual,
             contact: ContactResiduals::default(),
             friction_smoothing: ws.contacts.smoothing,
-            energy: self.energy,
+            energy: energy(self.model, &ws.memory, &state.displacements),
             tool_forces: vec![Vec3::zeros(); n_tools],
             tool_areas: vec![0.0; n_tools],
             tool_pressures: vec![0.0; n_tools],

@@ -6,6 +6,8 @@
     reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
 )]
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
@@ -13,6 +15,7 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, Par};
 use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
 
 use super::Number;
 use super::tree::{Front, FrontPair, Half, Tree};
@@ -22,7 +25,8 @@ use crate::blocks::Block;
 /// Scratch memory for factoring; its contents do not matter between calls.
 pub struct FactorScratch<T> {
     updates: Vec<T>,
-    memory: MemBuffer,
+    /// For the trunk, then for each branch if branches are factored at the same time.
+    memory: Vec<MemBuffer>,
 }
 
 impl<T> std::fmt::Debug for FactorScratch<T> {
@@ -36,19 +40,29 @@ impl<T> std::fmt::Debug for FactorScratch<T> {
 impl<T: Number> FactorScratch<T> {
     /// Scratch memory for one half of a tree.
     pub fn new(tree: &Tree, half: Half) -> Self {
-        let b = tree.width;
-        let most = tree.fronts[tree.range(half)]
-            .iter()
-            .map(|f| f.own.len() * b)
-            .max();
-        let need = most.map_or(StackReq::EMPTY, |n| {
-            cholesky_in_place_scratch::<T>(n, Par::Seq, faer::Spec::default())
-        });
         Self {
             updates: vec![T::default(); tree.scratch[half as usize]],
-            memory: MemBuffer::new(need),
+            memory: vec![memory_for::<T>(tree, tree.range(half))],
         }
     }
+
+    /// Scratch memory for one half of a tree whose branches are factored at the same time, by the
+    /// threads of rayon's pool. The result is the same to the bit.
+    pub fn in_parallel(tree: &Tree, half: Half) -> Self {
+        let mut scratch = Self::new(tree, half);
+        let branches = tree.branches[half as usize].iter();
+        scratch
+            .memory
+            .extend(branches.map(|branch| memory_for::<T>(tree, branch.clone())));
+        scratch
+    }
+}
+
+fn memory_for<T: Number>(tree: &Tree, fronts: Range<usize>) -> MemBuffer {
+    let columns = tree.fronts[fronts].iter().map(|f| f.own.len());
+    MemBuffer::new(columns.max().map_or(StackReq::EMPTY, |n| {
+        cholesky_in_place_scratch::<T>(n * tree.width, Par::Seq, faer::Spec::default())
+    }))
 }
 
 /// The factor of the columns outside the zone, and their Schur complement on the ring.
@@ -83,9 +97,15 @@ impl<T: Number> Exterior<T> {
         self.schur.fill(T::default());
         let n = tree.ring.len() * tree.width;
         put_pairs(tree, &tree.ring_pairs, blocks, &mut self.schur, n);
-        for f in tree.range(Half::Exterior) {
-            eliminate(tree, f, blocks, &mut self.panels, None, scratch)?;
-            let front = &tree.fronts[f];
+        eliminate_half(
+            tree,
+            Half::Exterior,
+            blocks,
+            &mut self.panels,
+            None,
+            scratch,
+        )?;
+        for front in &tree.fronts[tree.range(Half::Exterior)] {
             if front.parent.is_none() {
                 let size = front.border.len() * tree.width;
                 let update = &scratch.updates[front.update..][..size * size];
@@ -127,30 +147,145 @@ impl<T: Number> Zone<T> {
         exterior: Option<&Exterior<T>>,
         scratch: &mut FactorScratch<T>,
     ) -> Result<(), Singular> {
-        for f in tree.range(Half::Zone) {
-            let is_ring = tree.fronts[f].own == tree.ring;
-            let schur = exterior.filter(|_| is_ring).map(|e| &e.schur[..]);
-            eliminate(tree, f, blocks, &mut self.panels, schur, scratch)?;
-        }
-        Ok(())
+        let schur = exterior.map(|e| &e.schur[..]);
+        eliminate_half(tree, Half::Zone, blocks, &mut self.panels, schur, scratch)
     }
 }
 
-/// Assembles a front, factors its own columns and leaves its update in the scratch.
-fn eliminate<T: Number>(
+/// The least pivot of a factored half, relative to the entry on the matrix's diagonal that it came
+/// from. `diagonal` is that of the whole matrix, in the order of elimination.
+pub fn least_pivot<T: Number>(
     tree: &Tree,
-    f: usize,
+    half: Half,
+    panels: &impl AsRef<[T]>,
+    diagonal: &[T],
+) -> f64 {
+    let b = tree.width;
+    let mut least = f64::INFINITY;
+    for front in &tree.fronts[tree.range(half)] {
+        let (own, height) = (
+            front.own.len() * b,
+            (front.own.len() + front.border.len()) * b,
+        );
+        let panel = &panels.as_ref()[front.panel..][..height * own];
+        let diagonal = &diagonal[front.own.start as usize * b..][..own];
+        for (i, entry) in diagonal.iter().enumerate() {
+            let pivot = panel[i * height + i].wide();
+            least = least.min(pivot * pivot / entry.wide());
+        }
+    }
+    least
+}
+
+/// Factors all fronts of a half: branches at the same time if the scratch memory allows it, then
+/// the trunk.
+fn eliminate_half<T: Number>(
+    tree: &Tree,
+    half: Half,
     blocks: &[Block<T>],
     panels: &mut [T],
     schur: Option<&[T]>,
     scratch: &mut FactorScratch<T>,
 ) -> Result<(), Singular> {
+    let branches = &tree.branches[half as usize];
+    let FactorScratch { updates, memory } = scratch;
+    let (trunk_memory, branch_memory) = memory.split_at_mut(1);
+    let is_parallel = branch_memory.len() == branches.len() && branches.len() > 1;
+    if is_parallel {
+        let rooms = rooms(tree, branches, panels, updates, branch_memory);
+        (rooms.into_par_iter().zip(branches)).try_for_each(|(mut room, branch)| {
+            branch
+                .clone()
+                .try_for_each(|f| eliminate(tree, f, blocks, schur, &mut room))
+        })?;
+    }
+    let mut room = Room {
+        panels,
+        first_panel: 0,
+        updates,
+        first_update: 0,
+        memory: &mut trunk_memory[0],
+    };
+    let mut left = branches.iter().peekable();
+    for f in tree.range(half) {
+        left.next_if(|branch| branch.end <= f);
+        let is_done = is_parallel && left.peek().is_some_and(|branch| branch.contains(&f));
+        if !is_done {
+            eliminate(tree, f, blocks, schur, &mut room)?;
+        }
+    }
+    Ok(())
+}
+
+/// Memory in which some fronts are factored.
+struct Room<'a, T> {
+    panels: &'a mut [T],
+    /// Index of the first of these panels' numbers among those of the half.
+    first_panel: usize,
+    updates: &'a mut [T],
+    first_update: usize,
+    memory: &'a mut MemBuffer,
+}
+
+/// Divides memory among branches.
+fn rooms<'a, T>(
+    tree: &Tree,
+    branches: &[Range<usize>],
+    mut panels: &'a mut [T],
+    mut updates: &'a mut [T],
+    memory: &'a mut [MemBuffer],
+) -> Vec<Room<'a, T>> {
+    let b = tree.width;
+    let (mut panel, mut update) = (0, 0);
+    (branches.iter().zip(memory))
+        .map(|(branch, memory)| {
+            let fronts = &tree.fronts[branch.clone()];
+            let first_panel = fronts[0].panel;
+            let n_panels = (fronts
+                .iter()
+                .map(|f| f.own.len() * (f.own.len() + f.border.len())))
+            .sum::<usize>()
+                * b
+                * b;
+            let end = (fronts
+                .iter()
+                .map(|f| f.update + (f.border.len() * b).pow(2)))
+            .fold(update, usize::max);
+            let (_, rest) = std::mem::take(&mut panels).split_at_mut(first_panel - panel);
+            let (own, rest) = rest.split_at_mut(n_panels);
+            panels = rest;
+            let (own_updates, rest) = std::mem::take(&mut updates).split_at_mut(end - update);
+            updates = rest;
+            let room = Room {
+                panels: own,
+                first_panel,
+                updates: own_updates,
+                first_update: update,
+                memory,
+            };
+            panel = first_panel + n_panels;
+            update = end;
+            room
+        })
+        .collect()
+}
+
+/// Assembles a front, factors its own columns and leaves its update in the scratch memory. The
+/// front of the ring begins with the exterior's Schur complement, if there is one.
+fn eliminate<T: Number>(
+    tree: &Tree,
+    f: usize,
+    blocks: &[Block<T>],
+    schur: Option<&[T]>,
+    room: &mut Room<'_, T>,
+) -> Result<(), Singular> {
     let front = &tree.fronts[f];
     let b = tree.width;
     let (own, border) = (front.own.len() * b, front.border.len() * b);
     let height = own + border;
-    let panel = &mut panels[front.panel..][..height * own];
-    match schur {
+    let panel = &mut room.panels[front.panel - room.first_panel..][..height * own];
+    let update_of = |front: &Front| front.update.saturating_sub(room.first_update);
+    match schur.filter(|_| front.own == tree.ring) {
         // The ring has no border, so its panel is as large as the Schur complement.
         Some(schur) => panel.copy_from_slice(schur),
         None => panel.fill(T::default()),
@@ -158,7 +293,7 @@ fn eliminate<T: Number>(
     put_pairs(tree, &front.pairs, blocks, panel, height);
     for child in children(tree, front) {
         let size = child.border.len() * b;
-        let update = &scratch.updates[child.update..][..size * size];
+        let update = &room.updates[update_of(child)..][..size * size];
         add_update(b, &child.to_parent, update, 0, panel, height);
     }
     let (mut top, bottom) =
@@ -167,7 +302,7 @@ fn eliminate<T: Number>(
         top.rb_mut(),
         faer::linalg::cholesky::llt::factor::LltRegularization::default(),
         Par::Seq,
-        MemStack::new(&mut scratch.memory),
+        MemStack::new(room.memory),
         faer::Spec::default(),
     )
     .map_err(|_| Singular)?;
@@ -177,7 +312,8 @@ fn eliminate<T: Number>(
     if border > 0 {
         let mut bottom = bottom;
         solve_lower_triangular_in_place(top.rb(), bottom.rb_mut().transpose_mut(), Par::Seq);
-        let (before, rest) = scratch.updates.split_at_mut(front.update);
+        let first = update_of(front);
+        let (before, rest) = room.updates.split_at_mut(first);
         let (update, after) = rest.split_at_mut(border * border);
         matmul(
             MatMut::from_column_major_slice_mut(update, border, border),
@@ -192,10 +328,11 @@ fn eliminate<T: Number>(
         );
         for child in children(tree, front) {
             let size = child.border.len() * b;
-            let from = if child.update < front.update {
-                &before[child.update..][..size * size]
+            let at = update_of(child);
+            let from = if at < first {
+                &before[at..][..size * size]
             } else {
-                &after[child.update - front.update - border * border..][..size * size]
+                &after[at - first - border * border..][..size * size]
             };
             add_update(b, &child.to_parent, from, front.own.len(), update, border);
         }
@@ -203,8 +340,10 @@ fn eliminate<T: Number>(
     Ok(())
 }
 
+/// The children that leave an update.
 fn children<'a>(tree: &'a Tree, front: &'a Front) -> impl Iterator<Item = &'a Front> {
-    front.children.iter().map(|&c| &tree.fronts[c as usize])
+    let children = front.children.iter().map(|&c| &tree.fronts[c as usize]);
+    children.filter(|child| !child.border.is_empty())
 }
 
 /// Adds the columns of a child's update from the parent's column `first` on. When the target is a

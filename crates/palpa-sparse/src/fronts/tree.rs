@@ -10,6 +10,12 @@ use crate::blocks::ColumnPattern;
 /// Largest number of entries that a factor may have.
 const MOST_NUMBERS: usize = 1 << 30;
 
+/// Number of subtrees that are factored at the same time, and the work (multiplications) below
+/// which a subtree is not divided. Neither depends on the machine, so that every machine computes
+/// the same.
+const BRANCHES: usize = 12;
+const LEAST_BRANCH: f64 = 2e6;
+
 /// One half of a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Half {
@@ -41,6 +47,17 @@ pub(super) struct Front {
     /// Index of the first number of its update, in the scratch memory of its half. An update has
     /// `border × border` blocks of columns.
     pub(super) update: usize,
+}
+
+impl Front {
+    /// Multiplications for factoring this front, with `width` unknowns in a column.
+    fn flops(&self, width: usize) -> f64 {
+        let (s, r) = (
+            (self.own.len() * width) as f64,
+            (self.border.len() * width) as f64,
+        );
+        s * s * s / 3.0 + s * s * r + s * r * r
+    }
 }
 
 /// A pair of neighbours in a front.
@@ -77,6 +94,10 @@ pub struct Tree {
     /// Sizes of panels and scratch memory, in numbers: exterior, then zone.
     pub(super) panels: [usize; 2],
     pub(super) scratch: [usize; 2],
+    /// Subtrees of each half that can be factored at the same time; see [`Self::find_branches`].
+    pub(super) branches: [Vec<Range<usize>>; 2],
+    /// Whether a front is in no branch. `[n_fronts]`
+    pub(super) is_trunk: Vec<bool>,
     flops: [f64; 2],
 }
 
@@ -204,6 +225,8 @@ impl Tree {
             n_levels: pattern.n_levels(),
             panels: [0; 2],
             scratch: [0; 2],
+            branches: [Vec::new(), Vec::new()],
+            is_trunk: Vec::new(),
             flops: [0.0; 2],
         };
         tree.assign_pairs(pattern);
@@ -237,26 +260,27 @@ impl Tree {
     }
 
     /// Gives every front its place in memory. Scratch memory is reused as soon as a parent has
-    /// added the update.
+    /// added the update; each branch has scratch memory of its own.
     fn lay_out(&mut self) -> Result<(), TooLarge> {
         let b = self.width;
+        self.is_trunk = vec![true; self.fronts.len()];
         for half in [Half::Exterior, Half::Zone] {
             let h = half as usize;
-            let mut free: Vec<Range<usize>> = Vec::new();
-            for f in self.range(half) {
-                let own = self.fronts[f].own.len() * b;
-                let border = self.fronts[f].border.len() * b;
-                let (s, r) = (own as f64, border as f64);
-                self.flops[h] += s * s * s / 3.0 + s * s * r + s * r * r;
-                self.fronts[f].panel = self.panels[h];
+            let range = self.range(half);
+            for front in &mut self.fronts[range] {
+                let (own, border) = (front.own.len() * b, front.border.len() * b);
+                self.flops[h] += front.flops(b);
+                front.panel = self.panels[h];
                 self.panels[h] += own * (own + border);
-                self.fronts[f].update = take(&mut free, border * border, &mut self.scratch[h]);
-                for c in self.fronts[f].children.clone() {
-                    let child = &self.fronts[c as usize];
-                    let size = (child.border.len() * b).pow(2);
-                    give(&mut free, child.update..child.update + size);
-                }
             }
+            let branches = self.find_branches(half);
+            for branch in &branches {
+                self.is_trunk[branch.clone()].fill(false);
+                self.take_updates(h, branch.clone());
+            }
+            let trunk = self.range(half).filter(|&f| self.is_trunk[f]);
+            self.take_updates(h, trunk.collect::<Vec<_>>().into_iter());
+            self.branches[h] = branches;
             if self.panels[h] > MOST_NUMBERS || self.scratch[h] > MOST_NUMBERS {
                 return Err(TooLarge {
                     n_dofs: self.order.len() * b,
@@ -266,12 +290,68 @@ impl Tree {
         Ok(())
     }
 
+    /// Gives fronts, in the order of elimination, their scratch memory after all that has been
+    /// given in this half. Memory of updates of other fronts is not reused.
+    fn take_updates(&mut self, half: usize, fronts: impl Iterator<Item = usize>) {
+        let b = self.width;
+        let start = self.scratch[half];
+        let mut free: Vec<Range<usize>> = Vec::new();
+        for f in fronts {
+            let size = (self.fronts[f].border.len() * b).pow(2);
+            self.fronts[f].update = take(&mut free, size, &mut self.scratch[half]);
+            for c in self.fronts[f].children.clone() {
+                let child = &self.fronts[c as usize];
+                let size = (child.border.len() * b).pow(2);
+                if child.update >= start {
+                    give(&mut free, child.update..child.update + size);
+                }
+            }
+        }
+    }
+
+    /// Subtrees of a half that can be factored at the same time, in the order of elimination. The
+    /// rest of the half, the trunk, comes after all of them.
+    fn find_branches(&self, half: Half) -> Vec<Range<usize>> {
+        let range = self.range(half);
+        // First front and work of the subtree under each front. A subtree is a range of fronts.
+        let mut first: Vec<usize> = (0..self.fronts.len()).collect();
+        let mut work: Vec<f64> = self.fronts.iter().map(|f| f.flops(self.width)).collect();
+        for f in range.clone() {
+            for &c in &self.fronts[f].children {
+                first[f] = first[f].min(first[c as usize]);
+                work[f] += work[c as usize];
+            }
+        }
+        let is_root = |f: &usize| self.fronts[*f].parent.is_none();
+        let mut roots: Vec<usize> = range.filter(is_root).collect();
+        while roots.len() < BRANCHES {
+            let largest =
+                (0..roots.len()).max_by(|&i, &j| work[roots[i]].total_cmp(&work[roots[j]]));
+            let Some(i) = largest.filter(|&i| work[roots[i]] > LEAST_BRANCH) else {
+                break;
+            };
+            let children = &self.fronts[roots[i]].children;
+            if children.is_empty() {
+                break;
+            }
+            roots.swap_remove(i);
+            roots.extend(children.iter().map(|&c| c as usize));
+        }
+        roots.sort_unstable();
+        roots.iter().map(|&f| first[f]..f + 1).collect()
+    }
+
     /// The fronts of a half, in the order of elimination.
     pub(super) fn range(&self, half: Half) -> Range<usize> {
         match half {
             Half::Exterior => 0..self.n_exterior,
             Half::Zone => self.n_exterior..self.fronts.len(),
         }
+    }
+
+    /// Number of subtrees that can be computed at the same time.
+    pub fn n_branches(&self) -> usize {
+        self.branches.iter().map(Vec::len).sum()
     }
 
     /// Number of columns.

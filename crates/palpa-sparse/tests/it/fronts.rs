@@ -356,3 +356,52 @@ fn a_matrix_that_is_not_positive_definite_is_refused() {
         );
     }
 }
+
+/// The numbers of a factor and of a solution, of a tree large enough to have branches.
+fn numbers(case: &Case, tree: &Tree, in_parallel: bool) -> (Vec<f64>, Vec<f64>) {
+    let scratch = |half| {
+        if in_parallel {
+            FactorScratch::in_parallel(tree, half)
+        } else {
+            FactorScratch::new(tree, half)
+        }
+    };
+    let mut solve = if in_parallel {
+        SolveScratch::in_parallel(tree)
+    } else {
+        SolveScratch::new(tree)
+    };
+    let [inner, outer] = blocks(case, 3);
+    let (mut exterior, mut zone) = (Exterior::<f64>::new(tree), Zone::<f64>::new(tree));
+    exterior
+        .factor(tree, &outer, &mut scratch(Half::Exterior))
+        .unwrap();
+    zone.factor(tree, &inner, Some(&exterior), &mut scratch(Half::Zone))
+        .unwrap();
+    let mut noise = Noise::new(4);
+    let mut x: Vec<f64> = (0..case.pattern.n_dofs()).map(|_| noise.next()).collect();
+    substitute(tree, Half::Exterior, &exterior, &mut x, &mut solve);
+    substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+    back_substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+    back_substitute(tree, Half::Exterior, &exterior, &mut x, &mut solve);
+    let panels = [exterior.as_ref(), zone.as_ref()].concat();
+    (panels, x)
+}
+
+#[test]
+fn branches_that_are_computed_at_the_same_time_give_the_same_factor() {
+    let case = case(44, 40, 3, true, 9.0);
+    let tree = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    assert!(tree.n_branches() > 4, "{}", tree.n_branches());
+    let (factor, x) = numbers(&case, &tree, false);
+    let (same_factor, same_x) = numbers(&case, &tree, true);
+    assert_eq!(factor, same_factor);
+    let size = x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let difference = x.iter().zip(&same_x).map(|(a, b)| (a - b).abs());
+    let worst = difference.fold(0.0, f64::max);
+    assert!(worst < 1e-12 * size, "{worst:e} of {size}");
+    // The sums do not depend on the number of threads.
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let (_, alone) = one.unwrap().install(|| numbers(&case, &tree, true));
+    assert_eq!(same_x, alone);
+}

@@ -250,7 +250,7 @@ impl CoarseBody {
 }
 
 /// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
-fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
+pub(super) fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
     let (reach, radius) = match scene.tool {
         Tool::Disc { radius } => ([0.0; 2], radius),
         Tool::Node => ([0.0; 2], 0.0),

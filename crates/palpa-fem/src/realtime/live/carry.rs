@@ -2,9 +2,9 @@
 
 use palpa_mesh::{SurfaceIndex, Vec3};
 
-use super::super::batch::History;
 use super::Live;
 use super::candidates::SkinForces;
+use crate::batch::History;
 use crate::model::Model;
 use crate::state::State;
 

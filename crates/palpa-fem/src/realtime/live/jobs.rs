@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 
-use super::super::batch::History;
 use super::super::outside::Outside;
 use super::pressed::{Pressed, nearest_point};
 use super::rebuild::{Rebuild, Rebuilt, Shop, Target};
 use super::{ExteriorMode, Live};
+use crate::batch::History;
 use crate::law::Prony;
 use crate::model::Model;
 

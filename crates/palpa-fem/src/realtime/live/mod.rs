@@ -50,12 +50,12 @@ use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
 
 use super::candidate::Candidate;
-use super::column_pattern;
 use super::contact_problem::ContactProblem;
 use super::inside::Inside;
 use super::local::LocalModel;
 use super::outside::{Follower, Outside};
 use super::plan::{Plan, Trouble};
+use crate::batch::Tangent;
 use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -130,7 +130,7 @@ impl Live {
         come: Come,
         n_before: u64,
     ) -> Result<Self, FemError> {
-        let pattern = Arc::new(column_pattern(&model));
+        let pattern = Arc::new(model.structure.pattern.clone());
         let state = come.state;
         let mut memory = Memory::new(&model);
         memory.begin(&model, &state, 0.0);
@@ -139,8 +139,15 @@ impl Live {
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
         let mut shop = Box::new(Shop::new(&model, &memory, &pattern, &plan));
         let is_followed = params.exterior == ExteriorMode::Followed;
-        let mut follower =
-            is_followed.then(|| Box::new(Follower::new(&model, &memory, &pattern, &plan, false)));
+        let mut follower = is_followed.then(|| {
+            Box::new(Follower::new(
+                &model,
+                &memory,
+                &pattern,
+                &plan,
+                Tangent::None,
+            ))
+        });
         if let Some(history) = &come.history {
             inside.batches.load(history);
             shop.follower.batches.load(history);

@@ -6,10 +6,10 @@ use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
 use palpa_sparse::fronts::SolveScratch;
 
-use super::super::batch::History;
 use super::super::inside::Inside;
 use super::super::outside::{Follower, Outside, Workshop};
 use super::super::plan::{Plan, Trouble};
+use crate::batch::{History, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -73,7 +73,7 @@ impl Shop {
     ) -> Self {
         Self {
             plan: plan.id,
-            follower: Follower::new(model, memory, pattern, plan, true),
+            follower: Follower::new(model, memory, pattern, plan, Tangent::Single),
             workshop: Workshop::new(model, pattern, plan),
         }
     }
@@ -166,9 +166,15 @@ impl Rebuild {
         let (memory, here) = (&self.memory, &self.displacements);
         let made = shop.refactor(&mut outside, &model, memory, &pattern, &plan, here);
         let inside = is_new.then(|| {
-            let mut follower = self
-                .is_followed
-                .then(|| Box::new(Follower::new(&model, memory, &pattern, &plan, false)));
+            let mut follower = self.is_followed.then(|| {
+                Box::new(Follower::new(
+                    &model,
+                    memory,
+                    &pattern,
+                    &plan,
+                    Tangent::None,
+                ))
+            });
             let mut inside = Box::new(Inside::new(&model, memory, &pattern, &plan));
             if let Some(history) = &self.history {
                 inside.batches.load(history);

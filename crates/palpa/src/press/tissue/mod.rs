@@ -17,7 +17,7 @@ pub use self::result::{LargestErrors, LayerResult, RunResult};
 pub use self::run::Run;
 use self::run::{Acting, Earlier};
 pub use self::sample::{Failure, Sample, SampleOutcome};
-use super::mesh::{Patch, PressedBody};
+use super::mesh::{Patch, PressedBody, footprint};
 use super::{Phase, Place, Waypoint, waypoints};
 use crate::note::Note;
 use crate::prepare::{Approach, Prepared};
@@ -26,6 +26,10 @@ use crate::prepare::{Approach, Prepared};
 /// time, from this share of the rest on.
 const HOLD_SAMPLES: usize = 10;
 const FIRST_HOLD: f64 = 0.01;
+
+/// Distance from the tool's footprint, in addition to the depth, within which the stiffness is
+/// computed anew in every iteration, m.
+const REGION_MARGIN: f64 = 0.01;
 
 /// An indentation that is set up: the data that stays constant while it runs.
 #[derive(Debug)]
@@ -149,7 +153,7 @@ impl Indentation {
             indentation: self,
             index,
             state: self.rest.clone(),
-            workspace: Workspace::new(&self.model),
+            workspace: self.workspace(),
             path: self.path(self.speeds[index]),
             next: 0,
             before: Acting::default(),
@@ -158,6 +162,15 @@ impl Indentation {
             last: None,
             failure: None,
         }
+    }
+
+    /// Memory for the solver, prepared for touch under the tool.
+    fn workspace(&self) -> Workspace {
+        let scene = &self.prepared.scene;
+        let place = self.place();
+        let (points, radius) = footprint(scene, place.at, &place.direction);
+        let margin = REGION_MARGIN + scene.press.depth;
+        Workspace::round(&self.model, &points, radius + margin)
     }
 
     /// The rigid tool with its pose at a depth (m); `None` if the skin is bonded to it.

@@ -8,9 +8,8 @@
 use palpa_sparse::ColumnPattern;
 use palpa_sparse::fronts::Number;
 
-use super::super::kernel::{
-    Constant, Geometry, N_BLOCKS, N_NODES, N_POINTS, Row, Stiffness, WIDTH,
-};
+use super::Tangent;
+use super::kernel::{Constant, Geometry, N_BLOCKS, N_NODES, N_POINTS, Row, Stiffness, WIDTH};
 use super::places::places;
 use crate::law::{Hardening, Prony, PronyStep, six_of};
 use crate::model::Model;
@@ -37,8 +36,10 @@ pub(super) struct LaneBatch {
     pub(super) double: Numbers<f64>,
     /// Viscous memory; `None` in a body without memory.
     pub(super) past: Option<Box<Past>>,
-    /// For stiffness: the numbers in single precision, and the places of the blocks.
-    pub(super) tangent: Option<(Numbers<f32>, [[u32; WIDTH]; N_BLOCKS])>,
+    /// The numbers in single precision, for stiffness in that precision.
+    pub(super) single: Option<Box<Numbers<f32>>>,
+    /// The places of the blocks, for stiffness.
+    pub(super) places: Option<Box<[[u32; WIDTH]; N_BLOCKS]>>,
 }
 
 /// Memory of the pairs of a batch, all of one material.
@@ -58,18 +59,19 @@ impl LaneBatch {
     pub(super) fn empty(
         model: &Model,
         hardening: Hardening,
-        with_tangent: bool,
+        tangent: Tangent,
         past: Option<usize>,
     ) -> Self {
         let has_memory = past.is_some();
         Self {
             past: past.map(|material| Box::new(Past::new(model, material))),
+            single: (tangent == Tangent::Single).then(|| Box::new(Numbers::new(has_memory))),
+            places: (tangent != Tangent::None).then(|| Box::new([[0; WIDTH]; N_BLOCKS])),
             n: 0,
             hardening,
             pairs: [0; WIDTH],
             nodes: [[0; WIDTH]; N_NODES],
             double: Numbers::new(has_memory),
-            tangent: with_tangent.then(|| (Numbers::new(has_memory), [[0; WIDTH]; N_BLOCKS])),
         }
     }
 
@@ -97,10 +99,12 @@ impl LaneBatch {
                 row[lane] = value;
             }
         }
-        if let Some((single, blocks)) = &mut self.tangent {
+        if let Some(single) = &mut self.single {
             single.shape(model, pair, lane, columns);
+        }
+        if let Some(rows) = &mut self.places {
             let places = places(model, pattern, group, interval, columns);
-            for (row, place) in blocks.iter_mut().zip(places) {
+            for (row, place) in rows.iter_mut().zip(places) {
                 row[lane] = place;
             }
         }
@@ -113,7 +117,7 @@ impl LaneBatch {
             past.rest.put(lane, slopes, bulk);
         }
         self.double.stiffness.put(lane, slopes, bulk);
-        if let Some((single, _)) = &mut self.tangent {
+        if let Some(single) = &mut self.single {
             single.stiffness.put(lane, slopes, bulk);
         }
     }
@@ -141,8 +145,29 @@ impl LaneBatch {
         if let Some((decay, gain)) = factors.filter(|_| past.relaxes_volume) {
             past.add_memory(|row| &row.pressure, &decay, &gain, &mut constant.pressure);
         }
-        if let Some((single, _)) = &mut self.tangent {
+        if let Some(single) = &mut self.single {
             single.take_over(&self.double);
+        }
+    }
+
+    /// As [`Self::begin`], with the stresses of `memory`.
+    pub(super) fn begin_with(&mut self, model: &Model, memory: &Memory) {
+        let (Some(past), Some(constant)) = (&self.past, &mut self.double.constant) else {
+            return;
+        };
+        let scale = memory.scales[past.material];
+        for (row, rest) in self.double.stiffness.slope.iter_mut().zip(&past.rest.slope) {
+            *row = rest.map(|x| x * scale[0]);
+        }
+        self.double.stiffness.bulk = past.rest.bulk.map(|x| x * scale[1]);
+        for (lane, &pair) in self.pairs.iter().enumerate() {
+            let stresses = &memory.overstress[model.first_phase[pair as usize] as usize];
+            for (rows, stress) in constant.stress.iter_mut().zip(&stresses.points) {
+                for (row, value) in rows.iter_mut().zip(six_of(stress)) {
+                    row[lane] = value;
+                }
+            }
+            constant.pressure[lane] = stresses.volume;
         }
     }
 
@@ -160,7 +185,7 @@ impl LaneBatch {
                     row[lane] = row[0];
                 }
             }
-            if let Some((single, _)) = &mut self.tangent {
+            if let Some(single) = &mut self.single {
                 single.copy_first(lane);
             }
         }

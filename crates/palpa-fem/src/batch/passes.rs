@@ -10,10 +10,10 @@ use palpa_sparse::Block;
 use palpa_sparse::fronts::Number;
 use pulp::{Simd, WithSimd};
 
-use super::super::kernel::{Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, WIDTH};
-use super::super::lanes::{Doubles, Lanes, Singles};
 use super::TURNED;
+use super::kernel::{Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, WIDTH};
 use super::lane_batch::{LaneBatch, Numbers};
+use super::lanes::{Doubles, Lanes, Singles};
 use crate::law::Hardening;
 use crate::state::Memory;
 
@@ -80,11 +80,12 @@ impl<E: Number> Local<E> {
             displacements: [[zero; 3]; N_NODES],
             forces: [[zero; 3]; N_NODES],
             stiffness: [[zero; 9]; N_BLOCKS],
+            least: zero,
         }
     }
 
     #[inline(always)]
-    fn gather(&mut self, nodes: &[[u32; WIDTH]; N_NODES], displacements: &[Vec3]) {
+    pub(super) fn gather(&mut self, nodes: &[[u32; WIDTH]; N_NODES], displacements: &[Vec3]) {
         for (rows, nodes) in self.displacements.iter_mut().zip(nodes) {
             for (lane, &node) in nodes.iter().enumerate() {
                 let u = &displacements[node as usize];
@@ -98,13 +99,12 @@ impl<E: Number> Local<E> {
 
 /// Evaluates a batch in one precision. Returns false if a prism is inside out.
 #[inline(always)]
-fn run<R: Lanes, const TANGENT: bool>(
+pub(super) fn run<R: Lanes, const TANGENT: bool>(
     token: R::Token,
     numbers: &Numbers<R::Element>,
     hardening: Hardening,
     local: &mut Local<R::Element>,
 ) -> bool {
-    let mut least = [R::Element::nearest(1.0); WIDTH];
     for at in (0..WIDTH).step_by(R::N) {
         let constant = numbers.constant.as_ref();
         LaneGroup::<R>::new(
@@ -116,9 +116,9 @@ fn run<R: Lanes, const TANGENT: bool>(
             hardening,
         )
         .evaluate::<TANGENT>(local)
-        .store(&mut least[at..]);
+        .store(&mut local.least[at..]);
     }
-    least.iter().all(|&j| j > R::Element::default())
+    local.least.iter().all(|&j| j > R::Element::default())
 }
 
 /// Adds the forces of all batches, N. The error names a pair of the batch with a prism inside out.
@@ -166,14 +166,14 @@ impl WithSimd for Tangents<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         for batch in self.full {
-            let Some((single, places)) = &batch.tangent else {
+            let (Some(single), Some(places)) = (&batch.single, &batch.places) else {
                 continue;
             };
             self.local.gather(&batch.nodes, self.displacements);
             if !run::<Singles<S>, true>(simd, single, batch.hardening, self.local) {
                 return Err(batch.pairs[0]);
             }
-            for (rows, places) in self.local.stiffness.iter().zip(places) {
+            for (rows, places) in self.local.stiffness.iter().zip(places.iter()) {
                 for (lane, &place) in places.iter().enumerate().take(batch.n) {
                     let into = &mut self.blocks[(place & !TURNED) as usize];
                     // Rows hold entry (r, c) at 3 r + c, blocks at r + 3 c.

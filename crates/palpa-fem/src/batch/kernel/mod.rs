@@ -99,6 +99,8 @@ pub(super) struct Local<E> {
     pub(super) forces: [[Row<E>; 3]; N_NODES],
     /// `∂²W/∂u_a∂u_b`, entry (r, c) at `3 r + c`, N/m
     pub(super) stiffness: [[Row<E>; 9]; N_BLOCKS],
+    /// Least volume ratio of each pair's points.
+    pub(super) least: Row<E>,
 }
 
 /// The lanes of a batch that are computed together: those from `at` on, as many as a vector of the

@@ -1,14 +1,14 @@
 //! Memory of viscous pairs during the change from one set of batches to another.
 
-use super::super::kernel::N_POINTS;
 use super::Batches;
+use super::kernel::N_POINTS;
 use crate::Material;
 use crate::law::Prony;
 use crate::model::Model;
 
 /// Memory of all pairs of a body, for the change from one zone to another.
 #[derive(Debug, Clone)]
-pub(in super::super) struct History {
+pub(crate) struct History {
     n_rows: usize,
     /// `[pair][row][six stresses at six points, pressure]`, Pa
     numbers: Vec<f64>,
@@ -20,7 +20,7 @@ pub(in super::super) struct History {
 const ROW: usize = 6 * N_POINTS + 1;
 
 impl History {
-    pub(in super::super) fn new(model: &Model) -> Self {
+    pub(crate) fn new(model: &Model) -> Self {
         let rows = |m: &Material| m.prony.as_ref().map_or(0, Prony::n_rows);
         let n_rows = model.materials.iter().map(rows).max().unwrap_or(0);
         let n_pairs = if model.has_memory {
@@ -37,7 +37,7 @@ impl History {
 
     /// Takes over the memory of another mesh's pairs. `old` has, for each of this pair's two
     /// wedges, the old pair and the index of the wedge in it.
-    pub(in super::super) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
+    pub(crate) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
         if !old.iter().all(|&(old, _)| from.is_known[old]) {
             return;
         }
@@ -64,7 +64,7 @@ impl History {
 
 impl Batches {
     /// Puts the memory of these pairs into a history.
-    pub(in super::super) fn store(&self, history: &mut History) {
+    pub(crate) fn store(&self, history: &mut History) {
         for batch in &self.full {
             let Some(past) = &batch.past else { continue };
             for (lane, &pair) in batch.pairs.iter().enumerate().take(batch.n) {
@@ -81,7 +81,7 @@ impl Batches {
     }
 
     /// Takes the memory of these pairs from a history, as far as it is known there.
-    pub(in super::super) fn load(&mut self, history: &History) {
+    pub(crate) fn load(&mut self, history: &History) {
         for batch in &mut self.full {
             let Some(past) = &mut batch.past else {
                 continue;

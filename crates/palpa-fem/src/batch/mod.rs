@@ -6,40 +6,56 @@
 //! | `mod` | [`Batches`]: the prisms of a part of a body, their forces and stiffness |
 //! | `lane_batch` | one batch of sixteen pairs, and how it is filled |
 //! | `passes` | forces, stiffness and memory of all batches, in the machine's vectors |
+//! | `sums` | forces and stiffness in double precision, by several threads |
 //! | `single_pair` | a pair whose law is not one of the kernel's |
 //! | `places` | where nodes and blocks are |
 //! | `history` | memory on its way from zone to zone |
 
+mod elementary;
 mod history;
+mod kernel;
 mod lane_batch;
+mod lanes;
 mod passes;
 mod places;
+mod principal;
 mod single_pair;
+mod sums;
 
 use palpa_mesh::Vec3;
 use palpa_sparse::{Block, ColumnPattern};
 use pulp::Arch;
+use rayon::prelude::*;
 
-use super::kernel::{Local, N_POINTS, WIDTH};
 use crate::assembly::{Inverted, phases_at};
 use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt};
 use crate::law::Hardening;
 use crate::model::Model;
 use crate::state::{Memory, State};
+use kernel::{Local, N_POINTS, WIDTH};
 use lane_batch::LaneBatch;
 use passes::{Forces, Remember, Tangents};
 use places::{kernel_columns, places};
 use single_pair::{SinglePair, group_nodes, inverted};
 
-pub(super) use history::History;
+pub(crate) use history::History;
+pub(crate) use sums::{Slots, Sums};
 
 /// Flag on the place of a block that is to be added transposed.
 const TURNED: u32 = 1 << 31;
 
+/// Whether batches are for stiffness too, and in which precision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tangent {
+    None,
+    Single,
+    Double,
+}
+
 /// The prisms of some part of a body.
 #[derive(Debug)]
-pub(super) struct Batches {
+pub(crate) struct Batches {
     full: Vec<Box<LaneBatch>>,
     others: Vec<SinglePair>,
     local_double: Box<Local<f64>>,
@@ -70,14 +86,14 @@ fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f6
 }
 
 impl Batches {
-    /// The prisms under the groups that `keep` selects. With tangents they can be assembled into
-    /// blocks of the pattern.
-    pub(super) fn new(
+    /// The prisms under the groups that `keep` selects. `tangent` says
+    /// whether they can be assembled into blocks of the pattern.
+    pub(crate) fn new(
         model: &Model,
         memory: &Memory,
         pattern: &ColumnPattern,
         keep: &dyn Fn(&SurfaceGroup) -> bool,
-        with_tangent: bool,
+        tangent: Tangent,
     ) -> Self {
         let mut batches: Vec<Box<LaneBatch>> = Vec::new();
         let mut others = Vec::new();
@@ -107,7 +123,7 @@ impl Batches {
                 });
                 let index = with_room.copied().unwrap_or(batches.len());
                 if index == batches.len() {
-                    let batch = LaneBatch::empty(model, hardening, with_tangent, past);
+                    let batch = LaneBatch::empty(model, hardening, tangent, past);
                     batches.push(Box::new(batch));
                     open.push(index);
                 }
@@ -132,7 +148,7 @@ impl Batches {
 
     /// Starts a step: takes over stiffness and constant stresses of materials with memory. `memory`
     /// must already be set up for the step's duration.
-    pub(super) fn begin(&mut self, model: &Model, memory: &mut Memory, state: &State) {
+    pub(crate) fn begin(&mut self, model: &Model, memory: &mut Memory, state: &State) {
         if !model.has_memory {
             return;
         }
@@ -141,21 +157,29 @@ impl Batches {
     }
 
     /// As [`Self::begin`], for the pairs that are not in lanes.
-    pub(super) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
+    pub(crate) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
         for other in &self.others {
             memory.begin_group(model, state, other.pair as usize);
         }
     }
 
     /// As [`Self::begin`], for the pairs in lanes.
-    pub(super) fn begin_lanes(&mut self, memory: &Memory) {
+    pub(crate) fn begin_lanes(&mut self, memory: &Memory) {
         for batch in &mut self.full {
             batch.begin(memory);
         }
     }
 
+    /// As [`Self::begin`], where `memory` holds the constant stresses of all pairs.
+    pub(crate) fn begin_with(&mut self, model: &Model, memory: &Memory) {
+        if model.has_memory {
+            let full = self.full.par_iter_mut();
+            full.for_each(|batch| batch.begin_with(model, memory));
+        }
+    }
+
     /// Ends a step: updates the memory of every point.
-    pub(super) fn commit(&mut self, model: &Model, memory: &Memory, state: &mut State) {
+    pub(crate) fn commit(&mut self, model: &Model, memory: &Memory, state: &mut State) {
         if !model.has_memory {
             return;
         }
@@ -164,14 +188,14 @@ impl Batches {
     }
 
     /// As [`Self::commit`], for the pairs that are not in lanes.
-    pub(super) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
+    pub(crate) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
         for other in &self.others {
             memory.commit_group(model, state, other.pair as usize);
         }
     }
 
     /// As [`Self::commit`], for the pairs in lanes.
-    pub(super) fn commit_lanes(&mut self, memory: &Memory, displacements: &[Vec3]) {
+    pub(crate) fn commit_lanes(&mut self, memory: &Memory, displacements: &[Vec3]) {
         Arch::new().dispatch(Remember {
             full: &mut self.full,
             local: &mut self.local_double,
@@ -181,7 +205,7 @@ impl Batches {
     }
 
     /// Adds `∂W/∂u` of these prisms, N.
-    pub(super) fn add_forces(
+    pub(crate) fn add_forces(
         &mut self,
         model: &Model,
         memory: &Memory,
@@ -211,7 +235,7 @@ impl Batches {
 
     /// Adds the stiffness of these prisms to the blocks of the pattern, N/m. An extra block past
     /// the pattern's end receives the blocks of nodes that cannot move.
-    pub(super) fn add_stiffness(
+    pub(crate) fn add_stiffness(
         &mut self,
         model: &Model,
         memory: &Memory,

@@ -3,8 +3,8 @@
 use palpa_mesh::Vec3;
 use palpa_sparse::Block;
 
-use super::super::kernel::{N_BLOCKS, N_NODES};
 use super::TURNED;
+use super::kernel::{N_BLOCKS, N_NODES};
 use crate::assembly::{Inverted, phases_at};
 use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt};

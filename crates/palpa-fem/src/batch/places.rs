@@ -2,8 +2,8 @@
 
 use palpa_sparse::ColumnPattern;
 
-use super::super::kernel::{N_BLOCKS, N_NODES};
 use super::TURNED;
+use super::kernel::{N_BLOCKS, N_NODES};
 use crate::columns::SurfaceGroup;
 use crate::model::Model;
 
