@@ -212,21 +212,23 @@ fn the_force_hardly_depends_on_where_in_a_triangle_the_place_is() {
     };
     let spread_at =
         |runs: &[Vec<f64>], i: usize| spread(&runs.iter().map(|run| run[i]).collect::<Vec<_>>());
-    let sphere = press(&|| block().sphere(8.0));
     // The samples are at 0, 1 and 2 mm.
+    let sphere = press(&|| block().sphere(8.0));
     let (shallow, deep) = (spread_at(&sphere, 1), spread_at(&sphere, 2));
-    println!("sphere {shallow} {deep}");
-    let punch = press(&|| {
-        block()
-            .tool("flat-punch", 6.0)
-            .set("tool", "edge_radius", "2 mm")
-    });
-    let deep = spread_at(&punch, 2);
-    println!("punch {deep}");
-
-    let disc = press(&|| block().disc(6.0));
-    let deep = spread_at(&disc, 2);
-    println!("disc {deep}");
+    assert!(shallow < 0.015 && deep < 0.01, "{shallow} {deep}");
+    // A flat face and a disc feel each vertex that enters their edge.
+    let disc = spread_at(&press(&|| block().disc(6.0)), 2);
+    assert!(disc < 0.02, "{disc}");
+    let punch = spread_at(
+        &press(&|| {
+            block()
+                .tool("flat-punch", 7.0)
+                .set("tool", "edge_radius", "5 mm")
+                .near_tool(1.6)
+        }),
+        2,
+    );
+    assert!(punch < 0.01, "{punch}");
 }
 
 #[test]
