@@ -236,12 +236,11 @@ pub(super) fn note_overhang(
 fn overhang(scene: &Scene, skin: &Surface, place: &Place) -> f64 {
     let direction = place.direction.into_inner();
     let (reach, radius) = reach(scene);
-    let axes = match scene.tool.contact() {
-        Some(tool) => tool.axes(direction.into()).map(Vec3::from),
-        None => {
-            let x = direction.cross(&least_along(&direction)).normalize();
-            [x, direction.cross(&x), -direction]
-        }
+    let axes = if let Some(tool) = scene.tool.contact() {
+        tool.axes(direction.into()).map(Vec3::from)
+    } else {
+        let x = direction.cross(&least_along(&direction)).normalize();
+        [x, direction.cross(&x), -direction]
     };
     let (index, rim) = (Skin::new(skin), Rim::of(skin));
     let (mut n, mut n_off) = (0, 0);
