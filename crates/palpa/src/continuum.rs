@@ -11,7 +11,7 @@ use palpa_fem::shape::{
     Capsule, Cone, Ellipsoid, FlatPunch, Pose, RoundedBox, Shape, ShapeError, Sphere, Tool,
 };
 use palpa_fem::{Mat3, Supports};
-use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_scene::{
     ContactShape, ContactTool, CutFaces, Elastic, Energy, LumpPlace, Scene, Tissue, Volume,
 };
@@ -19,6 +19,7 @@ use palpa_scene::{
 use crate::build::{BuiltBody, in_mm, mended, read_in_metres};
 use crate::note::{Note, xyz};
 use crate::press::lump::share_inside;
+use crate::skin::Skin;
 
 /// Least share of a lump's volume that must lie in the tissue; less is an error. A share between
 /// this and `FULL_SHARE` gives a note.
@@ -115,6 +116,11 @@ pub fn lumps(
         return Ok(Vec::new());
     }
     let skin = Skin::new(&built.growth.body.skin);
+    // A skin without triangles grows no body.
+    let nearest = |p: Vec3| match skin.nearest(p) {
+        Some(point) => (point.at, skin.inward(&point)),
+        None => (p, -Vec3::z()),
+    };
     let mut lumps = Vec::new();
     for (i, lump) in scene.lumps.iter().enumerate() {
         let of_lump = || format!("lump \"{}\"", lump.name);
@@ -122,10 +128,10 @@ pub fn lumps(
         let (middle, inward) = match (&lump.place, &shape) {
             (LumpPlace::Below { depth, .. }, _) => {
                 let place = built.lump_places[i].expect("a lump below the skin has a place there");
-                let (on_skin, inward) = skin.nearest(place);
+                let (on_skin, inward) = nearest(place);
                 (on_skin + inward * *depth, inward)
             }
-            (LumpPlace::At(at), _) => (Vec3::from(*at), skin.nearest(Vec3::from(*at)).1),
+            (LumpPlace::At(at), _) => (Vec3::from(*at), nearest(Vec3::from(*at)).1),
             (LumpPlace::AsRead, LumpShape::Mesh(mesh)) => (mesh.centroid(), Vec3::zeros()),
             (LumpPlace::AsRead, _) => unreachable!("only a mesh is placed as it was read"),
         };
@@ -206,44 +212,6 @@ fn lump_shape(
 fn turned_to(axes: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
     let columns = Mat3::from_columns(&axes.map(Vec3::from));
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
-}
-
-/// A skin with an index for nearest-point queries.
-struct Skin<'a> {
-    surface: &'a Surface,
-    index: SurfaceIndex,
-    normals: Vec<Vec3>,
-}
-
-impl<'a> Skin<'a> {
-    fn new(surface: &'a Surface) -> Self {
-        Self {
-            surface,
-            index: SurfaceIndex::build(surface),
-            normals: surface.vertex_normals(),
-        }
-    }
-
-    /// The point of the skin nearest to `p`, and the inward normal there, interpolated between the
-    /// vertices.
-    fn nearest(&self, p: Vec3) -> (Vec3, Vec3) {
-        let Some(closest) = self.index.closest(p) else {
-            return (p, -Vec3::z()); // a skin without triangles grows no body
-        };
-        let t = closest.triangle as usize;
-        let [a, b, c] = self.surface.corners(t);
-        let q = closest.point;
-        // Barycentric weights: the area opposite to each corner.
-        let part = |u: Vec3, v: Vec3| (u - q).cross(&(v - q)).norm();
-        let weights = [part(b, c), part(c, a), part(a, b)];
-        let normal: Vec3 = (self.surface.triangles[t].iter().zip(weights))
-            .map(|(&v, w)| self.normals[v as usize] * w)
-            .sum();
-        let inward = (-normal)
-            .try_normalize(0.0)
-            .unwrap_or_else(|| -self.normals[self.surface.triangles[t][0] as usize]);
-        (q, inward)
-    }
 }
 
 /// The supports of the body: its base, and its cut faces as the scene says. Faces that cannot be

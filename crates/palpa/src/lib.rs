@@ -55,6 +55,8 @@ pub mod live;
 mod note;
 mod prepare;
 pub mod press;
+mod skin;
+mod touch;
 
 pub use error::one_paragraph;
 pub use note::{LayerAspect, Note, in_words, note_schema};
@@ -66,6 +68,7 @@ pub use palpa_scene as scene;
 pub use palpa_servo as servo;
 pub use palpa_springs as springs;
 pub use prepare::{Approach, PrepareParams, Prepared};
+pub use skin::SkinPoint;
 
 // The example of the README is compiled and run as well.
 #[cfg(doctest)]

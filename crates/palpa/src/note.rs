@@ -72,6 +72,25 @@ pub enum Note {
     },
     /// The place that is pressed is on the rim of a cut face.
     PressOnCutFace,
+    /// The point that the scene presses is far from the skin.
+    PlaceOffSkin {
+        /// The point, m.
+        asked: [f64; 3],
+        /// The point of the skin nearest to it, m.
+        at: [f64; 3],
+        /// Distance between them, m.
+        distance: f64,
+    },
+    /// A tool that holds a single vertex cannot press at the point of the scene.
+    NodeBeside {
+        /// Distance of the vertex from the nearest point of the skin, m.
+        distance: f64,
+    },
+    /// The tool reaches beyond the rim of the skin.
+    ToolOverRim {
+        /// Share of the tool's footprint at full depth that is beyond the rim, 0 to 1.
+        share: f64,
+    },
     /// The skin could not be refined as far as wanted.
     SkinTooCoarse {
         /// Number of triangles that are larger than wanted.
@@ -328,6 +347,29 @@ impl fmt::Display for Note {
             ),
             Self::PressOnCutFace => f.write_str(
                 "the press point lies on a cut face of the body; the force there is that of a free edge",
+            ),
+            Self::PlaceOffSkin {
+                asked,
+                at,
+                distance,
+            } => write!(
+                f,
+                "the point ({}) mm is {:.1} mm from the skin; the tool presses the nearest point of the skin, ({}) mm",
+                Mm(*asked),
+                mm(distance),
+                Mm(*at)
+            ),
+            Self::NodeBeside { distance } => write!(
+                f,
+                "the tool holds a single vertex, and the nearest one is {:.3} mm beside the press point; a disc or a tool \
+                 that touches presses at the point itself",
+                distance * 1e3
+            ),
+            Self::ToolOverRim { share } => write!(
+                f,
+                "{:.0} % of the tool's footprint is beyond the rim of the skin, where no tissue resists: press farther inside, \
+                 or keep more of the body",
+                (100.0 * share).max(1.0)
             ),
             Self::SkinTooCoarse {
                 n_triangles,

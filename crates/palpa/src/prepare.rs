@@ -16,7 +16,7 @@ use palpa_fem::{
     Workspace, advance,
 };
 use palpa_mesh::growth::MAX_NODES;
-use palpa_mesh::{LayeredBody, Surface, Vec3};
+use palpa_mesh::{Surface, Vec3};
 use palpa_scene::{ContactTool, Scene};
 
 use crate::build::{BuiltBody, build_within};
@@ -25,6 +25,7 @@ use crate::note::{Note, in_words};
 use crate::press::Place;
 use crate::press::lump::{lump_shares, surface_of_shape};
 use crate::press::mesh::PressedBody;
+use crate::touch::Way;
 
 /// Parameters of the preparation.
 #[derive(Debug, Clone)]
@@ -205,8 +206,27 @@ impl Prepared {
     pub fn approach(&self, tool: &ContactTool, rest: Option<&State>) -> anyhow::Result<Approach> {
         let place = self.place();
         let direction = place.direction.into_inner();
-        let (tool, pose) = continuum::tool(tool, direction, place.at)?;
-        let touch = first_touch(&self.mesh.body, rest, &tool, &pose, place);
+        // Tension may have moved the skin, and the place with it.
+        let body = &self.mesh.body;
+        let moved = |v: usize| match rest {
+            Some(rest) => rest.displacements[body.node(v, 0)],
+            None => Vec3::zeros(),
+        };
+        let tip = place.at + place.point.mean(moved);
+        let (tool, pose) = continuum::tool(tool, direction, tip)?;
+        let points: Vec<Vec3> = (body.skin.points.iter().enumerate())
+            .map(|(v, p)| p + moved(v))
+            .collect();
+        // The far side of the body is not in the way.
+        let facing = (body.skin.triangles.iter())
+            .map(|corners| corners.map(|v| points[v as usize]))
+            .filter(|[a, b, c]| (b - a).cross(&(c - a)).dot(&direction) < 0.0);
+        let way = Way {
+            tool: &tool,
+            pose: &pose,
+            direction,
+        };
+        let touch = way.first_touch(facing);
         Ok(Approach {
             tool,
             pose,
@@ -225,7 +245,8 @@ pub struct Approach {
     pose: Pose,
     /// Unit vector of its movement.
     direction: Vec3,
-    /// Distance along the way from `pose` to the first touch, m.
+    /// Distance along the way from `pose` to the first touch of the skin's triangles, m: 0 or
+    /// negative.
     touch: f64,
 }
 
@@ -239,55 +260,4 @@ impl Approach {
             pose: Pose::from_parts(translation.into(), self.pose.rotation),
         }
     }
-}
-
-/// Distance that the tool can go along its way from `pose` until it touches the skin, m: 0 if its
-/// tip touches first, negative if the skin beside the tip is higher.
-fn first_touch(
-    body: &LayeredBody,
-    rest: Option<&State>,
-    tool: &RigidTool,
-    pose: &Pose,
-    place: &Place,
-) -> f64 {
-    const HALVINGS: usize = 60;
-    let direction = place.direction.into_inner();
-    let x = |v: usize| {
-        let node = body.node(v, 0);
-        body.positions[node] + rest.map_or_else(Vec3::zeros, |rest| rest.displacements[node])
-    };
-    // Tension may have moved the skin, and the place with it.
-    let start = (x(place.vertex) - place.at).dot(&direction);
-    let normals = body.skin.vertex_normals();
-    let facing: Vec<Vec3> = (0..body.n_vertices())
-        .filter(|&v| normals[v].dot(&direction) < 0.0)
-        .map(x)
-        .collect();
-    let gap = |s: f64| {
-        let at = Pose::from_parts(
-            (pose.translation.vector + direction * s).into(),
-            pose.rotation,
-        );
-        facing
-            .iter()
-            .map(|x| tool.distance_at(&at, x).distance)
-            .fold(f64::INFINITY, f64::min)
-    };
-    if gap(start) > -1e-9 {
-        return start;
-    }
-    let mut back = 1e-4;
-    while gap(start - back) < 0.0 && back < 1.0 {
-        back *= 2.0;
-    }
-    let (mut free, mut deep) = (start - back, start);
-    for _ in 0..HALVINGS {
-        let middle = f64::midpoint(free, deep);
-        if gap(middle) < 0.0 {
-            deep = middle;
-        } else {
-            free = middle;
-        }
-    }
-    free
 }

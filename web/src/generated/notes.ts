@@ -88,6 +88,42 @@ export interface components {
             /** @constant */
             kind: "press_on_cut_face";
         } | {
+            /** @description The point, m. */
+            asked: [
+                number,
+                number,
+                number
+            ];
+            /** @description The point of the skin nearest to it, m. */
+            at: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Format: double
+             * @description Distance between them, m.
+             */
+            distance: number;
+            /** @constant */
+            kind: "place_off_skin";
+        } | {
+            /**
+             * Format: double
+             * @description Distance of the vertex from the nearest point of the skin, m.
+             */
+            distance: number;
+            /** @constant */
+            kind: "node_beside";
+        } | {
+            /** @constant */
+            kind: "tool_over_rim";
+            /**
+             * Format: double
+             * @description Share of the tool's footprint at full depth that is beyond the rim, 0 to 1.
+             */
+            share: number;
+        } | {
             /** @constant */
             kind: "skin_too_coarse";
             /**

@@ -361,7 +361,12 @@ impl Cut {
 }
 
 /// The vertices that are connected with `seed` over edges with both ends within.
-fn reached(n: usize, edges: &[[u32; 2]], seed: u32, is_within: impl Fn(u32) -> bool) -> Vec<bool> {
+pub(super) fn reached(
+    n: usize,
+    edges: &[[u32; 2]],
+    seed: u32,
+    is_within: impl Fn(u32) -> bool,
+) -> Vec<bool> {
     let mut sets = crate::topology::UnionFind::new(n);
     for &[a, b] in edges.iter().filter(|e| e.iter().all(|&v| is_within(v))) {
         sets.join(a, b);
@@ -401,7 +406,7 @@ fn corner_off([tip, n, m]: [u32; 3], [p, q]: [u32; 2], points: &[Vec3]) -> Vec<[
 }
 
 /// Smallest angle of some triangles. rad
-fn smallest_angle(body: &LayeredBody, triangles: &[u32]) -> f64 {
+pub(super) fn smallest_angle(body: &LayeredBody, triangles: &[u32]) -> f64 {
     triangles
         .iter()
         .flat_map(|&t| {

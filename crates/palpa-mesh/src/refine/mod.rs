@@ -23,6 +23,7 @@ mod imprint;
 mod levels;
 mod origin;
 mod size;
+mod slide;
 
 use crate::quality::PrismShape;
 use crate::{CutFace, LayeredBody, Surface, Vec3};
@@ -32,6 +33,7 @@ pub use imprint::{Circle, Imprint, ImprintError, imprint_circle};
 pub use levels::{LevelSplit, along, mean_depths, near_depth, parts_for, split_levels};
 pub use origin::Origins;
 pub use size::near_points;
+pub use slide::{Slide, slide_vertices};
 
 /// Limits of refinement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -58,7 +58,8 @@ impl Origins {
         composed
     }
 
-    fn push(&mut self, parts: Vec<(u32, f64)>) {
+    /// Adds a vertex with these parts.
+    pub(super) fn push(&mut self, parts: Vec<(u32, f64)>) {
         self.parts.extend(parts);
         self.first.push(self.parts.len());
     }

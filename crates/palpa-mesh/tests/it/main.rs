@@ -10,5 +10,6 @@ mod read;
 mod refine;
 mod repair;
 mod shapes;
+mod slide;
 mod sound;
 mod write;

@@ -30,16 +30,16 @@ use anyhow::{Context as _, bail};
 use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
-use palpa_mesh::{SurfaceIndex, Vec3};
+use palpa_mesh::Vec3;
 use palpa_scene::Scene;
 use palpa_servo::Pose;
 
-use crate::build::{build_within, in_mm, nearest};
+use crate::build::{build_within, in_mm};
 use crate::note::Note;
 use crate::prepare::Prepared;
-use crate::press::column_length;
 use crate::press::mesh::along_skin;
 use crate::press::tissue::{note_mesh, note_tension};
+use crate::skin::Skin;
 
 /// Radius of the zone as a multiple of contact radius plus depth, and its least value, m. The zone
 /// should contain the contact and the tissue beside it that deforms.
@@ -231,27 +231,27 @@ fn way(scene: &Scene) -> Vec<f64> {
 fn check_way(scene: &Scene, prepared: &Prepared, notes: &mut Vec<Note>) -> anyhow::Result<()> {
     let (body, place) = (&prepared.grown.growth.body, prepared.place());
     let along = along_skin(scene, &place.direction);
-    let index = SurfaceIndex::build(&body.skin);
+    let skin = Skin::new(&body.skin);
     let depth = scene.motion.depth;
     for far in way(scene) {
         let over = prepared.grown.press_at + along * far;
-        let Some(closest) = index.closest(over) else {
+        let Some(nearest) = skin.nearest(over) else {
             continue;
         };
-        if (closest.point - over).norm() > depth {
+        if (nearest.at - over).norm() > depth {
             notes.push(Note::MotionOffSkin {
                 far,
                 length: scene.motion.length,
             });
             break;
         }
-        let thickness = column_length(body, nearest(&body.skin, closest.point));
+        let thickness = nearest.column_length(body);
         if depth >= thickness {
             bail!(
                 "[motion] depth = \"{:.1} mm\" reaches beyond the body: at ({}) mm the tissue is {:.1} mm deep; press less deep, or \
                  at another place",
                 depth * 1e3,
-                in_mm(closest.point),
+                in_mm(nearest.at),
                 thickness * 1e3
             );
         }

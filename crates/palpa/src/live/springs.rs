@@ -58,7 +58,8 @@ impl SpringScene {
         let built = Arc::new(build_within(scene, MOST_NODES)?);
         let body = &built.growth.body;
         let mut notes = Vec::new();
-        let place = Place::find(scene, body, built.press_vertex, &mut notes)?;
+        // The tip holds a node.
+        let place = Place::at_vertex(scene, body, built.press_vertex, &mut notes)?;
         reference::note_cut_faces(scene, body, &mut notes);
         let point = ContactTool {
             shape: ContactShape::Sphere { radius: POINT },

@@ -3,13 +3,13 @@
 use nalgebra::Unit;
 use palpa_fem::lump::{Lump, LumpShape};
 use palpa_mesh::refine::{
-    Circle, RefineParams, Refined, along, imprint_circle, mean_depths, near_depth, near_points,
-    parts_for, refine, split_levels,
+    Circle, RefineParams, Refined, Slide, along, imprint_circle, mean_depths, near_depth,
+    near_points, parts_for, refine, slide_vertices, split_levels,
 };
 use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Target, Tool};
 
-use super::place::mesh_size_near;
+use super::place::{is_between_vertices, mesh_size_near, note_overhang, reach};
 use super::{Place, nodes_under_disc};
 use crate::build::{BuiltBody, nearest};
 use crate::note::{Note, xyz};
@@ -42,7 +42,7 @@ type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
 pub struct PressedBody {
     /// The refined body. Its first vertices are those of the body before refinement.
     pub body: LayeredBody,
-    /// The place that is pressed: the vertex nearest to the scene's target.
+    /// The place that is pressed. If the mesh may be refined, it is a vertex.
     pub place: Place,
     /// For each vertex, the thickness of the layers relative to the thickness that the scene asks
     /// for. `[n_vertices]`
@@ -82,18 +82,32 @@ impl PressedBody {
         notes: &mut Vec<Note>,
     ) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
-        // Check the place first, before any work, and only once.
-        let mut vertex = built.press_vertex;
-        let coarse = Place::find(scene, grown, vertex, &mut Vec::new())?;
+        // The place is checked first, before any work.
+        let mut remarks = Vec::new();
+        let coarse = Place::find(scene, built, &mut remarks)?;
         let mut refined = refine_near(scene, built, &coarse, lumps, way, notes);
-        if matches!(scene.press.target, Target::Point(_)) {
-            vertex = nearest(&refined.body.skin, built.press_at);
-        }
-        let place = Place::find(scene, &refined.body, vertex, notes)?;
+        let is_between = is_between_vertices(scene);
+        let mut place = if is_between {
+            bring_vertex(scene, &mut refined, coarse.at);
+            coarse.on(&refined.body)
+        } else {
+            remarks.clear();
+            let vertex = match scene.press.target {
+                Target::Point(_) => nearest(&refined.body.skin, built.press_at),
+                Target::Vertex(_) | Target::Middle => built.press_vertex,
+            };
+            Place::at_vertex(scene, &refined.body, vertex, &mut remarks)?
+        };
+        notes.append(&mut remarks);
+        note_overhang(scene, grown, &place, notes);
         let patch = match scene.tool {
             Tool::Disc { radius } => Some(bond(scene, &mut refined, &place, radius, notes)),
             _ => None,
         };
+        if is_between {
+            // The imprint of a disc divides triangles.
+            place = place.on(&refined.body);
+        }
         let thinning = refined.interpolate(&built.growth.thinning);
         let stand_off = refined.interpolate(&built.growth.stand_off);
         let is_fine = refined.n_too_large == 0;
@@ -118,6 +132,24 @@ impl PressedBody {
             patch,
             is_resolved: is_fine && is_split,
         })
+    }
+}
+
+/// Moves the vertex nearest to a point of the skin to the point, and the mesh under the tool with
+/// it: the force then hardly depends on where the vertices were. If the move would make poor
+/// elements, the mesh stays, and the tool presses between vertices.
+fn bring_vertex(scene: &Scene, refined: &mut Refined, at: Vec3) {
+    if !scene.mesh.refine {
+        return;
+    }
+    let (half, radius) = reach(scene);
+    let slide = Slide {
+        vertex: nearest(&refined.body.skin, at) as u32,
+        to: at,
+        radius: radius + half[0].hypot(half[1]),
+    };
+    if let Some(slid) = slide_vertices(&refined.body, &slide) {
+        *refined = slid.after(refined);
     }
 }
 
@@ -227,7 +259,7 @@ impl CoarseBody {
         let grown = &built.growth.body;
         // The notes are dropped: those of the first pressed body say the same.
         let mut notes = Vec::new();
-        let place = Place::find(scene, grown, built.press_vertex, &mut notes)?;
+        let place = Place::find(scene, built, &mut notes)?;
         let (body, _) = split_near(scene, grown.clone(), &place, lumps);
         let h = scene.mesh.near_tool_of(&scene.tool);
         Ok(Self {
@@ -251,11 +283,7 @@ impl CoarseBody {
 
 /// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
 pub(super) fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
-    let (reach, radius) = match scene.tool {
-        Tool::Disc { radius } => ([0.0; 2], radius),
-        Tool::Node => ([0.0; 2], 0.0),
-        Tool::Contact(tool) => tool.shape.reach(scene.press.depth),
-    };
+    let (reach, radius) = reach(scene);
     let mut points = vec![at];
     if let Some(tool) = scene.tool.contact() {
         let axes = tool.axes(direction.into_inner().into()).map(Vec3::from);

@@ -11,7 +11,7 @@ use palpa_springs::{
 };
 use serde::Serialize;
 
-use super::place::mesh_size_near;
+use super::place::{mesh_size_near, note_overhang};
 use super::{Phase, Place, Waypoint, tidy, waypoints};
 use crate::build::BuiltBody;
 use crate::note::{LayerAspect, Note, xyz};
@@ -109,7 +109,8 @@ impl BarIndentation {
         check_reference(scene)?;
         let body = &built.growth.body;
         let mut notes = Vec::new();
-        let place = Place::find(scene, body, built.press_vertex, &mut notes)?;
+        let place = Place::find(scene, built, &mut notes)?;
+        note_overhang(scene, body, &place, &mut notes);
         let Place {
             vertex,
             at,

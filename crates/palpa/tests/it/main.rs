@@ -5,4 +5,5 @@
 
 mod live;
 mod notes;
+mod place;
 mod record;

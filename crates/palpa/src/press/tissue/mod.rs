@@ -238,12 +238,14 @@ impl Indentation {
         }
     }
 
-    /// Thickness of each layer along the pressed column, m. `[n_layers]`
+    /// Thickness of each layer along the column under the place, m. `[n_layers]`
     fn thicknesses(&self, state: &State) -> Vec<f64> {
         let body = &self.mesh().body;
         let at = |level: usize| {
-            let node = body.node(self.place().vertex, level);
-            body.positions[node] + state.displacements[node]
+            self.place().point.mean(|v| {
+                let node = body.node(v, level);
+                body.positions[node] + state.displacements[node]
+            })
         };
         let length = |levels: &[usize]| -> f64 {
             (levels[0]..levels[1])

@@ -29,8 +29,14 @@ pub(super) struct BarReport<'a> {
 
 #[derive(Debug, Serialize)]
 pub(super) struct BarFacts {
+    /// The skin vertex nearest to the place.
     pub(super) vertex: usize,
+    /// The place: the point of the skin nearest to `asked_m`, or the vertex of the scene.
     pub(super) at_m: [f64; 3],
+    /// The point that the scene names, and its distance from the place; `None` if the scene names a
+    /// vertex or nothing.
+    pub(super) asked_m: Option<[f64; 3]>,
+    pub(super) asked_distance_mm: Option<f64>,
     pub(super) direction: [f64; 3],
     pub(super) tool: String,
     pub(super) n_operated_nodes: usize,
@@ -57,6 +63,8 @@ pub(super) fn facts(scene: &Scene, indentation: &BarIndentation) -> BarFacts {
     BarFacts {
         vertex: indentation.place.vertex,
         at_m: indentation.place.at.into(),
+        asked_m: indentation.place.asked.map(Into::into),
+        asked_distance_mm: indentation.place.distance_asked().map(|d| d * 1e3),
         direction: indentation.place.direction.into_inner().into(),
         tool: scene.tool.to_string(),
         n_operated_nodes: indentation.model.operated().len(),

@@ -31,8 +31,14 @@ pub(super) struct PressReport<'a> {
 
 #[derive(Debug, Serialize)]
 pub(super) struct PressFacts {
+    /// The skin vertex nearest to the place.
     pub(super) vertex: usize,
+    /// The place: the point of the skin nearest to `asked_m`, or the vertex of the scene.
     pub(super) at_m: [f64; 3],
+    /// The point that the scene names, and its distance from the place; `None` if the scene names a
+    /// vertex or nothing.
+    pub(super) asked_m: Option<[f64; 3]>,
+    pub(super) asked_distance_mm: Option<f64>,
     pub(super) direction: [f64; 3],
     pub(super) tool: String,
     /// Number of skin vertices bonded to the tool; 0 for a tool that only touches.
@@ -58,6 +64,8 @@ pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
     PressFacts {
         vertex: place.vertex,
         at_m: place.at.into(),
+        asked_m: place.asked.map(Into::into),
+        asked_distance_mm: place.distance_asked().map(|d| d * 1e3),
         direction: place.direction.into_inner().into(),
         tool: scene.tool.to_string(),
         n_operated_nodes: indentation.n_bonded(),
