@@ -11,4 +11,5 @@ mod refine;
 mod repair;
 mod shapes;
 mod sound;
+mod thickness;
 mod write;
