@@ -3,14 +3,16 @@
 //! 1. Flat caps of a closed limb are found and removed. Their rims become cut faces.
 //! 2. Every skin vertex gets a *column*: a line inward that starts along the smoothed normal and
 //!    turns into the field of the rigid core (bones). Without bones it is straight.
-//! 3. Levels are placed on the columns by the thickness of the layers. If there is too little room,
-//!    all layers are thinned in proportion.
-//! 4. Every prism is checked. Near prisms that are turned over or flat, the columns are relaxed
-//!    and, if that is not enough, shortened; the core then stands off the bone there. If nothing
-//!    helps, growth returns an error with the place.
+//! 3. Levels are placed on the columns. The lower side of a layer lies at the asked depth, which is
+//!    the distance to the nearest point of the skin. If there is too little room, all layers are
+//!    thinned in proportion.
+//! 4. Every prism is checked. Near prisms that are turned over or flat, nodes are moved: inside a
+//!    layer freely, between two layers only at their depth. If that is not enough, columns are
+//!    shortened; the core then stands off the bone there. The interface between two layers gives way
+//!    last. If nothing helps, growth returns an error with the place.
 //!
-//! The [`GrowthReport`] says how much was thinned and shortened, and how far the core stands off
-//! the bones.
+//! The [`GrowthReport`] says how much was thinned and shortened, where a layer gave way, and how far
+//! the core stands off the bones.
 
 mod columns;
 mod core;
@@ -192,8 +194,8 @@ fn millimetres([x, y, z]: [f64; 3]) -> String {
 /// Grows `surface` inward, down to `bones` where a layer asks for it.
 ///
 /// `surface` must be oriented outward and edge-manifold. The cost is about
-/// `n_vertices × (steps of a column ≈ 30) × (sources of the core's field ≈ 1000)`: a second for
-/// 10,000 vertices.
+/// `n_vertices × (steps of a column ≈ 30) × (sources of the core's field ≈ 1000)`, and about ten
+/// distances to the skin for each column: a few seconds for 10,000 vertices.
 ///
 /// # Errors
 /// [`GrowthError`], with the place of the problem.
