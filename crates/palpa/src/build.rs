@@ -93,6 +93,15 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
             n_pairs: n_overlaps,
         });
     }
+    if let Some(worst) = &growth.report.worst_moved {
+        notes.push(Note::LayersMoved {
+            share: growth.report.moved_share,
+            layer: worst.layer.clone(),
+            asked: worst.asked,
+            thickness: worst.thickness,
+            at: worst.at,
+        });
+    }
     let press_vertex = vertex_at(&growth.body.skin, press_at, &scene.press.target)?;
     let on_body = &growth.body.skin;
     let press_at = match (&scene.press.target, press_at) {

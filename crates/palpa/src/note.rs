@@ -58,6 +58,20 @@ pub enum Note {
         /// Number of pairs of triangles.
         n_pairs: usize,
     },
+    /// Layers are thicker or thinner than asked although there is room for them, because the mesh
+    /// would not be valid otherwise.
+    LayersMoved {
+        /// Share of the skin's area below which a layer is more than 1 % off, 0 to 1.
+        share: f64,
+        /// Name of the layer that is furthest off, as a share of its thickness.
+        layer: String,
+        /// The thickness that it asks for, m.
+        asked: f64,
+        /// Its thickness at the worst place, m.
+        thickness: f64,
+        /// The skin above the worst place, m.
+        at: [f64; 3],
+    },
     /// The rim of a cut-out is near enough to influence the force.
     CutoutNear {
         /// Radius of the cut-out, m.
@@ -332,6 +346,22 @@ impl fmt::Display for Note {
                 f,
                 "the base of the body passes through itself ({n_pairs} pairs of triangles): look at section.png or the VTU \
                  before you trust forces near there"
+            ),
+            Self::LayersMoved {
+                share,
+                layer,
+                asked,
+                thickness,
+                at,
+            } => write!(
+                f,
+                "layers are more than 1 % thicker or thinner than asked under {:.2} % of the skin's area, to keep the mesh \
+                 valid; worst under the skin at ({}) mm: layer \"{layer}\" is {:.2} mm instead of {:.2} mm thick; smooth \
+                 or remesh the skin there, or use thinner layers",
+                100.0 * share,
+                Mm(*at),
+                mm(thickness),
+                mm(asked)
             ),
             Self::CutoutNear { radius, enough } => write!(
                 f,

@@ -66,6 +66,32 @@ export interface components {
         } | {
             /**
              * Format: double
+             * @description The thickness that it asks for, m.
+             */
+            asked: number;
+            /** @description The skin above the worst place, m. */
+            at: [
+                number,
+                number,
+                number
+            ];
+            /** @constant */
+            kind: "layers_moved";
+            /** @description Name of the layer that is furthest off, as a share of its thickness. */
+            layer: string;
+            /**
+             * Format: double
+             * @description Share of the skin's area below which a layer is more than 1 % off, 0 to 1.
+             */
+            share: number;
+            /**
+             * Format: double
+             * @description Its thickness at the worst place, m.
+             */
+            thickness: number;
+        } | {
+            /**
+             * Format: double
              * @description Radius from which the rim has no influence, m.
              */
             enough: number;

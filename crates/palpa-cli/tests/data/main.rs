@@ -11,6 +11,7 @@ mod bench;
 mod ccx;
 mod manifest;
 mod real;
+mod thickness;
 mod verify;
 
 use std::path::PathBuf;

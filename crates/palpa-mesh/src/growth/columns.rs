@@ -1,7 +1,8 @@
 //! The lines along which columns grow inward from the skin.
 
 use super::core::RigidCore;
-use crate::{CutFace, Surface, SurfaceIndex, Vec3};
+use super::depth::{Depth, Place};
+use crate::{CutFace, Surface, Vec3};
 
 /// Length over which a column turns from the skin's normal to the core's field, as a share of its
 /// room.
@@ -13,6 +14,12 @@ const END_SHARE: f64 = 2e-3;
 /// A column that is longer than this many times its room and has not met the core ends there.
 const MAX_DETOUR: f64 = 3.0;
 const MAX_STEPS: usize = 200;
+/// Least cosine of the angle between a direction inward and the normals of the triangles at its
+/// vertex.
+const MIN_COS: f64 = 0.3;
+/// Largest length of a straight column as a multiple of its depth: a little more than a direction
+/// that leans as far as it may needs.
+const MAX_LEAN: f64 = 1.05 / MIN_COS;
 /// Less room than this counts as none: the column then only has a direction. m
 const NO_ROOM: f64 = 1e-5;
 
@@ -143,7 +150,6 @@ pub(super) fn inward_directions(
 /// Finds directions that leave a triangle of their vertex on the outer side (or nearly so), and
 /// turns them towards the inside of that triangle.
 fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinement) {
-    const MIN_COS: f64 = 0.3;
     let mut faces: Vec<Vec<Vec3>> = vec![Vec::new(); directions.len()];
     for (t, triangle) in skin.triangles.iter().enumerate() {
         if let Some(n) = skin.area_vector(t).try_normalize(0.0) {
@@ -172,29 +178,36 @@ fn keep_in_sight(skin: &Surface, directions: &mut [Vec3], confinement: &Confinem
     }
 }
 
-/// Straight columns along `directions`, of length `depth`, but at most about half (0.45) of the
-/// distance between the skin and its far side.
+/// Straight columns along `directions`, down to the depth `asked`, but at most about half (0.45) of
+/// the distance between the skin and its far side.
 pub(super) fn straight_columns(
     skin: &Surface,
     directions: &[Vec3],
-    depth: impl Fn(usize) -> f64,
+    asked: impl Fn(usize) -> f64,
+    depth: &Depth,
 ) -> Vec<Column> {
     const SHARE_OF_THICKNESS: f64 = 0.45;
-    let index = SurfaceIndex::build(skin);
     let mut across: Vec<f64> = (0..skin.points.len())
         .map(|v| {
-            index
-                .ray(skin.points[v], directions[v], 1e-6 * depth(v))
+            depth
+                .index()
+                .ray(skin.points[v], directions[v], 1e-6 * asked(v))
                 .map_or(f64::INFINITY, |(s, _)| s)
         })
         .collect();
     limit_slope(skin, &mut across);
     (0..skin.points.len())
         .map(|v| {
-            let mut column = Column::starting_at(skin.points[v]);
-            let length = depth(v).min(SHARE_OF_THICKNESS * across[v]);
-            column.push(skin.points[v] + directions[v] * length);
-            column
+            let to = |length: f64| {
+                let mut column = Column::starting_at(skin.points[v]);
+                column.push(skin.points[v] + directions[v] * length);
+                column
+            };
+            let asked = asked(v);
+            let longest = (MAX_LEAN * asked).min(SHARE_OF_THICKNESS * across[v]);
+            match depth.reach(&to(longest), Place::SKIN, asked, longest) {
+                Ok(place) | Err(place) => to(place.arc),
+            }
         })
         .collect()
 }

@@ -144,6 +144,18 @@ impl RigidCore {
             .map_or(x, |c| c.point)
     }
 
+    /// `x`, moved to the given distance from the nearest bone, along the shortest way.
+    pub(super) fn at_bone_distance(&self, x: Vec3, distance: f64) -> Vec3 {
+        let closest = self.bones.iter().filter_map(|b| b.closest(x));
+        let Some(nearest) = closest.min_by(|a, b| a.signed_distance.total_cmp(&b.signed_distance))
+        else {
+            return x;
+        };
+        let outward = (x - nearest.point) * nearest.signed_distance.signum();
+        let away = outward.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+        nearest.point + away * distance
+    }
+
     /// The unit direction of steepest ascent of the potential; zero where there is none.
     pub(super) fn direction(&self, x: Vec3) -> Vec3 {
         let mut sum = Vec3::zeros();

@@ -3,10 +3,14 @@
 use serde::Serialize;
 
 use super::core::RigidCore;
+use super::depth::Depth;
 use super::untangle::Placement;
 use super::{Growth, LayerSpec};
 use crate::check::self_intersections;
-use crate::{LayeredBody, Surface, Vec3};
+use crate::{LayeredBody, Surface};
+
+/// A layer whose thickness is off by no more than this share of it is as thick as asked.
+const KEPT: f64 = 0.01;
 
 /// The place where a figure is worst.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,6 +55,21 @@ impl Spread {
     }
 }
 
+/// A layer that growth could not keep as thick as asked, although there is room for it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Moved {
+    /// Name of the layer.
+    pub layer: String,
+    /// The thickness that the layer asks for there. m
+    pub asked: f64,
+    /// Its thickness there. m
+    pub thickness: f64,
+    /// Skin vertex above the place.
+    pub vertex: u32,
+    /// Position of that vertex. m
+    pub at: [f64; 3],
+}
+
 /// The actual thickness of a layer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LayerReport {
@@ -58,7 +77,8 @@ pub struct LayerReport {
     pub name: String,
     /// Number of prisms through its thickness.
     pub n_levels: usize,
-    /// Thickness along the columns, over all skin vertices. m
+    /// Thickness over all skin vertices: the difference between the distances of the layer's two
+    /// sides from the skin. m
     pub thickness: Spread,
 }
 
@@ -87,6 +107,12 @@ pub struct GrowthReport {
     pub thinned_share: f64,
     /// The strongest thinning (smallest factor of the thickness), if any.
     pub worst_thinning: Option<Worst>,
+    /// Share of the skin's area below which a layer is more than 1 % thicker or thinner than asked
+    /// although there is room for it. There, the interface between two layers gave way to keep
+    /// prisms valid.
+    pub moved_share: f64,
+    /// The layer and place that are furthest off, as a share of the thickness, if any.
+    pub worst_moved: Option<Moved>,
     /// Share of the skin's area below which columns were shortened to keep prisms valid.
     pub shortened_share: f64,
     /// Number of pairs of base triangles that pass through each other. Even if all prisms are
@@ -105,11 +131,13 @@ pub(super) fn finish(
     layers: &[LayerSpec],
     placement: Placement,
     core: Option<&RigidCore>,
+    depth: &Depth,
     n_caps: usize,
 ) -> Growth {
     let Placement {
         thinning,
-        used_share,
+        has_room,
+        used,
         shapes,
     } = placement;
     let n_intervals = body.n_levels - 1;
@@ -150,6 +178,12 @@ pub(super) fn finish(
             .fold(0.0, |sum, area| sum + area)
             / total
     };
+    let depths = interface_depths(&body, layers, depth);
+    let moved = moved_layers(&body, layers, &has_room, &depths);
+    let worst_moved = moved.iter().flatten().max_by(|a, b| {
+        let off = |m: &Moved| (m.thickness / m.asked - 1.0).abs();
+        off(a).total_cmp(&off(b))
+    });
     let report = GrowthReport {
         n_vertices: body.n_vertices(),
         n_levels: body.n_levels,
@@ -165,10 +199,12 @@ pub(super) fn finish(
             max: 0.0,
         }),
         worst_prism,
-        layers: layer_reports(&body, layers),
+        layers: layer_reports(&body, layers, &depths),
         thinned_share: share(&|v| thinning[v] < 1.0 - 1e-9),
         worst_thinning: extreme(&thinning, -1.0).filter(|w| w.value < 1.0 - 1e-9),
-        shortened_share: share(&|v| used_share[v] < 1.0 - 1e-9),
+        moved_share: share(&|v| moved[v].is_some()),
+        worst_moved: worst_moved.cloned(),
+        shortened_share: share(&|v| used[v].share < 1.0 - 1e-9),
         n_base_overlaps: self_intersections(&base).pairs.len(),
         stand_off: Spread::of(&stand_off),
         worst_stand_off: extreme(&stand_off, 1.0),
@@ -179,6 +215,64 @@ pub(super) fn finish(
         thinning,
         stand_off,
     }
+}
+
+/// Distance of the lower side of each layer from the skin. m, `[n_vertices × n_layers]`
+fn interface_depths(body: &LayeredBody, layers: &[LayerSpec], depth: &Depth) -> Vec<f64> {
+    let mut depths = Vec::with_capacity(body.n_vertices() * layers.len());
+    for v in 0..body.n_vertices() {
+        let mut level = 0;
+        for layer in layers {
+            level += layer.n_levels;
+            depths.push(depth.at(body.positions[body.node(v, level)]));
+        }
+    }
+    depths
+}
+
+/// The thicknesses of a column's layers, from the depths of their lower sides. m
+fn thicknesses(depths: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    let above = std::iter::once(0.0).chain(depths.iter().copied());
+    depths.iter().zip(above).map(|(below, above)| below - above)
+}
+
+/// For each column with room for its layers, the layer that is furthest off the asked thickness, if
+/// by more than [`KEPT`]. `[n_vertices]`
+fn moved_layers(
+    body: &LayeredBody,
+    layers: &[LayerSpec],
+    has_room: &[bool],
+    depths: &[f64],
+) -> Vec<Option<Moved>> {
+    let of_column = |(v, column): (usize, &[f64])| {
+        if !has_room[v] {
+            return None;
+        }
+        let at = body.skin.points[v];
+        let mut worst: Option<(f64, Moved)> = None;
+        for (layer, thickness) in layers.iter().zip(thicknesses(column)) {
+            let Some(asked) = layer.thickness.as_ref().map(|t| t.at(at)) else {
+                continue;
+            };
+            let off = (thickness / asked - 1.0).abs();
+            if off > worst.as_ref().map_or(KEPT, |w| w.0) {
+                let moved = Moved {
+                    layer: layer.name.clone(),
+                    asked,
+                    thickness,
+                    vertex: v as u32,
+                    at: at.into(),
+                };
+                worst = Some((off, moved));
+            }
+        }
+        worst.map(|(_, moved)| moved)
+    };
+    depths
+        .chunks(layers.len())
+        .enumerate()
+        .map(of_column)
+        .collect()
 }
 
 /// A third of the area of the triangles around each vertex. m²
@@ -193,24 +287,21 @@ fn vertex_areas(body: &LayeredBody) -> Vec<f64> {
     areas
 }
 
-fn layer_reports(body: &LayeredBody, layers: &[LayerSpec]) -> Vec<LayerReport> {
+fn layer_reports(body: &LayeredBody, layers: &[LayerSpec], depths: &[f64]) -> Vec<LayerReport> {
+    let mut all = vec![Vec::with_capacity(body.n_vertices()); layers.len()];
+    for column in depths.chunks(layers.len()) {
+        for (of_layer, thickness) in all.iter_mut().zip(thicknesses(column)) {
+            of_layer.push(thickness);
+        }
+    }
     layers
         .iter()
-        .enumerate()
-        .filter_map(|(id, layer)| {
-            let intervals: Vec<usize> = (0..body.n_levels - 1)
-                .filter(|&i| body.interval_layer[i] == id)
-                .collect();
-            let segment = |v: usize, i: usize| -> Vec3 {
-                body.positions[body.node(v, i + 1)] - body.positions[body.node(v, i)]
-            };
-            let thickness: Vec<f64> = (0..body.n_vertices())
-                .map(|v| intervals.iter().map(|&i| segment(v, i).norm()).sum())
-                .collect();
+        .zip(&all)
+        .filter_map(|(layer, thickness)| {
             Some(LayerReport {
                 name: layer.name.clone(),
                 n_levels: layer.n_levels,
-                thickness: Spread::of(&thickness)?,
+                thickness: Spread::of(thickness)?,
             })
         })
         .collect()

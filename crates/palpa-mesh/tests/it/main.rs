@@ -12,4 +12,5 @@ mod repair;
 mod shapes;
 mod slide;
 mod sound;
+mod thickness;
 mod write;
