@@ -76,7 +76,8 @@ pub struct Growth {
     pub body: LayeredBody,
     /// Figures about the body, for people and programs.
     pub report: GrowthReport,
-    /// Factor by which the layers of each column were thinned (1: not at all). `[n_vertices]`
+    /// Factor of the layer that was thinned most on each column, for want of room or to keep prisms
+    /// valid (1: not at all). `[n_vertices]`
     pub thinning: Vec<f64>,
     /// Distance from the end of each column to the nearest bone, in metres, negative inside it.
     /// Empty if there are no bones. `[n_vertices]`
@@ -374,7 +375,7 @@ fn place_on_column(
         None => nominal.clone(),
         Some(room) => thinned(&nominal, &floors, room),
     };
-    places.has_room = thickness == nominal;
+    places.has_room = (thickness.iter().zip(&nominal)).all(|(d, n)| *d >= n * (1.0 - 1e-9));
     let end = line.length() * used.share;
     if used.share < 1.0
         && let Some(room) = room(&thickness, end)

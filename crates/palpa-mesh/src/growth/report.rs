@@ -103,9 +103,10 @@ pub struct GrowthReport {
     pub worst_prism: Worst,
     /// Thickness of each layer.
     pub layers: Vec<LayerReport>,
-    /// Share of the skin's area below which the layers were thinned.
+    /// Share of the skin's area below which the layers were thinned because there is too little
+    /// room for them.
     pub thinned_share: f64,
-    /// The strongest thinning (smallest factor of the thickness), if any.
+    /// The strongest thinning of that kind (smallest factor of the thickness), if any.
     pub worst_thinning: Option<Worst>,
     /// Share of the skin's area below which a layer is more than 1 % thicker or thinner than asked
     /// although there is room for it. There, the interface between two layers gave way to keep
@@ -164,11 +165,9 @@ pub(super) fn finish(
     let stand_off: Vec<f64> = core.map_or_else(Vec::new, |core| {
         base.points.iter().map(|p| core.bone_distance(*p)).collect()
     });
-    let extreme = |values: &[f64], sign: f64| {
-        (0..values.len())
-            .max_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b])))
-            .map(|v| worst_at(v, values[v]))
-    };
+    let worst_stand_off = (0..stand_off.len())
+        .max_by(|&a, &b| stand_off[a].total_cmp(&stand_off[b]))
+        .map(|v| worst_at(v, stand_off[v]));
     let vertex_areas = vertex_areas(&body);
     let total: f64 = vertex_areas.iter().sum();
     let share = |is_in: &dyn Fn(usize) -> bool| {
@@ -200,14 +199,17 @@ pub(super) fn finish(
         }),
         worst_prism,
         layers: layer_reports(&body, layers, &depths),
-        thinned_share: share(&|v| thinning[v] < 1.0 - 1e-9),
-        worst_thinning: extreme(&thinning, -1.0).filter(|w| w.value < 1.0 - 1e-9),
+        thinned_share: share(&|v| !has_room[v]),
+        worst_thinning: (0..body.n_vertices())
+            .filter(|&v| !has_room[v])
+            .min_by(|&a, &b| thinning[a].total_cmp(&thinning[b]))
+            .map(|v| worst_at(v, thinning[v])),
         moved_share: share(&|v| moved[v].is_some()),
         worst_moved: worst_moved.cloned(),
         shortened_share: share(&|v| used[v].share < 1.0 - 1e-9),
         n_base_overlaps: self_intersections(&base).pairs.len(),
         stand_off: Spread::of(&stand_off),
-        worst_stand_off: extreme(&stand_off, 1.0),
+        worst_stand_off,
     };
     Growth {
         body,

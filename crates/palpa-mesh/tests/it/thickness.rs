@@ -98,7 +98,7 @@ fn assert_kept(name: &str, growth: &Growth, layers: &[LayerSpec], smooth: impl F
         "{name}: {}",
         worst(&from_smooth)
     );
-    assert_eq!(growth.report.moved_share, 0.0, "{name}");
+    assert!(growth.report.moved_share <= 0.0, "{name}");
     assert_eq!(growth.report.worst_moved, None, "{name}");
     for (report, layer) in growth.report.layers.iter().zip(layers) {
         let Some(Thickness::Constant(asked)) = layer.thickness else {
@@ -123,7 +123,7 @@ fn a_cylinder_keeps_its_layers_at_every_spacing() {
             let growth = grown(&skin, std::slice::from_ref(&bone), &layers);
             let name = format!("cylinder at {mm} mm, {n_levels} levels");
             assert_kept(&name, &growth, &layers, |x| radius - x.yz().norm());
-            assert_eq!(growth.report.thinned_share, 0.0, "{name}");
+            assert!(growth.report.thinned_share <= 0.0, "{name}");
             // The base slides along the bone and does not leave it.
             assert!(growth.report.stand_off.unwrap().max < 1e-4, "{name}");
         }
