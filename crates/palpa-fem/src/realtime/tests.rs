@@ -47,6 +47,12 @@ fn body() -> LayeredBody {
     )
 }
 
+/// A body with an odd number of triangles, one of which has no partner.
+fn odd_body() -> LayeredBody {
+    let whole = body();
+    palpa_mesh::Part::new(&whole, |t| t != 20).body
+}
+
 fn materials(laws: &[Law; 3], is_viscous: bool) -> Materials {
     Materials::of_layers(
         laws.iter()
@@ -148,9 +154,8 @@ fn forces_and_stiffness_are_the_elements_with_their_past() {
 }
 
 fn forces_and_stiffness_are_the_elements(strain: Strain) {
-    let body = body();
     for (name, materials) in cases() {
-        for is_fixed in [true, false] {
+        for (is_fixed, body) in [(true, body()), (false, body()), (true, odd_body())] {
             let supports = if is_fixed {
                 Supports::on_base(&body)
             } else {

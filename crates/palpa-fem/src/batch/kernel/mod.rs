@@ -42,7 +42,7 @@ use super::principal::{PLACES, Six, respond};
 use crate::law::Hardening;
 use algebra::{cauchy_green, cofactor, inv_cbrt};
 use deformation::Wedges;
-use unit::{Sums, VolumeChange};
+use unit::{NO_VOLUME, Sums, VolumeChange};
 
 pub(super) use algebra::{M3, V3, axpy, dot, mul, scale};
 
@@ -223,10 +223,11 @@ impl<R: Lanes> LaneGroup<'_, R> {
             dot(&f[1][0], &cofactor(&f[1])[0]),
         ];
         let sum = v[0] + v[1];
-        // The second wedge of a single prism has no volume, and no say.
-        let jb = v[0]
-            .mul_add(j[0], v[1] * j[1])
-            .divided_by(sum.max(self.splat(1e-300)));
+        // The second wedge of a single prism has no volume; it is taken as undeformed.
+        let none = self.splat(NO_VOLUME);
+        let whole = sum.select_less(none, one, sum);
+        let jb = v[0].mul_add(j[0], v[1] * j[1]).divided_by(whole);
+        let jb = sum.select_less(none, one, jb);
         let y = inv_cbrt(self.token, jb.max(self.splat(1e-3)));
         for q in 0..2 {
             let excess = jb.divided_by(j[q]) - one;

@@ -10,6 +10,9 @@ use super::algebra::{M3, V3, axpy, cauchy_green, cofactor, dot, inv_cbrt, mul, s
 use super::deformation::Unit;
 use super::{Hardening, LaneGroup, Lanes, N_BLOCKS, N_NODES, Row};
 
+/// A unit with less volume than this has none, m³.
+pub(super) const NO_VOLUME: f64 = 1e-30;
+
 /// Sums over the units of a pair.
 pub(super) struct Sums<R> {
     /// `∂W/∂u`, N.
@@ -120,9 +123,12 @@ impl<R: Lanes> LaneGroup<'_, R> {
         ];
         *least = least.min(j[0]).min(j[1]);
         let inv_j = [one.divided_by(j[0]), one.divided_by(j[1])];
-        let inv_total = one.divided_by(unit.volumes[0] + unit.volumes[1]);
+        // The second wedge of a single prism has no volume; it is taken as undeformed.
+        let total = unit.volumes[0] + unit.volumes[1];
+        let none = self.splat(NO_VOLUME);
+        let inv_total = one.divided_by(total.select_less(none, one, total));
         let v = [unit.volumes[0] * inv_total, unit.volumes[1] * inv_total];
-        let jb = v[0].mul_add(j[0], v[1] * j[1]);
+        let jb = total.select_less(none, one, v[0].mul_add(j[0], v[1] * j[1]));
         *least = least.min(jb);
         let inv_jb = one.divided_by(jb);
         let y = inv_cbrt(self.token, jb);
