@@ -197,6 +197,8 @@ pub(crate) struct LinearSystem {
     pub(crate) is_factored: bool,
     /// Shift of the factor, relative to the diagonal.
     pub(crate) shift: f64,
+    /// Shift of the factor outside the region.
+    outer_shift: f64,
 }
 
 /// A factor in one of two precisions.
@@ -218,6 +220,7 @@ impl LinearSystem {
             holds: vec![Hold::free(); n_nodes],
             is_factored: false,
             shift: 0.0,
+            outer_shift: 0.0,
         }
     }
 
@@ -245,21 +248,37 @@ impl LinearSystem {
         self.holds.copy_from_slice(holds);
         self.is_factored = false;
         self.shift = 0.0;
-        if self.factor_all(structure, 0.0).is_err() {
-            let mut unshifted = None;
-            if let Factors::Single(_) = self.factors {
-                let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
-                let numbers = Numbers::new(structure, tree, self.region.is_some());
-                self.factors = Factors::Double(numbers);
-                unshifted = Some(0.0);
-            }
-            let shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
-            self.shift = (unshifted.into_iter().chain(shifts))
-                .find(|&shift| self.factor_all(structure, shift).is_ok())
-                .ok_or(Singular)?;
+        if self.factor_exterior(structure, 0.0).is_ok() && self.factor_zone(structure, 0.0).is_ok()
+        {
+            self.is_factored = true;
+            return Ok(0.0);
         }
+        // If a small shift is enough, single precision may be too little; else the matrix is not
+        // positive definite.
+        let is_indefinite = self.factor_shifted(structure, FIRST_SHIFT).is_err();
+        if !is_indefinite && let Factors::Single(_) = self.factors {
+            let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
+            let numbers = Numbers::new(structure, tree, self.region.is_some());
+            self.factors = Factors::Double(numbers);
+            if self.factor_shifted(structure, 0.0).is_ok() {
+                self.is_factored = true;
+                return Ok(0.0);
+            }
+        }
+        let mut shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
+        self.shift = shifts
+            .find(|&shift| self.factor_shifted(structure, shift).is_ok())
+            .ok_or(Singular)?;
         self.is_factored = true;
         Ok(self.shift)
+    }
+
+    /// Factors the whole matrix, shifted only where it must be: in the region if that is enough.
+    fn factor_shifted(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
+        if self.factor_exterior(structure, 0.0).is_err() {
+            self.factor_exterior(structure, shift)?;
+        }
+        self.factor_zone(structure, shift)
     }
 
     /// Factors the region's blocks only, under constraints. Returns false if that is not enough:
@@ -283,22 +302,28 @@ impl LinearSystem {
             return false;
         }
         self.holds.copy_from_slice(holds);
-        let view = View {
-            structure,
-            region: self.region.as_ref(),
-            blocks: &self.blocks,
-            outer_share: &self.outer_share,
-            holds: &self.holds,
-            shift: 0.0,
-        };
-        self.is_factored = match &mut self.factors {
-            Factors::Single(numbers) => numbers.factor_zone(&view).is_ok(),
-            Factors::Double(numbers) => numbers.factor_zone(&view).is_ok(),
-        };
+        self.is_factored = self.factor_zone(structure, 0.0).is_ok();
         self.is_factored
     }
 
-    fn factor_all(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
+    fn factor_exterior(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
+        self.outer_shift = shift;
+        let (factors, view) = self.view(structure, shift);
+        match factors {
+            Factors::Single(numbers) => numbers.factor_exterior(&view),
+            Factors::Double(numbers) => numbers.factor_exterior(&view),
+        }
+    }
+
+    fn factor_zone(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
+        let (factors, view) = self.view(structure, shift);
+        match factors {
+            Factors::Single(numbers) => numbers.factor_zone(&view),
+            Factors::Double(numbers) => numbers.factor_zone(&view),
+        }
+    }
+
+    fn view<'a>(&'a mut self, structure: &'a Structure, shift: f64) -> (&'a mut Factors, View<'a>) {
         let view = View {
             structure,
             region: self.region.as_ref(),
@@ -306,17 +331,9 @@ impl LinearSystem {
             outer_share: &self.outer_share,
             holds: &self.holds,
             shift,
+            outer_shift: self.outer_shift,
         };
-        match &mut self.factors {
-            Factors::Single(numbers) => {
-                numbers.factor_exterior(&view)?;
-                numbers.factor_zone(&view)
-            }
-            Factors::Double(numbers) => {
-                numbers.factor_exterior(&view)?;
-                numbers.factor_zone(&view)
-            }
-        }
+        (&mut self.factors, view)
     }
 
     /// Solves with the factor: `solution = K⁻¹ right_side`, node-major. A held direction is an
@@ -343,8 +360,9 @@ struct View<'a> {
     blocks: &'a [Mat3],
     outer_share: &'a [Mat3],
     holds: &'a [Hold],
-    /// Shift of the diagonal, relative to it.
+    /// Shift of the diagonal, relative to it, and of that of the part outside the region.
     shift: f64,
+    outer_shift: f64,
 }
 
 impl View<'_> {
@@ -361,6 +379,11 @@ impl View<'_> {
         column: usize,
         is_whole: bool,
     ) -> Block<T> {
+        let shift = if is_whole {
+            self.shift
+        } else {
+            self.outer_shift
+        };
         let (row_hold, column_hold) = (&self.holds[row], &self.holds[column]);
         let is_diagonal = row == column;
         // Any positive number works for a held direction; one of the size of the matrix keeps
@@ -382,7 +405,7 @@ impl View<'_> {
         }
         if is_diagonal {
             for r in 0..3 {
-                block[(r, r)] += self.shift * block[(r, r)].abs();
+                block[(r, r)] += shift * block[(r, r)].abs();
             }
         }
         std::array::from_fn(|i| T::nearest(block.as_slice()[i]))

@@ -48,6 +48,7 @@
 //! }
 //! ```
 
+pub mod accuracy;
 pub mod build;
 pub mod continuum;
 mod error;

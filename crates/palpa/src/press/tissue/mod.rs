@@ -8,7 +8,10 @@ mod sample;
 
 use std::sync::Arc;
 
-use palpa_fem::{Dynamics, Model, PosedTool, SolveParams, State, Workspace};
+use palpa_fem::{
+    Dynamics, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, equilibrate,
+};
+use palpa_mesh::Vec3;
 
 use self::notes::note_friction;
 pub(crate) use self::notes::{note_mesh, note_tension};
@@ -166,11 +169,78 @@ impl Indentation {
 
     /// Memory for the solver, prepared for touch under the tool.
     fn workspace(&self) -> Workspace {
-        let scene = &self.prepared.scene;
+        let (points, radius) = self.region();
+        Workspace::round(&self.model, &points, radius)
+    }
+
+    /// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
+    pub(crate) fn footprint(&self) -> (Vec<Vec3>, f64) {
         let place = self.place();
-        let (points, radius) = footprint(scene, place.at, &place.direction);
-        let margin = REGION_MARGIN + scene.press.depth;
-        Workspace::round(&self.model, &points, radius + margin)
+        footprint(&self.prepared.scene, place.at, &place.direction)
+    }
+
+    /// Points of the skin, and the radius around them within which contact and stiffness change
+    /// most, m.
+    pub(crate) fn region(&self) -> (Vec<Vec3>, f64) {
+        let (points, radius) = self.footprint();
+        (
+            points,
+            radius + REGION_MARGIN + self.prepared.scene.press.depth,
+        )
+    }
+
+    /// Memory for [`Self::elastic`].
+    pub(crate) fn elastic_workspace(&self) -> Workspace {
+        self.workspace()
+    }
+
+    /// The force (N) and the displacements at a depth (m), without relaxation, inertia or a history
+    /// of friction; `None` if no equilibrium is found. `guess` are displacements near them.
+    pub(crate) fn elastic(
+        &self,
+        ws: &mut Workspace,
+        depth: f64,
+        guess: &[Vec3],
+    ) -> Option<(f64, Vec<Vec3>)> {
+        let acting = self.acting(depth);
+        let mut state = State::new(&self.model);
+        state.displacements = guess.to_vec();
+        let load = acting.load(0.0, None);
+        let report = equilibrate(&self.model, &mut state, ws, &load, &self.params);
+        let bonded: Vec<usize> = acting.held.iter().map(|held| held.0).collect();
+        (report.outcome == Outcome::Converged).then(|| {
+            let force = self.force_of(&report, &bonded, ws);
+            (force, state.displacements)
+        })
+    }
+
+    /// The force on the tool against its direction, N. `bonded` are the nodes bonded to it.
+    pub(crate) fn force_of(&self, report: &StepReport, bonded: &[usize], ws: &Workspace) -> f64 {
+        let pull: Vec3 = if self.is_bonded() {
+            bonded.iter().map(|&node| -ws.reactions()[node]).sum()
+        } else {
+            report.tool_forces.iter().sum()
+        };
+        -pull.dot(&self.place().direction)
+    }
+
+    /// The skin vertices that are bonded to the tool.
+    pub(crate) fn bonded_vertices(&self) -> Vec<usize> {
+        let n_levels = self.mesh().body.n_levels;
+        match &self.grip {
+            Grip::Bond { nodes, .. } => nodes.iter().map(|node| node / n_levels).collect(),
+            Grip::Contact(_) => Vec::new(),
+        }
+    }
+
+    /// Displacements of the body at rest, m. `[n_nodes]`
+    pub(crate) fn rest_displacements(&self) -> &[Vec3] {
+        &self.rest.displacements
+    }
+
+    /// Tolerances of a step.
+    pub(crate) fn solve_params(&self) -> SolveParams {
+        self.params
     }
 
     /// The rigid tool with its pose at a depth (m); `None` if the skin is bonded to it.

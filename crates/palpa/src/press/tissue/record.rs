@@ -4,6 +4,8 @@ use palpa_fem::{PrismField, level_forces, prism_fields};
 use palpa_mesh::quality::prism_shapes;
 use palpa_mesh::{LayeredBody, Vec3};
 
+use crate::press::Phase;
+
 use super::{Failure, Indentation, Run, Sample, SampleOutcome};
 
 /// The samples of a press so far. Its methods give the figures of all samples together and the
@@ -34,6 +36,8 @@ pub struct Record<'a> {
     pub failures: Vec<Failure>,
     /// The body at the deepest sample of the first run.
     pub deepest: Deepest,
+    /// Displacements of the nodes at the samples of the first press down, m.
+    down: Vec<(usize, Vec<Vec3>)>,
 }
 
 /// The body at its deepest sample.
@@ -70,6 +74,7 @@ impl<'a> Record<'a> {
             indentation,
             samples: Vec::new(),
             failures: Vec::new(),
+            down: Vec::new(),
             deepest: Deepest {
                 sample: 0,
                 depth_mm: 0.0,
@@ -89,7 +94,23 @@ impl<'a> Record<'a> {
         } else if run.index == 0 && sample.depth_mm > self.deepest.depth_mm {
             self.deepest = Deepest::new(run, self.samples.len(), sample.depth_mm);
         }
+        let is_down = sample.run == 0 && sample.cycle == 0 && sample.phase == Phase::Load;
+        if is_down && sample.outcome.is_converged() {
+            let displacements = run.state.displacements.clone();
+            self.down.push((self.samples.len(), displacements));
+        }
         self.samples.push(sample);
+    }
+
+    /// The press.
+    pub(crate) fn indentation(&self) -> &'a Indentation {
+        self.indentation
+    }
+
+    /// Displacements of the nodes at a sample of the first press down, m. `[n_nodes]`
+    pub(crate) fn displacements(&self, sample: usize) -> Option<&[Vec3]> {
+        let of = self.down.iter().find(|(index, _)| *index == sample);
+        of.map(|(_, displacements)| &displacements[..])
     }
 
     /// Converged, or how the first step that failed ended.

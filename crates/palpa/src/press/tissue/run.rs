@@ -81,7 +81,7 @@ impl Earlier {
 }
 
 impl Acting {
-    fn load(&self, duration: f64, dynamics: Option<Dynamics>) -> Load<'_> {
+    pub(super) fn load(&self, duration: f64, dynamics: Option<Dynamics>) -> Load<'_> {
         Load {
             tools: &self.tools,
             held: &self.held,

@@ -1,0 +1,179 @@
+//! Error bars: how far the force of a press may be from that of an infinitely fine mesh.
+//!
+//! A *probe* is the same press on a mesh that is finer in one respect: triangles near the tool,
+//! triangles around it, intervals between levels near the skin, or deep ones, each divided in two.
+//! The change of the force is that respect's contribution. Probes cover the part of the body near
+//! the tool; its border moves as in the press. They start from the press's own displacements, which
+//! a finer mesh of the same body can take over.
+//!
+//! The bar is the sum of the *sizes* of the contributions times [`SAFETY`], so that errors of
+//! opposite sign do not hide each other.
+//!
+//! Probes are elastic: tissue that relaxes is probed at its instantaneous stiffness, and the relative
+//! error is taken over. Errors of the scene (its surface, thicknesses, stiffnesses) are not in the
+//! bar.
+
+mod probe;
+
+use serde::Serialize;
+
+use crate::press::Phase;
+use crate::press::tissue::{Record, Sample};
+
+/// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
+/// first order and three quarters of one of second order; the rest of the factor covers what probes
+/// do not see. Chosen so that nine in ten of the cases in `docs/accuracy.md` lie within the bar.
+pub const SAFETY: f64 = 2.0;
+/// Depths that are probed, as shares of the deepest.
+const DEPTHS: [f64; 3] = [1.0, 0.5, 0.25];
+
+/// What a probe makes finer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// Edges of the skin's triangles near the tool.
+    SkinNear,
+    /// Edges of the skin's triangles around that.
+    SkinFar,
+    /// Heights of the intervals between levels near the skin.
+    LevelsNear,
+    /// Heights of the deeper intervals.
+    LevelsDeep,
+}
+
+impl Source {
+    /// All sources, in the order of every list of contributions.
+    pub const ALL: [Self; 4] = [
+        Self::SkinNear,
+        Self::SkinFar,
+        Self::LevelsNear,
+        Self::LevelsDeep,
+    ];
+}
+
+/// Contributions to the error at one depth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Probed {
+    /// Depth of the tool, mm.
+    pub depth_mm: f64,
+    /// Force on the press's own mesh, of the elastic problem that the probes solve, N.
+    pub force_n: f64,
+    /// Relative change of the force by each probe, in the order of [`Source::ALL`]; `None` if its
+    /// probe found no equilibrium.
+    pub changes: [Option<f64>; 4],
+}
+
+impl Probed {
+    /// Half the width of the bar relative to the force; `None` if a probe failed.
+    pub fn half_width(&self) -> Option<f64> {
+        let sizes: Option<Vec<f64>> = self.changes.iter().map(|c| c.map(f64::abs)).collect();
+        sizes.map(|sizes| SAFETY * sizes.iter().sum::<f64>())
+    }
+}
+
+/// The error bar of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorBar {
+    /// Half the width of the bar, N.
+    pub half_width_n: f64,
+    /// Signed contributions, N, in the order of [`Source::ALL`].
+    pub contributions_n: [f64; 4],
+}
+
+/// The error bars of a press.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorBars {
+    /// Contributions at the depths that were probed, the deepest first.
+    pub probed: Vec<Probed>,
+    /// Number of nodes of the largest probe.
+    pub n_nodes: usize,
+}
+
+impl ErrorBars {
+    /// Probes the first press down of a record. `progress` is called before each probe with its
+    /// number and the number of all; if it returns false, the probes are given up.
+    ///
+    /// # Errors
+    /// When the tool or a probe's mesh cannot be made.
+    pub fn estimate(
+        record: &Record<'_>,
+        mut progress: impl FnMut(usize, usize) -> bool,
+    ) -> anyhow::Result<Option<Self>> {
+        let Some(samples) = probed_samples(record) else {
+            return Ok(None);
+        };
+        probe::run(record, &samples, &mut progress)
+    }
+
+    /// The bar of a sample. `loading` are the samples of the first press down. Where no depth was
+    /// probed, relative contributions are interpolated; above the least depth they are those at it.
+    pub fn of(&self, sample: &Sample, loading: &[&Sample]) -> Option<ErrorBar> {
+        let force = force_at(loading, sample.depth_mm)?;
+        let changes = self.changes_at(sample.depth_mm)?;
+        let contributions_n = changes.map(|change| change * force);
+        Some(ErrorBar {
+            half_width_n: SAFETY * contributions_n.iter().map(|c| c.abs()).sum::<f64>(),
+            contributions_n,
+        })
+    }
+
+    fn changes_at(&self, depth_mm: f64) -> Option<[f64; 4]> {
+        let known = |probed: &Probed| -> Option<(f64, [f64; 4])> {
+            let mut changes = [0.0; 4];
+            for (into, change) in changes.iter_mut().zip(probed.changes) {
+                *into = change?;
+            }
+            Some((probed.depth_mm, changes))
+        };
+        // Ascending by depth.
+        let all: Vec<(f64, [f64; 4])> = self.probed.iter().rev().filter_map(known).collect();
+        let after = all.partition_point(|(depth, _)| *depth < depth_mm);
+        let (before, next) = (
+            after.checked_sub(1).map(|i| all[i]),
+            all.get(after).copied(),
+        );
+        Some(match (before, next) {
+            (Some((a, from)), Some((b, to))) => {
+                let share = (depth_mm - a) / (b - a);
+                std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
+            }
+            (Some((_, changes)), None) | (None, Some((_, changes))) => changes,
+            (None, None) => return None,
+        })
+    }
+}
+
+/// The converged samples of the first press down that are probed, the deepest first.
+fn probed_samples(record: &Record<'_>) -> Option<Vec<usize>> {
+    let loading = loading(&record.samples);
+    let deepest = loading.last()?.depth_mm;
+    let nearest = |share: f64| {
+        let off = |s: &&Sample| (s.depth_mm - share * deepest).abs();
+        let below = loading.iter().filter(|s| s.depth_mm > 0.0);
+        below
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
+            .map(|s| s.depth_mm)
+    };
+    let mut depths: Vec<f64> = DEPTHS.iter().filter_map(|&share| nearest(share)).collect();
+    depths.dedup();
+    let index = |depth: f64| record.samples.iter().position(|s| s.depth_mm == depth);
+    Some(depths.into_iter().filter_map(index).collect())
+}
+
+/// The converged samples of the first press down.
+pub fn loading(samples: &[Sample]) -> Vec<&Sample> {
+    let down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
+    let good = |s: &&Sample| s.outcome.is_converged();
+    samples.iter().filter(down).filter(good).collect()
+}
+
+/// Force of the press down at a depth, N; linear between samples.
+fn force_at(loading: &[&Sample], depth_mm: f64) -> Option<f64> {
+    let after = loading.partition_point(|s| s.depth_mm < depth_mm - 1e-9);
+    let next = loading.get(after)?;
+    let Some(before) = after.checked_sub(1).map(|i| loading[i]) else {
+        return Some(next.force_n);
+    };
+    let share = (depth_mm - before.depth_mm) / (next.depth_mm - before.depth_mm);
+    Some(before.force_n + (next.force_n - before.force_n) * share)
+}
