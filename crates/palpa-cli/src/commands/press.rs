@@ -53,6 +53,10 @@ pub struct Args {
     /// Stop at the full depth; do not retract
     #[arg(long)]
     no_retract: bool,
+    /// Estimate the force's error bar: press on finer meshes near the tool. Takes about as long
+    /// again as the press
+    #[arg(long)]
+    error_bar: bool,
     /// Number of deformed bodies in the ParaView series, including rest and the deepest; 0 for none
     #[arg(long, default_value_t = 9, value_name = "N")]
     frames: usize,

@@ -62,6 +62,8 @@ impl Batches {
         sums: &mut Sums<'_>,
     ) -> Result<(), Inverted> {
         let with_tangent = sums.blocks.is_some();
+        // The lists hold boxes, because a batch is large.
+        #[expect(clippy::borrowed_box, reason = "an item of the list")]
         let compute = |batch: &Box<LaneBatch>, slot: &mut Local<f64>| {
             let is_good = Arch::new().dispatch(One {
                 batch,
@@ -72,6 +74,7 @@ impl Batches {
             let pair = || worst_pair(batch, slot);
             is_good.then_some(()).ok_or_else(|| inverted(model, pair()))
         };
+        #[expect(clippy::borrowed_box, reason = "an item of the list")]
         let add = |batch: &Box<LaneBatch>, slot: &Local<f64>| add_batch(batch, slot, sums);
         in_chunks(&self.full, &mut slots.batches, BATCHES, compute, add)?;
         if self.others.is_empty() {
@@ -122,10 +125,8 @@ fn in_chunks<I: Sync, S: Send + Sync>(
         let (result, ()) = rayon::join(
             || run(chunk, next),
             || {
-                before
-                    .iter()
-                    .zip(&*now)
-                    .for_each(|(item, slot)| add(item, slot))
+                let done = before.iter().zip(&*now);
+                done.for_each(|(item, slot)| add(item, slot));
             },
         );
         result?;

@@ -35,17 +35,13 @@ impl Newton<'_> {
             let result =
                 ws.assembler
                     .forces(self.model, &ws.memory, &ws.trial, &mut ws.trial_forces);
-            match result {
-                Err(inverted) => last = Some(inverted),
-                Ok(()) => {
-                    let is_good = self.keeps_touch(ws, share)
-                        && (!must_fall || self.is_better(state, ws, imbalance.free));
-                    if is_good {
-                        std::mem::swap(&mut state.displacements, &mut ws.trial);
-                        return Ok(share);
-                    }
-                    last = None;
-                }
+            last = result.err();
+            let is_good = last.is_none()
+                && self.keeps_touch(ws, share)
+                && (!must_fall || self.is_better(state, ws, imbalance.free));
+            if is_good {
+                std::mem::swap(&mut state.displacements, &mut ws.trial);
+                return Ok(share);
             }
             share *= 0.5;
         }

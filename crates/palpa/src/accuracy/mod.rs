@@ -21,11 +21,13 @@ use crate::press::Phase;
 use crate::press::tissue::{Record, Sample};
 
 /// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
-/// first order and three quarters of one of second order; the rest of the factor covers what probes
-/// do not see. Chosen so that nine in ten of the cases in `docs/accuracy.md` lie within the bar.
+/// first order and three quarters of one of second order.
 pub const SAFETY: f64 = 2.0;
 /// Depths that are probed, as shares of the deepest.
 const DEPTHS: [f64; 3] = [1.0, 0.5, 0.25];
+
+/// Depths closer than this are the same, mm.
+const SAME_DEPTH: f64 = 1e-9;
 
 /// What a probe makes finer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -105,6 +107,21 @@ impl ErrorBars {
         probe::run(record, &samples, &mut progress)
     }
 
+    /// Enters the bars into the samples of a press.
+    pub fn enter(&self, samples: &mut [Sample]) {
+        let down: Vec<Sample> = loading(samples).into_iter().cloned().collect();
+        let down: Vec<&Sample> = down.iter().collect();
+        for sample in samples.iter_mut().filter(|s| s.outcome.is_converged()) {
+            let bar = self.of(sample, &down);
+            sample.error_bar_n = bar.map(|bar| bar.half_width_n);
+            let part = |i: usize| bar.map(|bar| bar.contributions_n[i]);
+            sample.error_skin_near_n = part(0);
+            sample.error_skin_far_n = part(1);
+            sample.error_levels_near_n = part(2);
+            sample.error_levels_deep_n = part(3);
+        }
+    }
+
     /// The bar of a sample. `loading` are the samples of the first press down. Where no depth was
     /// probed, relative contributions are interpolated; above the least depth they are those at it.
     pub fn of(&self, sample: &Sample, loading: &[&Sample]) -> Option<ErrorBar> {
@@ -156,7 +173,12 @@ fn probed_samples(record: &Record<'_>) -> Option<Vec<usize>> {
     };
     let mut depths: Vec<f64> = DEPTHS.iter().filter_map(|&share| nearest(share)).collect();
     depths.dedup();
-    let index = |depth: f64| record.samples.iter().position(|s| s.depth_mm == depth);
+    let index = |depth: f64| {
+        record
+            .samples
+            .iter()
+            .position(|s| (s.depth_mm - depth).abs() < SAME_DEPTH)
+    };
     Some(depths.into_iter().filter_map(index).collect())
 }
 
@@ -169,7 +191,7 @@ pub fn loading(samples: &[Sample]) -> Vec<&Sample> {
 
 /// Force of the press down at a depth, N; linear between samples.
 fn force_at(loading: &[&Sample], depth_mm: f64) -> Option<f64> {
-    let after = loading.partition_point(|s| s.depth_mm < depth_mm - 1e-9);
+    let after = loading.partition_point(|s| s.depth_mm < depth_mm - SAME_DEPTH);
     let next = loading.get(after)?;
     let Some(before) = after.checked_sub(1).map(|i| loading[i]) else {
         return Some(next.force_n);

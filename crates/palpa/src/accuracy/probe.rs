@@ -57,7 +57,9 @@ pub(super) fn run(
         }
         let Some(mut probe) = Probe::build(press, &part, source)? else {
             // Nothing to divide.
-            probed.iter_mut().for_each(|p| p.changes[i] = Some(0.0));
+            for probed in &mut probed {
+                probed.changes[i] = Some(0.0);
+            }
             continue;
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
@@ -90,7 +92,7 @@ struct Probe {
     model: Model,
     workspace: Workspace,
     /// Carries displacements of the part to the probe.
-    carry: Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>,
+    carry: Carry,
     /// Nodes that move as in the press.
     border: Vec<usize>,
     /// Nodes that are bonded to the tool.
@@ -126,7 +128,9 @@ impl Probe {
         let mut bonded = Vec::new();
         if !bonded_whole.is_empty() {
             let mut marks = vec![false; press.mesh().body.n_vertices()];
-            bonded_whole.iter().for_each(|&v| marks[v] = true);
+            for v in bonded_whole {
+                marks[v] = true;
+            }
             let marks = per_vertex(&part.take(&marks, 1));
             bonded.extend(
                 (0..body.n_vertices())
@@ -268,7 +272,9 @@ fn rim(body: &LayeredBody) -> Vec<bool> {
     edges.sort_unstable();
     let mut is_rim = vec![false; body.n_vertices()];
     for same in edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
-        same[0].iter().for_each(|&v| is_rim[v as usize] = true);
+        for &v in &same[0] {
+            is_rim[v as usize] = true;
+        }
     }
     is_rim
 }

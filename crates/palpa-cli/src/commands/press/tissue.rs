@@ -11,13 +11,14 @@ use std::sync::Arc;
 use palpa_scene::Scene;
 
 use self::pictures::draw_pictures;
-use self::record::record;
+use self::record::{record, table};
 use self::report::{PressReport, announce, conclude, facts};
 use self::result::result_of;
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
-use palpa::press::tissue::{Indentation, SampleOutcome};
+use palpa::accuracy::ErrorBars;
+use palpa::press::tissue::{Indentation, Record, SampleOutcome};
 use palpa::{Note, Prepared};
 
 /// Runs the press.
@@ -38,7 +39,12 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
 
     context.begin_recording();
     remove_older(out.path())?;
-    let recorded = record(job, &indentation)?;
+    let mut recorded = record(job, &indentation)?;
+    let bars = if job.args.error_bar {
+        estimate_bars(job, &mut recorded)?
+    } else {
+        None
+    };
     let result = result_of(&recorded, &materials, context.is_interrupted());
     let notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
         .map(Note::to_string)
@@ -51,6 +57,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         press: facts(scene, &indentation),
         result,
         notes: &notes,
+        error_bars: bars.as_ref(),
         samples: &recorded.samples,
     };
     out.write_json("press.json", &report)?;
@@ -66,6 +73,27 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         (_, SampleOutcome::Converged) => Outcome::Done,
         _ => Outcome::NotGood,
     })
+}
+
+/// Estimates the error bars, enters them into the samples and writes the table again; `None` if it
+/// was interrupted.
+fn estimate_bars(job: &Job<'_>, recorded: &mut Record<'_>) -> anyhow::Result<Option<ErrorBars>> {
+    let context = job.context;
+    let progress = context.progress(0, "error bar");
+    let bars = ErrorBars::estimate(recorded, |probe, n_probes| {
+        progress.set_message(format!("error bar, probe {} of {n_probes}", probe + 1));
+        !context.is_interrupted()
+    })?;
+    drop(progress);
+    if let Some(bars) = &bars {
+        bars.enter(&mut recorded.samples);
+        let mut table = table(job)?;
+        for sample in &recorded.samples {
+            table.push(sample)?;
+        }
+        table.finish()?;
+    }
+    Ok(bars)
 }
 
 /// Materials of the layers, then of the lumps.

@@ -230,6 +230,11 @@ impl Run<'_> {
             work_mj,
             volume_ratio_min: ratios.clone().fold(f64::INFINITY, f64::min),
             volume_ratio_max: ratios.fold(0.0, f64::max),
+            error_bar_n: None,
+            error_skin_near_n: None,
+            error_skin_far_n: None,
+            error_levels_near_n: None,
+            error_levels_deep_n: None,
             layer_thickness_mm: (indentation.thicknesses(&self.state).iter())
                 .map(|t| t * 1e3)
                 .collect(),

@@ -66,6 +66,17 @@ pub struct Sample {
     pub volume_ratio_min: f64,
     /// Largest ratio of a prism's volume to its volume at rest.
     pub volume_ratio_max: f64,
+    /// Half the width of the force's error bar, N; `None` if it was not estimated. See
+    /// [`crate::accuracy`].
+    pub error_bar_n: Option<f64>,
+    /// Change of the force by finer triangles near the tool, N.
+    pub error_skin_near_n: Option<f64>,
+    /// Change of the force by finer triangles around them, N.
+    pub error_skin_far_n: Option<f64>,
+    /// Change of the force by finer intervals near the skin, N.
+    pub error_levels_near_n: Option<f64>,
+    /// Change of the force by finer deep intervals, N.
+    pub error_levels_deep_n: Option<f64>,
     /// Thickness of each layer along the pressed column, mm. `[n_layers]`
     pub layer_thickness_mm: Vec<f64>,
 }

@@ -195,7 +195,14 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
                 down.splice(0..0, before.map(|s| [s.depth_mm, s.force_n]));
             }
             let mut back = points(&[Phase::Retract]);
-            chart = chart.series(Series::new(name, down.clone()).with_color(color));
+            let bars = (of_run.iter())
+                .filter(|s| s.cycle == 0 && cycle == 0 && s.phase == Phase::Load)
+                .filter_map(|s| {
+                    let bar = s.error_bar_n?;
+                    Some([s.depth_mm, s.force_n - bar, s.force_n + bar])
+                });
+            let series = Series::new(name, down.clone()).with_color(color);
+            chart = chart.series(series.with_spread(bars.collect()));
             if !back.is_empty() {
                 back.splice(0..0, down.last().copied());
                 let name = if (cycle, n_runs) == (0, 1) {

@@ -5,7 +5,7 @@ use super::super::Job;
 use super::super::files::Series;
 use super::fields::grid;
 use palpa::press::tissue::{Indentation, Record, Sample};
-use palpa_plot::output::{CsvTable, OutDir};
+use palpa_plot::output::CsvTable;
 
 /// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
 /// run leaves a valid table.
@@ -14,14 +14,9 @@ pub(super) fn record<'a>(
     indentation: &'a Indentation,
 ) -> anyhow::Result<Record<'a>> {
     let Job {
-        args,
-        context,
-        out,
-        scene,
-        ..
+        args, context, out, ..
     } = *job;
-    let names = scene.layers.iter().map(|layer| layer.tissue.name.as_str());
-    let mut table = table(out, names)?;
+    let mut table = table(job)?;
     let n_samples = indentation.n_samples();
     let lump_shares = indentation.prepared.lump_shares();
     let mut series = Series::new(args.frames, n_samples, indentation.deepest());
@@ -49,14 +44,13 @@ pub(super) fn record<'a>(
 }
 
 /// Opens the table: the fields of [`Sample`], then one column for the thickness of each layer.
-fn table<'a>(
-    out: &OutDir,
-    layers: impl Iterator<Item = &'a str>,
-) -> anyhow::Result<CsvTable<Sample>> {
+pub(super) fn table(job: &Job<'_>) -> anyhow::Result<CsvTable<Sample>> {
+    let names = (job.scene.layers.iter()).map(|layer| layer.tissue.name.as_str());
     let column = |(i, layer): (usize, &str)| {
         let word = layer.replace(|c: char| !c.is_alphanumeric(), "_");
         // The index is needed because two layers may have the same tissue.
         format!("layer_{i}_{word}_mm")
     };
-    out.table_with_list("press.csv", layers.enumerate().map(column).collect())
+    let columns = names.enumerate().map(column).collect();
+    job.out.table_with_list("press.csv", columns)
 }

@@ -10,6 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
+use palpa::accuracy::ErrorBars;
 use palpa::build::in_mm;
 use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
@@ -26,6 +27,8 @@ pub(super) struct PressReport<'a> {
     pub(super) press: PressFacts,
     pub(super) result: PressResult,
     pub(super) notes: &'a [String],
+    /// Contributions to the force's error at the depths that were probed; `None` if they were not.
+    pub(super) error_bars: Option<&'a ErrorBars>,
     pub(super) samples: &'a [Sample],
 }
 
@@ -144,6 +147,7 @@ pub(super) fn conclude(
     for run in &r.runs {
         context.say(run_in_words(run))?;
     }
+    say_bars(job, report)?;
     say_forces(job, r)?;
     let w = &r.worst;
     if !indentation.is_bonded() {
@@ -237,7 +241,7 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
             .collect();
         table.push([
             format!("{:.2}", sample.depth_mm),
-            format!("{:.4}", (sample.force_n * 1e4).round() / 1e4 + 0.0),
+            force_in_words(sample),
             format!("{:.0}", sample.contact_area_mm2),
             sample
                 .max_pressure_kpa
@@ -246,6 +250,41 @@ fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> an
         ]);
     }
     job.context.say(table)
+}
+
+/// The force, with its error bar if it has one.
+fn force_in_words(sample: &Sample) -> String {
+    let force = (sample.force_n * 1e4).round() / 1e4 + 0.0;
+    match sample.error_bar_n {
+        Some(bar) => format!("{force:.4} ± {bar:.4}"),
+        None => format!("{force:.4}"),
+    }
+}
+
+/// Prints the error bar at the deepest depth that was probed, and its contributions.
+fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
+    let Some(probed) = report.error_bars.and_then(|bars| bars.probed.first()) else {
+        return Ok(());
+    };
+    let words = [
+        "triangles near the tool",
+        "triangles around them",
+        "intervals near the skin",
+        "deep intervals",
+    ];
+    let changes = (words.iter().zip(probed.changes)).map(|(word, change)| match change {
+        Some(change) => format!("{word} {:+.1} %", 100.0 * change),
+        None => format!("{word}: no equilibrium found"),
+    });
+    let bar = probed.half_width().map_or_else(
+        || "not known, because a probe failed".to_owned(),
+        |half| format!("±{:.1} % of the force", 100.0 * half),
+    );
+    job.context.say(format!(
+        "error bar at {:.2} mm: {bar}; halving sizes changes the force by: {}",
+        probed.depth_mm,
+        changes.collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// Prints which layer deforms most, and the force that each layer passes on.
