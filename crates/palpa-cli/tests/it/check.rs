@@ -109,7 +109,7 @@ fn what_cannot_be_read_is_exit_code_2_and_the_rest_is_reported() {
 
 #[test]
 fn a_scene_is_checked_with_its_surfaces_in_its_unit() {
-    let scene = "[body]\nsurface = \"skin.obj\"\nunit = \"mm\"\n[[layer]]\ntissue = \"fat\"\nthickness = \"20 mm\"\n";
+    let scene = "[body]\nsurface = \"skin.obj\"\nunit = \"mm\"\n[[layer]]\ntissue = \"fat\"\nthickness = \"10 mm\"\n";
     let skin = GOOD.replace(".1", "100");
     let check = Check::new(&[
         ("limb.toml", scene),

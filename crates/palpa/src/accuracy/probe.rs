@@ -36,7 +36,9 @@ pub(super) fn run(
         let Some(start) = record.displacements(index) else {
             continue;
         };
-        let Some((force, displacements)) = press.elastic(&mut own, depth, start) else {
+        // A tool that does not touch yet has no force that a change could be relative to.
+        let found = press.elastic(&mut own, depth, start);
+        let Some((force, displacements)) = found.filter(|(force, _)| *force != 0.0) else {
             continue;
         };
         bases.push((depth, force, displacements));
@@ -55,11 +57,15 @@ pub(super) fn run(
         if !progress(i, n_all) {
             return Ok(None);
         }
-        let Some(mut probe) = Probe::build(press, &part, source)? else {
+        let Some((body, carry)) = divided(press, &part, source) else {
             // Nothing to divide.
             for probed in &mut probed {
                 probed.changes[i] = Some(0.0);
             }
+            continue;
+        };
+        // A probe that is too large has no result, like one without equilibrium.
+        let Ok(mut probe) = Probe::build(press, &part, &body, carry) else {
             continue;
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
@@ -100,11 +106,13 @@ struct Probe {
 }
 
 impl Probe {
-    /// A probe; `None` if there is nothing that it could divide.
-    fn build(press: &Indentation, part: &Part, source: Source) -> anyhow::Result<Option<Self>> {
-        let Some((body, carry)) = divided(press, part, source) else {
-            return Ok(None);
-        };
+    /// A probe with another mesh of the part. `carry` carries displacements of the part to it.
+    fn build(
+        press: &Indentation,
+        part: &Part,
+        body: &LayeredBody,
+        carry: Carry,
+    ) -> anyhow::Result<Self> {
         let per_vertex = |marks: &[bool]| -> Vec<bool> {
             // A vertex is marked if all vertices between which it lies are.
             let n = part.body.n_levels;
@@ -116,7 +124,7 @@ impl Probe {
                 .map(|v| carried[body.node(v, 0)].x > 1.0 - 1e-9)
                 .collect()
         };
-        let rim = rim(&body);
+        let rim = rim(body);
         let is_border = per_vertex(&part.is_border);
         let columns = |v: usize| (0..body.n_levels).map(move |l| (v, l));
         let border = (0..body.n_vertices())
@@ -139,19 +147,19 @@ impl Probe {
             );
         }
         let prepared = &press.prepared;
-        let supports = continuum::supports(prepared.scene.body.cut_faces, &body, &mut Vec::new());
+        let supports = continuum::supports(prepared.scene.body.cut_faces, body, &mut Vec::new());
         let params = ModelParams {
             alpha: prepared.scene.model.alpha,
         };
-        let model = Model::build(&body, &prepared.materials, &supports, params)?;
+        let model = Model::build(body, &prepared.materials, &supports, params)?;
         let (points, radius) = press.region();
-        Ok(Some(Self {
+        Ok(Self {
             workspace: Workspace::round(&model, &points, radius),
             model,
             carry,
             border,
             bonded,
-        }))
+        })
     }
 
     /// The force at a depth, N, with the displacements of the press there; `None` if no equilibrium
@@ -277,4 +285,89 @@ fn rim(body: &LayeredBody) -> Vec<bool> {
         }
     }
     is_rim
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use palpa_scene::Scene;
+
+    use super::*;
+    use crate::Prepared;
+
+    /// A press of a block on which the part is smaller than the body.
+    fn press(tool: &str) -> Indentation {
+        let text = format!(
+            r#"
+            [body]
+            generator = {{ kind = "block", size = ["120 mm", "120 mm", "16 mm"], spacing = "10 mm" }}
+            [[layer]]
+            tissue = {{ name = "gel", young = "10 kPa", poisson = 0.45 }}
+            levels = 3
+            [tool]
+            {tool}
+            [press]
+            at = ["3 mm", "2 mm", "0 mm"]
+            depth = "2 mm"
+            step = "1 mm"
+            hold = "0 s"
+            retract = false
+            "#
+        );
+        let scene = Scene::parse(&text, Path::new(".")).unwrap();
+        Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap()
+    }
+
+    #[test]
+    fn the_part_alone_has_the_force_of_the_press() {
+        for tool in ["shape = \"disc\"", "shape = \"sphere\"\nradius = \"8 mm\""] {
+            let press = press(tool);
+            let part = part(&press);
+            assert!(part.body.n_vertices() < press.mesh().body.n_vertices());
+            assert!(part.is_border.contains(&true));
+            let mut record = Record::new(&press);
+            let mut run = press.start(0);
+            while let Some(sample) = run.advance() {
+                record.push(&run, sample);
+            }
+            let last = record.samples.len() - 1;
+            let displacements = record.displacements(last).unwrap();
+            let carry: Carry = Box::new(<[Vec3]>::to_vec);
+            let mut probe = Probe::build(&press, &part, &part.body.clone(), carry).unwrap();
+            let force = probe.force(&press, 2e-3, &part, displacements).unwrap();
+            let expected = record.samples[last].force_n;
+            assert!(expected > 0.01);
+            // The triangles of the part are paired anew, which changes the force a little.
+            assert!(
+                (force - expected).abs() < 5e-4 * expected,
+                "{tool}: {force} and {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn sources_divide_all_of_the_part_and_nothing_twice() {
+        let press = press("shape = \"disc\"");
+        let part = part(&press);
+        let n_prisms = part.body.n_prisms();
+        let n_levels = part.body.n_levels;
+        let mut finer = 0;
+        for source in [Source::LevelsNear, Source::LevelsDeep] {
+            finer += divided(&press, &part, source).map_or(0, |(body, _)| body.n_levels - n_levels);
+        }
+        assert_eq!(finer, n_levels - 1);
+        for source in [Source::SkinNear, Source::SkinFar] {
+            let (body, carry) = divided(&press, &part, source).unwrap();
+            assert!(body.n_prisms() > n_prisms);
+            // Positions are carried to positions: the geometry is the same.
+            let carried = carry(&part.body.positions);
+            let off = carried
+                .iter()
+                .zip(&body.positions)
+                .map(|(a, b)| (a - b).norm());
+            assert!(off.fold(0.0, f64::max) < 1e-12);
+        }
+    }
 }

@@ -274,7 +274,7 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
     ];
     let changes = (words.iter().zip(probed.changes)).map(|(word, change)| match change {
         Some(change) => format!("{word} {:+.1} %", 100.0 * change),
-        None => format!("{word}: no equilibrium found"),
+        None => format!("{word}: no result"),
     });
     let bar = probed.half_width().map_or_else(
         || "not known, because a probe failed".to_owned(),
