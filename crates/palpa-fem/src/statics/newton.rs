@@ -33,6 +33,17 @@ pub fn equilibrate(
     load: &Load<'_>,
     params: &SolveParams,
 ) -> StepReport {
+    // In rayon's pool, whose threads share the work at once.
+    rayon::scope(|_| equilibrate_in_pool(model, state, ws, load, params))
+}
+
+fn equilibrate_in_pool(
+    model: &Model,
+    state: &mut State,
+    ws: &mut Workspace,
+    load: &Load<'_>,
+    params: &SolveParams,
+) -> StepReport {
     let mut newton = Newton::begin(model, state, ws, load, params);
     let start =
         (!load.tools.is_empty()).then(|| (state.displacements.clone(), state.touches.clone()));

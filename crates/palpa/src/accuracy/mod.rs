@@ -93,17 +93,13 @@ pub struct ErrorBars {
 
 impl ErrorBars {
     /// Probes the first press down of a record. `progress` is called before each probe with its
-    /// number and the number of all; if it returns false, the probes are given up.
-    ///
-    /// # Errors
-    /// When the tool or a probe's mesh cannot be made.
+    /// number and the number of all; if it returns false, the probes are given up. `None` if they
+    /// were, or if no sample converged.
     pub fn estimate(
         record: &Record<'_>,
         mut progress: impl FnMut(usize, usize) -> bool,
-    ) -> anyhow::Result<Option<Self>> {
-        let Some(samples) = probed_samples(record) else {
-            return Ok(None);
-        };
+    ) -> Option<Self> {
+        let samples = probed_samples(record)?;
         probe::run(record, &samples, &mut progress)
     }
 

@@ -26,7 +26,7 @@ pub(super) fn run(
     record: &Record<'_>,
     samples: &[usize],
     progress: &mut dyn FnMut(usize, usize) -> bool,
-) -> anyhow::Result<Option<ErrorBars>> {
+) -> Option<ErrorBars> {
     let press = record.indentation();
     let n_all = Source::ALL.len();
     let mut bases = Vec::new();
@@ -55,7 +55,7 @@ pub(super) fn run(
     let mut n_nodes = 0;
     for (i, source) in Source::ALL.into_iter().enumerate() {
         if !progress(i, n_all) {
-            return Ok(None);
+            return None;
         }
         let Some((body, carry)) = divided(press, &part, source) else {
             // Nothing to divide.
@@ -74,7 +74,7 @@ pub(super) fn run(
             probed.changes[i] = found.map(|found| (found - force) / force);
         }
     }
-    Ok(Some(ErrorBars { probed, n_nodes }))
+    Some(ErrorBars { probed, n_nodes })
 }
 
 /// The part of the body that is probed.

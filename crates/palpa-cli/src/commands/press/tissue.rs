@@ -83,7 +83,7 @@ fn estimate_bars(job: &Job<'_>, recorded: &mut Record<'_>) -> anyhow::Result<Opt
     let bars = ErrorBars::estimate(recorded, |probe, n_probes| {
         progress.set_message(format!("error bar, probe {} of {n_probes}", probe + 1));
         !context.is_interrupted()
-    })?;
+    });
     drop(progress);
     if let Some(bars) = &bars {
         bars.enter(&mut recorded.samples);
