@@ -9,8 +9,8 @@
 //! compliance.
 //!
 //! ```text
-//! lanes, elementary, principal ─► kernel ─► batch ─► inside (zone) ────┐
-//!                                             └────► outside (exterior) ┤─► live ─► local ─► haptic loop
+//! crate::batch (elements in lanes) ─► inside (zone) ───────────────────┐
+//!                             └─────► outside (exterior) ───────────────┤─► live ─► local ─► haptic loop
 //! plan (which columns are in the zone) ─────────────────────────────────┤
 //! candidate ─► contact_problem ─────────────────────────────────────────┘
 //! ```
