@@ -33,13 +33,9 @@ impl Assembler {
             let pattern = &model.structure.pattern;
             Batches::new(model, memory, pattern, keep, Tangent::Double)
         };
-        let is_inner = |region: &Region, group: &SurfaceGroup| {
-            let mut vertices = group.vertices[..group.n_columns()].iter();
-            vertices.all(|&v| region.contains(v as usize))
-        };
         Self {
-            outer: region.map(|r| part(&|group| !is_inner(r, group))),
-            inner: part(&|group| region.is_none_or(|r| is_inner(r, group))),
+            outer: region.map(|r| part(&|group| !r.holds(group))),
+            inner: part(&|group| region.is_none_or(|r| r.holds(group))),
             slots: Slots::new(),
         }
     }
@@ -126,7 +122,7 @@ pub(crate) fn energy(model: &Model, memory: &Memory, displacements: &[Vec3]) -> 
 }
 
 /// Evaluates one group.
-fn evaluate_group<'a>(
+pub(crate) fn evaluate_group<'a>(
     model: &'a Model,
     memory: &'a Memory,
     index: usize,

@@ -26,6 +26,12 @@ impl SurfaceGroup {
         usize::from(self.shape.n_wedges) + 2
     }
 
+    /// Whether all of its columns are among the marked ones.
+    pub(crate) fn is_within(&self, is_inside: &[bool]) -> bool {
+        let mut columns = self.vertices[..self.n_columns()].iter();
+        columns.all(|&v| is_inside[v as usize])
+    }
+
     /// Local nodes of the group.
     pub(crate) fn n_nodes(&self) -> usize {
         2 * self.n_columns()
@@ -68,9 +74,8 @@ impl Structure {
             })
         });
         let pattern = ColumnPattern::new(skin.points.len(), n_free_levels, edges);
-        let places: Vec<[f64; 3]> = skin.points.iter().map(|p| (*p).into()).collect();
         Ok(Self {
-            tree: Tree::whole(&pattern, &places)?,
+            tree: Tree::whole(&pattern, &places(skin))?,
             groups: cells
                 .into_iter()
                 .map(|(vertices, triangles)| group(&pattern, skin, vertices, &triangles))
@@ -135,37 +140,38 @@ impl Structure {
     }
 
     /// Calls `visit` for every block that exists, with its index, row node and column node.
-    pub(crate) fn for_each_block(&self, mut visit: impl FnMut(usize, usize, usize)) {
-        for v in 0..self.pattern.n_columns() {
-            self.for_each_own(v, &mut visit);
-        }
-        for pair in 0..self.pattern.n_pairs() {
-            self.for_each_between(pair, &mut visit);
-        }
+    pub(crate) fn for_each_block(&self, visit: impl FnMut(usize, usize, usize)) {
+        self.for_each_block_between(|_| true, visit);
     }
 
-    /// As [`Self::for_each_block`], for the blocks within a column.
-    pub(crate) fn for_each_own(&self, v: usize, visit: &mut impl FnMut(usize, usize, usize)) {
-        let (first, node) = (self.pattern.own(v), v * self.n_levels);
-        for l in 0..self.n_free_levels {
-            visit(first + 2 * l, node + l, node + l);
-            if l + 1 < self.n_free_levels {
-                visit(first + 2 * l + 1, node + l + 1, node + l);
+    /// As [`Self::for_each_block`], for the blocks between columns that `keep` selects; a column's
+    /// own blocks are between it and itself.
+    pub(crate) fn for_each_block_between(
+        &self,
+        keep: impl Fn([usize; 2]) -> bool,
+        mut visit: impl FnMut(usize, usize, usize),
+    ) {
+        let n = self.n_free_levels;
+        for v in (0..self.pattern.n_columns()).filter(|&v| keep([v, v])) {
+            let (first, node) = (self.pattern.own(v), v * self.n_levels);
+            for l in 0..n {
+                visit(first + 2 * l, node + l, node + l);
+                if l + 1 < n {
+                    visit(first + 2 * l + 1, node + l + 1, node + l);
+                }
             }
         }
-    }
-
-    /// As [`Self::for_each_block`], for the blocks between two columns.
-    pub(crate) fn for_each_between(
-        &self,
-        pair: usize,
-        visit: &mut impl FnMut(usize, usize, usize),
-    ) {
-        let first = self.pattern.between(pair);
-        let [a, b] = self.pattern.pair(pair).map(|v| v as usize * self.n_levels);
-        for l in 0..self.n_free_levels {
-            for k in l.saturating_sub(1)..(l + 2).min(self.n_free_levels) {
-                visit(first + 3 * l + k + 1 - l, a + k, b + l);
+        for pair in 0..self.pattern.n_pairs() {
+            let columns = self.pattern.pair(pair).map(|v| v as usize);
+            if !keep(columns) {
+                continue;
+            }
+            let first = self.pattern.between(pair);
+            let [a, b] = columns.map(|v| v * self.n_levels);
+            for l in 0..n {
+                for k in l.saturating_sub(1)..(l + 2).min(n) {
+                    visit(first + 3 * l + k + 1 - l, a + k, b + l);
+                }
             }
         }
     }
@@ -179,6 +185,11 @@ impl Structure {
         let (v, l) = (node / self.n_levels, node % self.n_levels);
         self.pattern.own(v) + 2 * l
     }
+}
+
+/// Positions of the columns at the skin, m.
+pub(crate) fn places(skin: &Surface) -> Vec<[f64; 3]> {
+    skin.points.iter().map(|p| (*p).into()).collect()
 }
 
 fn group(

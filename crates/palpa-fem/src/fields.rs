@@ -4,8 +4,8 @@ use palpa_mesh::Vec3;
 use rayon::prelude::*;
 
 use crate::Mat3;
-use crate::assembly::phases_at;
-use crate::element::{GroupResponse, element_fields, evaluate};
+use crate::assembly::{evaluate_group, phases_at};
+use crate::element::{GroupResponse, element_fields};
 use crate::model::Model;
 use crate::state::{Memory, State};
 use crate::statics::Workspace;
@@ -111,17 +111,14 @@ pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
     let mut response = GroupResponse::new();
     for (i, level) in forces.iter_mut().enumerate().take(model.body.n_levels - 1) {
         for (g, group) in model.structure.groups.iter().enumerate() {
-            let index = i * model.n_groups() + g;
-            phases_at(model, &ws.memory, index, &mut phases);
-            let local = model.group_nodes(g, i).map(|n| state.displacements[n]);
-            evaluate(
-                group.shape,
-                &model.geometries[index],
-                &local,
-                &phases,
-                model.params.alpha,
-                false,
+            evaluate_group(
+                model,
+                &ws.memory,
+                i * model.n_groups() + g,
+                &state.displacements,
+                &mut phases,
                 &mut response,
+                false,
             );
             for node in (0..group.n_nodes()).step_by(2) {
                 *level -= response.forces[node];

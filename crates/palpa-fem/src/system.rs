@@ -8,7 +8,7 @@
 //! With a [`Region`], the columns near the tools are eliminated last. Contact and stiffness change
 //! most there, and only this part of the factor is computed again in every iteration.
 
-use palpa_mesh::Vec3;
+use palpa_mesh::{Surface, Vec3};
 use palpa_sparse::fronts::{
     Exterior, FactorScratch, Half, Number, SolveScratch, Tree, Zone, back_substitute, least_pivot,
     substitute,
@@ -16,7 +16,7 @@ use palpa_sparse::fronts::{
 use palpa_sparse::{Block, Singular, TooLarge};
 
 use crate::Mat3;
-use crate::columns::Structure;
+use crate::columns::{Structure, SurfaceGroup, places};
 
 /// A pivot smaller than this, relative to its original diagonal entry, counts as zero: in double
 /// precision, and in single precision.
@@ -117,29 +117,32 @@ pub(crate) struct Region {
     is_inside: Vec<bool>,
     /// Whether a column is outside, or touches a column outside. `[n_vertices]`
     is_outer: Vec<bool>,
-    /// Blocks between columns of the ring, to which prisms inside and outside contribute.
-    ring_blocks: Vec<u32>,
+    /// Blocks between columns of the ring, to which prisms inside and outside contribute, each with
+    /// its row node and column node.
+    ring_blocks: Vec<[usize; 3]>,
 }
 
 impl Region {
-    /// The region of the marked columns; `places` are positions of all columns.
+    /// The region of the marked columns.
     pub(crate) fn new(
         structure: &Structure,
-        places: &[[f64; 3]],
+        skin: &Surface,
         is_inside: Vec<bool>,
     ) -> Result<Self, TooLarge> {
         let pattern = &structure.pattern;
-        let tree = Tree::zone_last(pattern, places, &is_inside)?;
+        let tree = Tree::zone_last(pattern, &places(skin), &is_inside)?;
         let is_outer: Vec<bool> = (0..pattern.n_columns())
             .map(|v| {
                 let mut around = pattern.neighbours(v).iter();
                 !is_inside[v] || around.any(|&w| !is_inside[w as usize])
             })
             .collect();
+        let is_ring = |v: usize| is_inside[v] && is_outer[v];
         let mut ring_blocks = Vec::new();
-        for_each_ring_block(structure, &is_inside, &is_outer, &mut |block, _, _| {
-            ring_blocks.push(block as u32);
-        });
+        structure.for_each_block_between(
+            |[v, w]| is_ring(v) && is_ring(w),
+            |block, row, column| ring_blocks.push([block, row, column]),
+        );
         Ok(Self {
             tree,
             is_inside,
@@ -148,38 +151,20 @@ impl Region {
         })
     }
 
-    /// Calls `visit` for every block of the ring, with its row node and column node.
-    fn for_each_ring_block(
-        &self,
-        structure: &Structure,
-        visit: &mut impl FnMut(usize, usize, usize),
-    ) {
-        for_each_ring_block(structure, &self.is_inside, &self.is_outer, visit);
+    /// Whether a column is in the region.
+    fn contains(&self, column: usize) -> bool {
+        self.is_inside[column]
     }
 
-    /// Whether a column is in the region.
-    pub(crate) fn contains(&self, column: usize) -> bool {
-        self.is_inside[column]
+    /// Whether all columns of a group are in the region.
+    pub(crate) fn holds(&self, group: &SurfaceGroup) -> bool {
+        group.is_within(&self.is_inside)
     }
 }
 
-/// Visits the blocks between columns that are both inside and outer.
-fn for_each_ring_block(
-    structure: &Structure,
-    is_inside: &[bool],
-    is_outer: &[bool],
-    visit: &mut impl FnMut(usize, usize, usize),
-) {
-    let pattern = &structure.pattern;
-    let is_ring = |v: usize| is_inside[v] && is_outer[v];
-    for v in (0..pattern.n_columns()).filter(|&v| is_ring(v)) {
-        structure.for_each_own(v, visit);
-    }
-    for pair in 0..pattern.n_pairs() {
-        if pattern.pair(pair).iter().all(|&v| is_ring(v as usize)) {
-            structure.for_each_between(pair, visit);
-        }
-    }
+/// The order of elimination of a system with or without a region.
+fn tree_of<'a>(structure: &'a Structure, region: Option<&'a Region>) -> &'a Tree {
+    region.map_or(&structure.tree, |region| &region.tree)
 }
 
 /// The matrix and its factor, in memory that is reused.
@@ -210,7 +195,7 @@ enum Factors {
 
 impl LinearSystem {
     pub(crate) fn new(structure: &Structure, n_nodes: usize, region: Option<Region>) -> Self {
-        let tree = region.as_ref().map_or(&structure.tree, |r| &r.tree);
+        let tree = tree_of(structure, region.as_ref());
         let n_ring_blocks = region.as_ref().map_or(0, |r| r.ring_blocks.len());
         Self {
             blocks: vec![Mat3::zeros(); structure.n_blocks()],
@@ -232,8 +217,8 @@ impl LinearSystem {
     /// Takes note of the blocks to which only prisms outside the region have been added so far.
     pub(crate) fn note_outer_share(&mut self) {
         if let Some(region) = &self.region {
-            for (share, &block) in self.outer_share.iter_mut().zip(&region.ring_blocks) {
-                *share = self.blocks[block as usize];
+            for (share, &[block, ..]) in self.outer_share.iter_mut().zip(&region.ring_blocks) {
+                *share = self.blocks[block];
             }
         }
     }
@@ -247,38 +232,31 @@ impl LinearSystem {
     ) -> Result<f64, Singular> {
         self.holds.copy_from_slice(holds);
         self.is_factored = false;
-        self.shift = 0.0;
-        if self.factor_exterior(structure, 0.0).is_ok() && self.factor_zone(structure, 0.0).is_ok()
-        {
-            self.is_factored = true;
-            return Ok(0.0);
-        }
+        let mut shift = self.factor_shifted(structure);
         // If a small shift is enough, single precision may be too little; else the matrix is not
         // positive definite.
-        let is_indefinite = self.factor_shifted(structure, FIRST_SHIFT).is_err();
-        if !is_indefinite && let Factors::Single(_) = self.factors {
-            let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
+        let is_small = shift.is_some_and(|shift| shift > 0.0 && shift <= FIRST_SHIFT);
+        if is_small && matches!(self.factors, Factors::Single(_)) {
+            let tree = tree_of(structure, self.region.as_ref());
             let numbers = Numbers::new(structure, tree, self.region.is_some());
             self.factors = Factors::Double(numbers);
-            if self.factor_shifted(structure, 0.0).is_ok() {
-                self.is_factored = true;
-                return Ok(0.0);
-            }
+            shift = self.factor_shifted(structure);
         }
-        let mut shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
-        self.shift = shifts
-            .find(|&shift| self.factor_shifted(structure, shift).is_ok())
-            .ok_or(Singular)?;
+        self.shift = shift.ok_or(Singular)?;
         self.is_factored = true;
         Ok(self.shift)
     }
 
-    /// Factors the whole matrix, shifted only where it must be: in the region if that is enough.
-    fn factor_shifted(&mut self, structure: &Structure, shift: f64) -> Result<(), Singular> {
-        if self.factor_exterior(structure, 0.0).is_err() {
-            self.factor_exterior(structure, shift)?;
-        }
-        self.factor_zone(structure, shift)
+    /// Factors the matrix with the least shift that works, in the region only if that is enough.
+    /// Returns the shift; `None` if none works.
+    fn factor_shifted(&mut self, structure: &Structure) -> Option<f64> {
+        let is_outer_good = self.factor_exterior(structure, 0.0).is_ok();
+        let shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
+        let unshifted = is_outer_good.then_some(0.0);
+        (unshifted.into_iter().chain(shifts)).find(|&shift| {
+            (is_outer_good || self.factor_exterior(structure, shift).is_ok())
+                && self.factor_zone(structure, shift).is_ok()
+        })
     }
 
     /// Factors the region's blocks only, under constraints. Returns false if that is not enough:
@@ -289,15 +267,9 @@ impl LinearSystem {
             return false;
         };
         let n_levels = holds.len() / region.is_outer.len();
-        let is_kept = (region
-            .is_outer
-            .iter()
-            .enumerate()
-            .filter(|(_, outer)| **outer))
-        .all(|(v, _)| {
-            let nodes = v * n_levels..(v + 1) * n_levels;
-            self.holds[nodes.clone()] == holds[nodes]
-        });
+        let columns = self.holds.chunks(n_levels).zip(holds.chunks(n_levels));
+        let is_kept = (columns.zip(&region.is_outer))
+            .all(|((before, now), &is_outer)| !is_outer || before == now);
         if !is_kept || self.shift > 0.0 {
             return false;
         }
@@ -345,7 +317,7 @@ impl LinearSystem {
         right_side: &[Vec3],
         solution: &mut [Vec3],
     ) {
-        let tree = self.region.as_ref().map_or(&structure.tree, |r| &r.tree);
+        let tree = tree_of(structure, self.region.as_ref());
         match &mut self.factors {
             Factors::Single(n) => n.solve(structure, tree, &self.holds, right_side, solution),
             Factors::Double(n) => n.solve(structure, tree, &self.holds, right_side, solution),
@@ -367,7 +339,7 @@ struct View<'a> {
 
 impl View<'_> {
     fn tree(&self) -> &Tree {
-        self.region.map_or(&self.structure.tree, |r| &r.tree)
+        tree_of(self.structure, self.region)
     }
 
     /// A block under the constraints of its nodes. `is_whole` says whether `block` is the whole
@@ -453,61 +425,37 @@ impl<T: Number + Send + Sync> Numbers<T> {
         let Some(region) = view.region else {
             return Ok(());
         };
-        let (structure, pattern) = (view.structure, &view.structure.pattern);
         let blocks = &mut self.blocks;
-        let mut put = |block: usize, row: usize, column: usize| {
-            blocks[block] = view.constrained(view.blocks[block], row, column, true);
-        };
-        for v in (0..pattern.n_columns()).filter(|&v| !region.contains(v)) {
-            structure.for_each_own(v, &mut put);
+        view.structure.for_each_block_between(
+            |[v, w]| !(region.contains(v) && region.contains(w)),
+            |block, row, column| {
+                blocks[block] = view.constrained(view.blocks[block], row, column, true);
+            },
+        );
+        for (&[block, row, column], share) in region.ring_blocks.iter().zip(view.outer_share) {
+            blocks[block] = view.constrained(*share, row, column, false);
         }
-        for pair in 0..pattern.n_pairs() {
-            if pattern
-                .pair(pair)
-                .iter()
-                .any(|&v| !region.contains(v as usize))
-            {
-                structure.for_each_between(pair, &mut put);
-            }
-        }
-        let mut shares = view.outer_share.iter();
-        let mut put_share = |block: usize, row: usize, column: usize| {
-            let share = shares.next().copied().unwrap_or_default();
-            blocks[block] = view.constrained(share, row, column, false);
-        };
-        region.for_each_ring_block(structure, &mut put_share);
         exterior.factor(&region.tree, blocks, scratch)?;
         self.note_diagonal(view, |v| !region.contains(v));
         self.check(view, Half::Exterior)
     }
 
     fn factor_zone(&mut self, view: &View<'_>) -> Result<(), Singular> {
-        let (structure, pattern) = (view.structure, &view.structure.pattern);
         let contains = |v: usize| view.region.is_none_or(|r| r.contains(v));
         let blocks = &mut self.blocks;
-        let mut put = |block: usize, row: usize, column: usize| {
-            blocks[block] = view.constrained(view.blocks[block], row, column, true);
-        };
-        for v in (0..pattern.n_columns()).filter(|&v| contains(v)) {
-            structure.for_each_own(v, &mut put);
-        }
-        for pair in 0..pattern.n_pairs() {
-            if pattern.pair(pair).iter().all(|&v| contains(v as usize)) {
-                structure.for_each_between(pair, &mut put);
-            }
-        }
+        view.structure.for_each_block_between(
+            |[v, w]| contains(v) && contains(w),
+            |block, row, column| {
+                blocks[block] = view.constrained(view.blocks[block], row, column, true);
+            },
+        );
         self.note_diagonal(view, contains);
-        if let Some(region) = view.region {
-            let blocks = &mut self.blocks;
-            let mut shares = view.outer_share.iter();
-            let mut take_share = |block: usize, row: usize, column: usize| {
-                let share = shares.next().copied().unwrap_or_default();
-                let share: Block<T> = view.constrained(share, row, column, false);
-                for (whole, share) in blocks[block].iter_mut().zip(share) {
-                    *whole -= share;
-                }
-            };
-            region.for_each_ring_block(structure, &mut take_share);
+        let ring = view.region.map_or(&[][..], |r| &r.ring_blocks);
+        for (&[block, row, column], share) in ring.iter().zip(view.outer_share) {
+            let share: Block<T> = view.constrained(*share, row, column, false);
+            for (whole, share) in self.blocks[block].iter_mut().zip(share) {
+                *whole -= share;
+            }
         }
         let exterior = self.exterior.as_ref().map(|(exterior, _)| exterior);
         self.zone

@@ -51,7 +51,7 @@ pub(super) struct Past {
     pub(super) rest: Stiffness<f64>,
     /// Tension in the plane of the layer, `xx, yy, zz, xy, yz, zx`, Pa.
     pub(super) tension: [Row<f64>; 6],
-    /// The last elastic stress, then the memory of each term, Pa.
+    /// The last elastic stress, then the memory of each term, Pa; empty in statics.
     pub(super) rows: Vec<Constant<f64>>,
 }
 
@@ -64,7 +64,11 @@ impl LaneBatch {
     ) -> Self {
         let has_memory = past.is_some();
         Self {
-            past: past.map(|material| Box::new(Past::new(model, material))),
+            // Statics keeps the memory in its state.
+            past: past.map(|material| {
+                let keeps_rows = tangent != Tangent::Double;
+                Box::new(Past::new(model, material, keeps_rows))
+            }),
             single: (tangent == Tangent::Single).then(|| Box::new(Numbers::new(has_memory))),
             places: (tangent != Tangent::None).then(|| Box::new([[0; WIDTH]; N_BLOCKS])),
             n: 0,
@@ -126,11 +130,7 @@ impl LaneBatch {
         let (Some(past), Some(constant)) = (&self.past, &mut self.double.constant) else {
             return;
         };
-        let scale = memory.scales[past.material];
-        for (row, rest) in self.double.stiffness.slope.iter_mut().zip(&past.rest.slope) {
-            *row = rest.map(|x| x * scale[0]);
-        }
-        self.double.stiffness.bulk = past.rest.bulk.map(|x| x * scale[1]);
+        self.double.stiffness = past.rest.scaled(memory.scales[past.material]);
         let factors = memory.step_of(past.material).map(PronyStep::factors);
         for point in 0..N_POINTS {
             for k in 0..6 {
@@ -155,11 +155,7 @@ impl LaneBatch {
         let (Some(past), Some(constant)) = (&self.past, &mut self.double.constant) else {
             return;
         };
-        let scale = memory.scales[past.material];
-        for (row, rest) in self.double.stiffness.slope.iter_mut().zip(&past.rest.slope) {
-            *row = rest.map(|x| x * scale[0]);
-        }
-        self.double.stiffness.bulk = past.rest.bulk.map(|x| x * scale[1]);
+        self.double.stiffness = past.rest.scaled(memory.scales[past.material]);
         for (lane, &pair) in self.pairs.iter().enumerate() {
             let stresses = &memory.overstress[model.first_phase[pair as usize] as usize];
             for (rows, stress) in constant.stress.iter_mut().zip(&stresses.points) {
@@ -278,6 +274,16 @@ impl<E: Number> Numbers<E> {
     }
 }
 
+impl Stiffness<f64> {
+    /// This stiffness times the factors of a step, of its deviatoric and its volumetric part.
+    fn scaled(&self, [deviatoric, volumetric]: [f64; 2]) -> Self {
+        Self {
+            slope: self.slope.map(|row| row.map(|x| x * deviatoric)),
+            bulk: self.bulk.map(|x| x * volumetric),
+        }
+    }
+}
+
 impl<E: Number> Stiffness<E> {
     fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64) {
         for (row, slope) in self.slope.iter_mut().zip(slopes) {
@@ -294,7 +300,7 @@ impl<E: Number> Stiffness<E> {
 }
 
 impl Past {
-    fn new(model: &Model, material: usize) -> Self {
+    fn new(model: &Model, material: usize, keeps_rows: bool) -> Self {
         let zero = [0.0; WIDTH];
         let prony = model.materials[material].prony.as_ref();
         let empty = Constant {
@@ -309,7 +315,7 @@ impl Past {
                 bulk: zero,
             },
             tension: [zero; 6],
-            rows: vec![empty; prony.map_or(0, Prony::n_rows)],
+            rows: vec![empty; prony.filter(|_| keeps_rows).map_or(0, Prony::n_rows)],
         }
     }
 

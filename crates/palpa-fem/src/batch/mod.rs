@@ -21,6 +21,8 @@ mod places;
 mod principal;
 mod single_pair;
 mod sums;
+#[cfg(test)]
+mod tests;
 
 use palpa_mesh::Vec3;
 use palpa_sparse::{Block, ColumnPattern};
@@ -41,9 +43,6 @@ use single_pair::{SinglePair, group_nodes, inverted};
 
 pub(crate) use history::History;
 pub(crate) use sums::{Slots, Sums};
-
-/// Flag on the place of a block that is to be added transposed.
-const TURNED: u32 = 1 << 31;
 
 /// Whether batches are for stiffness too, and in which precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

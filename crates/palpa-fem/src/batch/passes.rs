@@ -10,10 +10,10 @@ use palpa_sparse::Block;
 use palpa_sparse::fronts::Number;
 use pulp::{Simd, WithSimd};
 
-use super::TURNED;
 use super::kernel::{Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, WIDTH};
 use super::lane_batch::{LaneBatch, Numbers};
 use super::lanes::{Doubles, Lanes, Singles};
+use super::places::{add_block, index_of};
 use crate::law::Hardening;
 use crate::state::Memory;
 
@@ -175,18 +175,8 @@ impl WithSimd for Tangents<'_> {
             }
             for (rows, places) in self.local.stiffness.iter().zip(places.iter()) {
                 for (lane, &place) in places.iter().enumerate().take(batch.n) {
-                    let into = &mut self.blocks[(place & !TURNED) as usize];
-                    // Rows hold entry (r, c) at 3 r + c, blocks at r + 3 c.
-                    for r in 0..3 {
-                        for c in 0..3 {
-                            let at = if place & TURNED == 0 {
-                                r + 3 * c
-                            } else {
-                                c + 3 * r
-                            };
-                            into[at] += rows[3 * r + c][lane];
-                        }
-                    }
+                    let into = &mut self.blocks[index_of(place)];
+                    add_block(place, |r, c| rows[3 * r + c][lane], into);
                 }
             }
         }

@@ -1,11 +1,46 @@
 //! The nodes of a group in the kernel's order, and the places of its blocks in the matrix.
 
+#![expect(
+    clippy::inline_always,
+    reason = "compiled in its caller with the machine's instructions"
+)]
+
+use std::ops::AddAssign;
+
 use palpa_sparse::ColumnPattern;
 
-use super::TURNED;
 use super::kernel::{N_BLOCKS, N_NODES};
 use crate::columns::SurfaceGroup;
 use crate::model::Model;
+
+/// Flag on the place of a block that is to be added transposed.
+const TURNED: u32 = 1 << 31;
+
+/// Index of the block at a place.
+#[inline(always)]
+pub(super) fn index_of(place: u32) -> usize {
+    (place & !TURNED) as usize
+}
+
+/// Adds a 3 × 3 matrix, given by its entries `(r, c)`, to the block at a place. Entry (r, c) of a
+/// block is at `r + 3 c`.
+#[inline(always)]
+pub(super) fn add_block<E: Copy + AddAssign>(
+    place: u32,
+    entry: impl Fn(usize, usize) -> E,
+    block: &mut [E],
+) {
+    for r in 0..3 {
+        for c in 0..3 {
+            let at = if place & TURNED == 0 {
+                r + 3 * c
+            } else {
+                c + 3 * r
+            };
+            block[at] += entry(r, c);
+        }
+    }
+}
 
 /// Local columns in the order of the kernel: the first wedge's own, the two that are shared, the
 /// second's own.

@@ -3,9 +3,9 @@
 use palpa_mesh::Vec3;
 use palpa_sparse::Block;
 
-use super::TURNED;
 use super::kernel::{N_BLOCKS, N_NODES};
-use crate::assembly::{Inverted, phases_at};
+use super::places::{add_block, index_of};
+use crate::assembly::{Inverted, evaluate_group};
 use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt};
 use crate::model::Model;
@@ -31,17 +31,15 @@ impl SinglePair {
         response: &mut GroupResponse,
         with_tangent: bool,
     ) -> Result<(), Inverted> {
-        let pair = self.pair as usize;
-        phases_at(model, memory, pair, phases);
-        let (group, nodes) = group_nodes(model, pair);
-        crate::element::evaluate(
-            group.shape,
-            &model.geometries[pair],
-            &nodes.map(|n| displacements[n]),
+        let index = self.pair as usize;
+        evaluate_group(
+            model,
+            memory,
+            index,
+            displacements,
             phases,
-            model.params.alpha,
-            with_tangent,
             response,
+            with_tangent,
         );
         if response.energy.is_finite() {
             Ok(())
@@ -52,18 +50,9 @@ impl SinglePair {
 
     /// Adds the stiffness of a response to the matrix.
     pub(super) fn add_blocks(&self, response: &GroupResponse, blocks: &mut [Block<f32>]) {
-        for (place, block) in self.blocks.iter().zip(&response.stiffness) {
-            let into = &mut blocks[(place & !TURNED) as usize];
-            for r in 0..3 {
-                for c in 0..3 {
-                    let at = if place & TURNED == 0 {
-                        r + 3 * c
-                    } else {
-                        c + 3 * r
-                    };
-                    into[at] += block[(r, c)] as f32;
-                }
-            }
+        for (&place, block) in self.blocks.iter().zip(&response.stiffness) {
+            let into = &mut blocks[index_of(place)];
+            add_block(place, |r, c| block[(r, c)] as f32, into);
         }
     }
 }

@@ -11,12 +11,13 @@ use palpa_mesh::Vec3;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::Batches;
 use super::kernel::{Local, N_NODES, WIDTH};
 use super::lane_batch::LaneBatch;
 use super::lanes::Doubles;
 use super::passes::run;
+use super::places::{add_block, index_of};
 use super::single_pair::{SinglePair, group_nodes, inverted};
-use super::{Batches, TURNED};
 use crate::Mat3;
 use crate::assembly::Inverted;
 use crate::element::GroupResponse;
@@ -188,21 +189,10 @@ fn add_batch(batch: &LaneBatch, slot: &Local<f64>, sums: &mut Sums<'_>) {
     };
     for (rows, places) in slot.stiffness.iter().zip(places.iter()) {
         for (lane, &place) in places.iter().enumerate().take(batch.n.min(WIDTH)) {
-            let Some(into) = blocks.get_mut((place & !TURNED) as usize) else {
+            let Some(into) = blocks.get_mut(index_of(place)) else {
                 continue; // a node that cannot move
             };
-            let into = into.as_mut_slice();
-            // Rows hold entry (r, c) at 3 r + c, blocks at r + 3 c.
-            for r in 0..3 {
-                for c in 0..3 {
-                    let at = if place & TURNED == 0 {
-                        r + 3 * c
-                    } else {
-                        c + 3 * r
-                    };
-                    into[at] += rows[3 * r + c][lane];
-                }
-            }
+            add_block(place, |r, c| rows[3 * r + c][lane], into.as_mut_slice());
         }
     }
 }

@@ -6,7 +6,7 @@
 //!    and [`Law`]. Without `Described::hardening` all works, but slower while the mesh moves: the
 //!    step then evaluates the law one pair at a time.
 //! 2. Tests: the lists `every_law` of `tests/it/law.rs`, `laws` of `element/tests.rs` and `cases` of
-//!    `realtime/tests.rs`, which run all tests of laws over it; its closed forms in
+//!    `batch/tests.rs`, which run all tests of laws over it; its closed forms in
 //!    `tests/it/law/closed_forms.rs`. Now it can be used from Rust.
 //! 3. For scenes: `palpa-scene/src/law.rs` (the compiler asks for the rest there), and a parameter
 //!    that no law has yet in `PARAMETERS`, with its count, of `parameters.rs`; then an arm in

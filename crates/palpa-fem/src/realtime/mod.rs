@@ -25,9 +25,6 @@ mod local;
 mod outside;
 mod plan;
 
-#[cfg(test)]
-mod tests;
-
 pub use live::{
     ExteriorMode, FineBodies, Glance, Live, LiveParams, LiveReport, Rebuild, Rebuilt, RoamDone,
     RoamJob, Roaming, StepOutcome,

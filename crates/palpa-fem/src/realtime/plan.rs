@@ -5,7 +5,7 @@ use palpa_sparse::fronts::Tree;
 use palpa_sparse::{Block, ColumnPattern, Singular, TooLarge};
 
 use crate::assembly::Inverted;
-use crate::columns::SurfaceGroup;
+use crate::columns::{SurfaceGroup, places};
 use crate::model::Model;
 
 /// Stiffness of the springs that hold a supported node, relative to its own.
@@ -71,8 +71,7 @@ impl Plan {
         if !is_inside.contains(&true) {
             is_inside.fill(true);
         }
-        let places: Vec<[f64; 3]> = points.iter().map(|p| (*p).into()).collect();
-        let tree = Tree::zone_last(pattern, &places, &is_inside)?;
+        let tree = Tree::zone_last(pattern, &places(&model.body.skin), &is_inside)?;
         let nodes = |keep: &dyn Fn(usize) -> bool| -> Vec<[u32; 2]> {
             (0..points.len())
                 .filter(|&v| keep(v))
@@ -105,9 +104,7 @@ impl Plan {
 
     /// Whether all columns of a group are in the zone.
     pub(super) fn holds(&self, group: &SurfaceGroup) -> bool {
-        group.vertices[..group.n_columns()]
-            .iter()
-            .all(|&v| self.is_inside[v as usize])
+        group.is_within(&self.is_inside)
     }
 
     /// Adds stiff springs where nodes are supported.

@@ -59,10 +59,9 @@ impl Workspace {
         let is_inside: Vec<bool> = skin.iter().map(is_near).collect();
         let n_inside = is_inside.iter().filter(|inside| **inside).count();
         let is_worth_it = n_inside > 0 && (n_inside as f64) < LARGEST_SHARE * skin.len() as f64;
-        let places: Vec<[f64; 3]> = skin.iter().map(|p| (*p).into()).collect();
         // A region whose factor would be too large is left out.
         let region = is_worth_it
-            .then(|| Region::new(&model.structure, &places, is_inside).ok())
+            .then(|| Region::new(&model.structure, &model.body.skin, is_inside).ok())
             .flatten();
         Self::with_region(model, region)
     }
