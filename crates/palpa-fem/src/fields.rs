@@ -106,10 +106,9 @@ fn stretches(f: &Mat3) -> [f64; 3] {
 /// If the body has no held cut faces, all of them equal the force of the tool, which passes through
 /// all layers.
 pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
-    let mut forces = vec![Vec3::zeros(); model.body.n_levels];
-    let mut phases = Vec::with_capacity(4);
-    let mut response = GroupResponse::new();
-    for (i, level) in forces.iter_mut().enumerate().take(model.body.n_levels - 1) {
+    let below = |i: usize| {
+        let (mut phases, mut response) = (Vec::with_capacity(4), GroupResponse::new());
+        let mut sum = Vec3::zeros();
         for (g, group) in model.structure.groups.iter().enumerate() {
             evaluate_group(
                 model,
@@ -121,10 +120,14 @@ pub fn level_forces(model: &Model, state: &State, ws: &Workspace) -> Vec<Vec3> {
                 false,
             );
             for node in (0..group.n_nodes()).step_by(2) {
-                *level -= response.forces[node];
+                sum -= response.forces[node];
             }
         }
-    }
+        sum
+    };
+    let intervals = (0..model.body.n_levels - 1).into_par_iter();
+    let mut forces: Vec<Vec3> = intervals.map(below).collect();
+    forces.push(Vec3::zeros());
     let base = model.body.n_levels - 1;
     for v in 0..model.body.n_vertices() {
         forces[base] += ws.reactions()[model.body.node(v, base)];

@@ -6,7 +6,7 @@ use palpa_mesh::Vec3;
 /// The result of a solve.
 #[derive(Debug)]
 pub(crate) struct Solution {
-    /// `M x`.
+    /// `x`.
     pub(crate) vector: Vec<Vec3>,
     /// Norm of the residual, relative to that of the right side.
     pub(crate) residual: f64,
@@ -20,14 +20,14 @@ fn norm(a: &[Vec3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Solves `A x = b` (Saad & Schultz 1986). `apply` is `A M⁻¹` with an approximation M of A; the
-/// result is `M x`. Stops when the relative residual is `tolerance`, when the basis has `most`
-/// vectors, or when these would not be enough at the present rate.
+/// Solves `A x = b` (Saad & Schultz 1986). `apply(r, z, y)` sets `z = M⁻¹ r` with an approximation
+/// M of A, and adds `A z` to `y`. Keeping all `z` saves a last `M⁻¹` (Saad 1993). Stops when the relative residual is `tolerance`, when the basis has `most` vectors, or
+/// when these would not be enough at the present rate.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,
     most: usize,
-    mut apply: impl FnMut(&[Vec3], &mut Vec<Vec3>),
+    mut apply: impl FnMut(&[Vec3], &mut [Vec3], &mut [Vec3]),
 ) -> Solution {
     let size = norm(b);
     let mut solution = vec![Vec3::zeros(); b.len()];
@@ -38,14 +38,17 @@ pub(crate) fn gmres(
         };
     }
     let mut basis: Vec<Vec<Vec3>> = vec![b.iter().map(|x| x / size).collect()];
+    let mut directions: Vec<Vec<Vec3>> = Vec::new();
     // Columns of the triangular factor, rotations (cosine, sine), and the rotated right side.
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut rotations: Vec<(f64, f64)> = Vec::new();
     let mut right = vec![size];
     while columns.len() < most {
         let j = columns.len();
-        let mut next = Vec::new();
-        apply(&basis[j], &mut next);
+        let mut direction = vec![Vec3::zeros(); b.len()];
+        let mut next = vec![Vec3::zeros(); b.len()];
+        apply(&basis[j], &mut direction, &mut next);
+        directions.push(direction);
         let mut column = Vec::with_capacity(j + 2);
         for vector in &basis {
             let share = dot(&next, vector);
@@ -89,8 +92,8 @@ pub(crate) fn gmres(
         let known: f64 = (i + 1..n).map(|j| columns[j][i] * weights[j]).sum();
         weights[i] = (right[i] - known) / columns[i][i];
     }
-    for (vector, weight) in basis.iter().zip(weights) {
-        for (x, v) in solution.iter_mut().zip(vector) {
+    for (direction, weight) in directions.iter().zip(weights) {
+        for (x, v) in solution.iter_mut().zip(direction) {
             *x += v * weight;
         }
     }
@@ -116,12 +119,19 @@ mod tests {
             let share = dot(&c, x);
             x.iter().zip(&a).map(|(x, a)| x + a * share).collect()
         };
+        // M = 2 I.
+        let halved = |x: &[Vec3], half: &mut [Vec3], out: &mut [Vec3]| {
+            for (half, x) in half.iter_mut().zip(x) {
+                *half = x / 2.0;
+            }
+            out.copy_from_slice(&apply(half));
+        };
         let Solution {
             vector: x,
             residual,
-        } = gmres(&b, 1e-12, 40, |x, out| *out = apply(x));
+        } = gmres(&b, 1e-12, 40, halved);
         assert!(residual < 1e-12);
-        let one = gmres(&b, 1e-12, 1, |x, out| *out = apply(x));
+        let one = gmres(&b, 1e-12, 1, halved);
         let error: f64 = apply(&x).iter().zip(&b).map(|(x, b)| (x - b).norm()).sum();
         assert!(error < 1e-10, "{error}");
         let left: f64 = apply(&one.vector)

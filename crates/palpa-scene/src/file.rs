@@ -25,7 +25,7 @@ pub(crate) use self::tool::{LumpShapeName, LumpTable, ToolTable};
 use crate::Status;
 use crate::model::ModelKind;
 use crate::scene::{CutFaces, InPlane, LengthUnit, Solver};
-use crate::units::{Kind, Length, Pressure, Quantity, Rate, Time, Velocity};
+use crate::units::{Kind, Length, Pressure, Quantity, Rate, Share, Time, Velocity};
 
 /// A scene of Palpa: the body, its layers, the tool and the press.
 ///
@@ -258,7 +258,7 @@ pub(crate) struct ModelTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) damping: Option<DampingTable>,
     /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
-    /// forces in the body, 0.000000000001 to 0.001. Default: 0.00000001.
+    /// forces in the body, 0.000000000001 to 0.001. Default: 0.000001.
     pub(crate) tolerance: f64,
 }
 
@@ -269,7 +269,7 @@ impl Default for ModelTable {
             alpha: 0.8,
             dynamics: DynamicsName::default(),
             damping: None,
-            tolerance: 1e-8,
+            tolerance: 1e-6,
         }
     }
 }
@@ -321,6 +321,14 @@ pub(crate) struct MeshTable {
     /// Largest number of skin vertices after refinement, 100 to 500000. At this limit refinement
     /// stops. Default: 20000.
     pub(crate) max_vertices: u32,
+    /// Error bar that `palpa press` may leave: half its width at the deepest, as a share of the
+    /// force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so
+    /// `near_tool` cannot be given too. Default: sizes as given here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) accuracy: Option<Share>,
+    /// Longest time for the choice of a mesh by `accuracy`, 1 s to 86400 s. Default: no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) max_time: Option<Time>,
     /// Whether the fine part near the tool moves with it in real time, so that the hand may go
     /// anywhere. If false, the body is fine along the whole way of the scene's motion. Default:
     /// false.
@@ -335,6 +343,8 @@ impl Default for MeshTable {
             near_lumps: None,
             growth: 0.5,
             max_vertices: 20_000,
+            accuracy: None,
+            max_time: None,
             moves: false,
         }
     }

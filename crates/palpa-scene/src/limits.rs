@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::units::{
-    Angle, Density, Kind, Length, Pressure, Quantity, Rate, SpringConstant, Time, Velocity,
+    Angle, Density, Kind, Length, Pressure, Quantity, Rate, Share, SpringConstant, Time, Velocity,
 };
 
 /// Largest size of a scene file, bytes.
@@ -102,6 +102,8 @@ pub(crate) const DAMPING_STIFFNESS: Limits<Time> = between(0.0, 10.0);
 pub(crate) const EDGE_LENGTH: Limits<Length> = between(0.1e-3, 0.1);
 pub(crate) const GROWTH: Limits<f64> = numbers(0.02, 5.0);
 pub(crate) const MESH_VERTICES: Limits<u32> = numbers(100, 500_000);
+pub(crate) const ACCURACY: Limits<Share> = between(0.002, 0.5);
+pub(crate) const SEARCH_TIME: Limits<Time> = between(1.0, 86_400.0);
 pub(crate) const CYCLES: Limits<u32> = numbers(1, 100);
 pub(crate) const DEPTH: Limits<Length> = between(1e-6, 0.5);
 pub(crate) const SPEED: Limits<Velocity> = between(1e-5, 1.0);
@@ -217,6 +219,8 @@ mod tests {
         says("MeshTable", "near_lumps", &EDGE_LENGTH);
         says("MeshTable", "growth", &GROWTH);
         says("MeshTable", "max_vertices", &MESH_VERTICES);
+        says("MeshTable", "accuracy", &ACCURACY);
+        says("MeshTable", "max_time", &SEARCH_TIME);
         says("PressTable", "at", &format!("within {}", COORDINATE.max));
         says("PressTable", "depth", &DEPTH);
         says("PressTable", "speed", &SPEED);

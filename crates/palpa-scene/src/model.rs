@@ -68,6 +68,11 @@ pub struct Mesh {
     pub growth: f64,
     /// Largest number of skin vertices after refinement.
     pub max_vertices: usize,
+    /// Half the width of the error bar that may be left at the deepest, as a share of the force;
+    /// `None` if the sizes above are kept.
+    pub accuracy: Option<f64>,
+    /// Longest time for the choice of a mesh by accuracy, s; `None` without limit.
+    pub max_time: Option<f64>,
     /// Whether the fine part near the tool moves with it in real time; if false, the body is fine
     /// along the whole way of the motion.
     pub moves: bool,
@@ -78,6 +83,34 @@ impl Mesh {
     const FINEST: f64 = 0.5e-3;
     /// Largest automatic edge length near a tool, m.
     const COARSEST: f64 = 10e-3;
+
+    /// Checks accuracy and time limit against the ranges of the scene file, for a program that has
+    /// set its own values.
+    ///
+    /// # Errors
+    /// The value that is out of range, and the range; or that the mesh may not be refined.
+    pub fn check(&self) -> Result<(), String> {
+        use crate::limits::{ACCURACY, SEARCH_TIME};
+        use crate::units::{Share, Time};
+        let accuracy = self.accuracy.map(Share::from_si);
+        if let Some(accuracy) = accuracy.filter(|accuracy| !ACCURACY.contains(accuracy)) {
+            return Err(format!(
+                "an accuracy of {accuracy} is outside the allowed range {ACCURACY}"
+            ));
+        }
+        let time = self.max_time.map(Time::from_si);
+        if let Some(time) = time.filter(|time| !SEARCH_TIME.contains(time)) {
+            return Err(format!(
+                "a time limit of {time} is outside the allowed range {SEARCH_TIME}"
+            ));
+        }
+        if accuracy.is_some() && !self.refine {
+            return Err(
+                "an accuracy needs a mesh that may be refined; remove refine = false".to_owned(),
+            );
+        }
+        Ok(())
+    }
 
     /// Wanted length near `tool` in metres, as given or by default. Default: a quarter of the
     /// [contact radius](Tool::contact_radius), at most a third of the radius of the rounded edge,

@@ -117,6 +117,12 @@ kind!(
     &[("kg/m³", 1.0, 1.0)],
     |number, unit| Some(parse::<si::MassDensity>(number, unit)?.value)
 );
+kind!(
+    /// A share of a whole, as a number.
+    Share, ShareKind, "a share", "3 %", "%",
+    &[("%", 0.01, 0.0)],
+    |number, unit| (unit == "%").then_some(number / 100.0)
+);
 
 /// A value in SI that is written as a text with a unit.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]

@@ -16,7 +16,7 @@ use crate::file::{
 };
 use crate::model::{Dynamics, Mesh, Model};
 use crate::scene::{Body, Generator, Layer, Press, Reference, Scene, Skin, Target};
-use crate::units::{Length, Pressure, Rate, Time, Velocity};
+use crate::units::{Length, Pressure, Rate, Share, Time, Velocity};
 
 pub(crate) fn to_toml(scene: &Scene, names: Names) -> String {
     let file = SceneFile {
@@ -105,6 +105,8 @@ fn mesh(mesh: &Mesh) -> MeshTable {
         near_lumps: mesh.near_lumps.map(Length::from_si),
         growth: mesh.growth,
         max_vertices: u32::try_from(mesh.max_vertices).unwrap_or(u32::MAX),
+        accuracy: mesh.accuracy.map(Share::from_si),
+        max_time: mesh.max_time.map(Time::from_si),
         moves: mesh.moves,
     }
 }

@@ -24,7 +24,7 @@ use crate::continuum;
 use crate::note::{Note, in_words};
 use crate::press::Place;
 use crate::press::lump::{lump_shares, surface_of_shape};
-use crate::press::mesh::PressedBody;
+use crate::press::mesh::{PressedBody, Sizes};
 use crate::touch::Way;
 
 /// Parameters of the preparation.
@@ -91,11 +91,24 @@ impl Prepared {
     /// # Errors
     /// When place, depth, tissues or lumps do not fit the body.
     pub fn on(scene: &Scene, grown: Arc<BuiltBody>, way: &[f64]) -> anyhow::Result<Self> {
+        Self::with_sizes(scene, grown, Sizes::of(scene), way)
+    }
+
+    /// As [`Self::on`], with other sizes of the mesh near the tool.
+    ///
+    /// # Errors
+    /// As [`Self::on`].
+    pub fn with_sizes(
+        scene: &Scene,
+        grown: Arc<BuiltBody>,
+        sizes: Option<Sizes>,
+        way: &[f64],
+    ) -> anyhow::Result<Self> {
         let mut notes = grown.notes.clone();
         let materials = continuum::materials(scene)?;
         let lumps = continuum::lumps(scene, &grown, &mut notes)?;
         let (lumps, drawn): (Vec<Lump>, Vec<Option<Surface>>) = lumps.into_iter().unzip();
-        let mesh = PressedBody::build(scene, &grown, &lumps, way, &mut notes)?;
+        let mesh = PressedBody::build(scene, &grown, &lumps, sizes, way, &mut notes)?;
         let supports = continuum::supports(scene.body.cut_faces, &mesh.body, &mut notes);
         Ok(Self {
             scene: scene.clone(),

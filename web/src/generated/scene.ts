@@ -47,7 +47,7 @@ export interface components {
              *       "alpha": 0.8,
              *       "dynamics": "quasi-static",
              *       "kind": "tissue",
-             *       "tolerance": 1e-8
+             *       "tolerance": 0.000001
              *     }
              */
             model?: components["schemas"]["ModelTable"];
@@ -345,11 +345,21 @@ export interface components {
         /** @description Mesh size near the tool and lumps. The mesh is never made coarser than the body's own. */
         MeshTable: {
             /**
+             * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here.
+             * @example 3 %
+             */
+            accuracy?: string;
+            /**
              * Format: double
              * @description Increase of the wanted length with the distance from the tool or lump, as a share of that distance, 0.02 to 5. Default: 0.5.
              * @default 0.5
              */
             growth?: number;
+            /**
+             * @description Longest time for the choice of a mesh by `accuracy`, 1 s to 86400 s. Default: no limit.
+             * @example 0.5 s
+             */
+            max_time?: string;
             /**
              * Format: uint32
              * @description Largest number of skin vertices after refinement, 100 to 500000. At this limit refinement stops. Default: 20000.
@@ -401,8 +411,8 @@ export interface components {
             kind?: components["schemas"]["ModelKind"];
             /**
              * Format: double
-             * @description Tolerance of the force balance: the largest unbalanced force at a free node, relative to the forces in the body, 0.000000000001 to 0.001. Default: 0.00000001.
-             * @default 1e-8
+             * @description Tolerance of the force balance: the largest unbalanced force at a free node, relative to the forces in the body, 0.000000000001 to 0.001. Default: 0.000001.
+             * @default 0.000001
              */
             tolerance?: number;
         };

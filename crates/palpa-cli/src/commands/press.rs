@@ -9,8 +9,8 @@ mod words;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
-use palpa_scene::units::{Length, Time, Velocity};
+use anyhow::{Context as _, anyhow, bail};
+use palpa_scene::units::{Length, Share, Time, Velocity};
 use palpa_scene::{Generator, ModelKind, Scene, Skin, Target};
 
 use super::Outcome;
@@ -57,6 +57,13 @@ pub struct Args {
     /// again as the press
     #[arg(long)]
     error_bar: bool,
+    /// Choose the mesh so that the error bar at the deepest is no wider than this share of the
+    /// force: "3 %"
+    #[arg(long, value_name = "SHARE")]
+    accuracy: Option<Share>,
+    /// Longest time for the choice of the mesh, with a unit: "60 s"
+    #[arg(long, value_name = "TIME")]
+    max_time: Option<Time>,
     /// Number of deformed bodies in the ParaView series, including rest and the deepest; 0 for none
     #[arg(long, default_value_t = 9, value_name = "N")]
     frames: usize,
@@ -148,10 +155,33 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         press.hold = hold.si();
     }
     press.retract &= !args.no_retract;
+    set_accuracy(&mut scene, args)?;
+    let press = &scene.press;
     if let Err(problem) = press.check() {
         bail!("{problem}; see --depth, --step, --speed and --hold");
     }
     Ok(scene)
+}
+
+/// Sets accuracy and time limit from the command line.
+fn set_accuracy(scene: &mut Scene, args: &Args) -> anyhow::Result<()> {
+    let mesh = &mut scene.mesh;
+    if let Some(accuracy) = args.accuracy {
+        mesh.accuracy = Some(accuracy.si());
+        // The command line is stronger than the scene.
+        mesh.near_tool = None;
+    }
+    if let Some(time) = args.max_time {
+        mesh.max_time = Some(time.si());
+    }
+    mesh.check()
+        .map_err(|problem| anyhow!("{problem}; see --accuracy and --max-time"))?;
+    if mesh.accuracy.is_some() && scene.model.kind == ModelKind::Reference {
+        bail!(
+            "--accuracy needs the model `tissue`; the method of 2009 has the mesh of its surface"
+        );
+    }
+    Ok(())
 }
 
 /// Lets the embedded forearm grow from a coarser skin than in its scene. Bars need fine triangles

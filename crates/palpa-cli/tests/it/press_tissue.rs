@@ -116,7 +116,7 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
 }
 
 /// The columns of press.csv before the layers: programs read them by these names.
-const COLUMNS: [&str; 32] = [
+const COLUMNS: [&str; 31] = [
     "run",
     "speed_mm_s",
     "phase",
@@ -145,9 +145,8 @@ const COLUMNS: [&str; 32] = [
     "volume_ratio_min",
     "volume_ratio_max",
     "error_bar_n",
-    "error_skin_near_n",
+    "error_near_n",
     "error_skin_far_n",
-    "error_levels_near_n",
     "error_levels_deep_n",
 ];
 
@@ -548,4 +547,43 @@ fn the_shipped_scenes_without_files_can_be_set_up() {
         n += 1;
     }
     assert!(n >= 4, "{n}");
+}
+
+#[test]
+fn a_mesh_is_chosen_for_an_accuracy_or_refused() {
+    let press = tissue();
+    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
+        .press(2.0)
+        .set("press", "step", "1 mm")
+        .set("press", "hold", "0 s");
+    let report = press.report(&scene, &["--frames", "0", "--accuracy", "40 %"]);
+    let choice = &report["mesh_choice"];
+    assert_eq!(choice["end"]["kind"], "reached");
+    let best = choice["best"].as_u64().unwrap() as usize;
+    assert_eq!(
+        choice["rounds"][best]["n_nodes"],
+        report["press"]["n_nodes"]
+    );
+    let half_width = number(&choice["rounds"][best]["half_width"]);
+    let deepest = (report["samples"].as_array().unwrap().iter())
+        .find(|s| number(&s["depth_mm"]) > 1.99)
+        .unwrap();
+    let bar = number(&deepest["error_bar_n"]) / number(&deepest["force_n"]);
+    assert!(half_width <= 0.4 && (bar - half_width).abs() < 0.01 * bar);
+    let scene = scene.set("mesh", "max_vertices", Toml::raw("100"));
+    let press = tissue();
+    let file = press.bench.file("few", scene);
+    let (code, tried, said) = press.run(&[file, "--accuracy", "0.2 %"]);
+    assert_eq!(code, 2, "{said}");
+    assert!(tried.contains("error bar of ±0.2 %"), "{tried}");
+    assert!(
+        said.contains("an accuracy of 0.2 % was not reached"),
+        "{said}"
+    );
+    assert!(said.contains("raise max_vertices"), "{said}");
+    let said = press.refusal(&[file, "--accuracy", "0 %"]);
+    assert!(
+        said.contains("outside the allowed range 0.2 % to 50 %"),
+        "{said}"
+    );
 }

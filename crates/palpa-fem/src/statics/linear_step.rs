@@ -57,18 +57,15 @@ impl Newton<'_> {
             } else {
                 (GMRES_TOLERANCE, GMRES_VECTORS)
             };
-            let solution = gmres(&carried, tolerance, most, |x, out| {
-                system.solve(structure, x, delta);
-                keep_free(holds, delta);
-                out.clear();
-                out.resize(x.len(), Vec3::zeros());
-                structure.multiply(&system.blocks, delta, out);
+            let solution = gmres(&carried, tolerance, most, |force, step, out| {
+                system.solve(structure, force, step);
+                keep_free(holds, step);
+                structure.multiply(&system.blocks, step, out);
                 couple(&sliding, out);
                 keep_free(holds, out);
             });
             is_solved = solution.residual <= tolerance;
-            system.solve(structure, &solution.vector, delta);
-            keep_free(holds, delta);
+            *delta = solution.vector;
         }
         for (delta, demand) in delta.iter_mut().zip(demand.iter()) {
             *delta += demand;

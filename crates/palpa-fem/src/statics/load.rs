@@ -36,6 +36,8 @@ pub struct SolveParams {
     /// preconditioner of the next systems, as long as that pays. The cost of a factor grows faster
     /// with the body than the cost of using it.
     pub keep_factor_from: usize,
+    /// Whether the state begins near equilibrium, so that the first factor serves all iterations.
+    pub is_near: bool,
 }
 
 impl Default for SolveParams {
@@ -45,6 +47,7 @@ impl Default for SolveParams {
             gap_tolerance: 1e-8,
             max_iterations: 40,
             keep_factor_from: 10_000,
+            is_near: false,
         }
     }
 }

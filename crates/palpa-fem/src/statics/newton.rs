@@ -265,8 +265,8 @@ impl Newton<'_> {
         let model = self.model;
         let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
         // The first step of a load is the largest. After it, the stiffness is near that at the end.
-        let is_kept =
-            is_large && ws.system.region.is_none() && ws.system.is_factored && self.iterations != 2;
+        let is_large = is_large && ws.system.region.is_none() && self.iterations != 2;
+        let is_kept = ws.system.is_factored && (is_large || self.params.is_near);
         let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.holds);
         if !(is_usable && self.solve(ws, true)) {
             match ws.system.refactor(&model.structure, &ws.holds) {

@@ -22,6 +22,7 @@ mod report;
 mod thickness;
 mod untangle;
 
+use rayon::prelude::*;
 use thiserror::Error;
 
 pub use report::{GrowthReport, LayerReport, Moved, Spread, Worst};
@@ -256,6 +257,7 @@ pub fn grow(
     let (lines, core): (Vec<Column>, Option<RigidCore>) = if reaches_bone {
         let core = RigidCore::build(bones, &cuts);
         let lines = (0..skin.points.len())
+            .into_par_iter()
             .map(|v| columns::column_to_core(v, skin.points[v], directions[v], &core, &confinement))
             .collect();
         (lines, Some(core))

@@ -47,6 +47,16 @@ impl Reader<'_> {
             None => Ok(None),
             Some(length) => Ok(Some(at.key(key).within(length, &limits::EDGE_LENGTH)?.si())),
         };
+        if let (Some(_), Some(near_tool)) = (mesh.accuracy, mesh.near_tool) {
+            return Err(at.key("near_tool").invalid(format!(
+                "{near_tool} beside `accuracy`, which chooses this length; remove one of the two"
+            )));
+        }
+        if mesh.accuracy.is_some() && !mesh.refine {
+            return Err(at.key("refine").invalid(
+                "false beside `accuracy`, which needs a mesh that may be refined; remove one of the two",
+            ));
+        }
         Ok(Mesh {
             refine: mesh.refine,
             near_tool: edge("near_tool", mesh.near_tool)?,
@@ -56,6 +66,14 @@ impl Reader<'_> {
                 .key("max_vertices")
                 .within(mesh.max_vertices, &limits::MESH_VERTICES)?
                 as usize,
+            accuracy: match mesh.accuracy {
+                None => None,
+                Some(share) => Some(at.key("accuracy").within(share, &limits::ACCURACY)?.si()),
+            },
+            max_time: match mesh.max_time {
+                None => None,
+                Some(time) => Some(at.key("max_time").within(time, &limits::SEARCH_TIME)?.si()),
+            },
             moves: mesh.moves,
         })
     }

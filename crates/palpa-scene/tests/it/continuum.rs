@@ -99,6 +99,8 @@ fn everything_is_understood_and_survives_being_written() {
         near_lumps: Some(1.5e-3),
         growth: 0.5,
         max_vertices: 5000,
+        accuracy: None,
+        max_time: Some(90.0),
         moves: true,
     };
     assert_eq!(scene.mesh, mesh);
@@ -285,7 +287,7 @@ fn a_scene_of_old_has_the_defaults_of_the_continuum() {
     let scene = Scene::embedded();
     assert_eq!(scene.model.kind, ModelKind::Tissue);
     assert_eq!(scene.model.dynamics, Dynamics::QuasiStatic);
-    assert_eq!((scene.model.alpha, scene.model.tolerance), (0.8, 1e-8));
+    assert_eq!((scene.model.alpha, scene.model.tolerance), (0.8, 1e-6));
     assert!(scene.lumps.is_empty() && scene.press.speeds.is_empty());
     assert_eq!(scene.press.cycles, 1);
     assert_eq!(scene.mesh.near_tool_of(&scene.tool), Some(2e-3));

@@ -440,6 +440,18 @@ fn wrong_programmes_models_and_meshes() {
         ("[reference]", "[mesh]\nnear_lumps = \"1 m\"\n[reference]"),
         ("[reference]", "[mesh]\ngrowth = 0\n[reference]"),
         ("[reference]", "[mesh]\nmax_vertices = 10\n[reference]"),
+        ("[reference]", "[mesh]\naccuracy = 0.02\n[reference]"),
+        ("[reference]", "[mesh]\naccuracy = \"0 %\"\n[reference]"),
+        ("[reference]", "[mesh]\naccuracy = \"-2 %\"\n[reference]"),
+        ("[reference]", "[mesh]\nmax_time = \"0.2 s\"\n[reference]"),
+        (
+            "[reference]",
+            "[mesh]\naccuracy = \"2 %\"\nnear_tool = \"1 mm\"\n[reference]",
+        ),
+        (
+            "[reference]",
+            "[mesh]\naccuracy = \"2 %\"\nrefine = false\n[reference]",
+        ),
         ("[reference]", "[mesh]\nnear_lump = \"1 mm\"\n[reference]"),
     ]);
     insta::assert_snapshot!(said);

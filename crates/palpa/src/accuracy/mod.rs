@@ -1,7 +1,7 @@
 //! Error bars: how far the force of a press may be from that of an infinitely fine mesh.
 //!
-//! A *probe* is the same press on a mesh that is finer in one respect: triangles near the tool,
-//! triangles around it, intervals between levels near the skin, or deep ones, each divided in two.
+//! A *probe* is the same press on a mesh that is finer in one respect: prisms near the tool,
+//! triangles of the skin around it, or deep intervals between levels, each divided in two.
 //! The change of the force is that respect's contribution. Probes cover the part of the body near
 //! the tool; its border moves as in the press. They start from the press's own displacements, which
 //! a finer mesh of the same body can take over.
@@ -13,11 +13,13 @@
 //! error is taken over. Errors of the scene (its surface, thicknesses, stiffnesses) are not in the
 //! bar.
 
+mod choice;
 mod probe;
 
 use serde::Serialize;
 
-use crate::press::Phase;
+pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
+use self::probe::Base;
 use crate::press::tissue::{Record, Sample};
 
 /// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
@@ -33,24 +35,22 @@ const SAME_DEPTH: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// Edges of the skin's triangles near the tool.
-    SkinNear,
+    /// Edges of the skin's triangles near the tool, and heights of the intervals between levels near
+    /// the skin. They are made finer together, because the error of a prism depends on its shape: of
+    /// edges or heights alone, the change is often many times the error, with opposite signs.
+    Near,
     /// Edges of the skin's triangles around that.
     SkinFar,
-    /// Heights of the intervals between levels near the skin.
-    LevelsNear,
     /// Heights of the deeper intervals.
     LevelsDeep,
 }
 
+/// Number of sources.
+pub const N_SOURCES: usize = 3;
+
 impl Source {
     /// All sources, in the order of every list of contributions.
-    pub const ALL: [Self; 4] = [
-        Self::SkinNear,
-        Self::SkinFar,
-        Self::LevelsNear,
-        Self::LevelsDeep,
-    ];
+    pub const ALL: [Self; N_SOURCES] = [Self::Near, Self::SkinFar, Self::LevelsDeep];
 }
 
 /// Contributions to the error at one depth.
@@ -62,7 +62,7 @@ pub struct Probed {
     pub force_n: f64,
     /// Relative change of the force by each probe, in the order of [`Source::ALL`]; `None` if its
     /// probe found no equilibrium.
-    pub changes: [Option<f64>; 4],
+    pub changes: [Option<f64>; N_SOURCES],
 }
 
 impl Probed {
@@ -79,7 +79,7 @@ pub struct ErrorBar {
     /// Half the width of the bar, N.
     pub half_width_n: f64,
     /// Signed contributions, N, in the order of [`Source::ALL`].
-    pub contributions_n: [f64; 4],
+    pub contributions_n: [f64; N_SOURCES],
 }
 
 /// The error bars of a press.
@@ -92,33 +92,61 @@ pub struct ErrorBars {
 }
 
 impl ErrorBars {
-    /// Probes the first press down of a record. `progress` is called before each probe with its
-    /// number and the number of all; if it returns false, the probes are given up. `None` if they
-    /// were, or if no sample converged.
+    /// Probes the first press down of a record that keeps displacements. `known` are contributions
+    /// at its deepest, if they have been found before. `progress` is called before each probe with
+    /// its number and the number of all; if it returns false, the probes are given up. `None` if
+    /// they were, or if no sample converged.
+    ///
+    /// # Panics
+    /// If the record is not [`Record::with_displacements`].
     pub fn estimate(
         record: &Record<'_>,
+        known: Option<&Self>,
         mut progress: impl FnMut(usize, usize) -> bool,
     ) -> Option<Self> {
-        let samples = probed_samples(record)?;
-        probe::run(record, &samples, &mut progress)
+        let press = record.indentation();
+        let mut ws = press.workspace();
+        let known = known.into_iter().flat_map(|bars| &bars.probed);
+        let mut bars = Self {
+            probed: known.cloned().collect(),
+            n_nodes: 0,
+        };
+        let mut bases = Vec::new();
+        for index in probed_samples(record)? {
+            let depth_mm = record.samples[index].depth_mm;
+            let is_same = |probed: &Probed| (probed.depth_mm - depth_mm).abs() < SAME_DEPTH;
+            if !bars.probed.iter().any(is_same) {
+                let guess = Some(record.displacements(index));
+                bases.extend(Base::find(press, &mut ws, depth_mm * 1e-3, guess));
+            }
+        }
+        drop(ws);
+        let found = probe::run(press, &bases, &mut progress)?;
+        bars.probed.extend(found.probed);
+        bars.probed
+            .sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
+        bars.n_nodes = found.n_nodes;
+        Some(bars)
     }
 
-    /// Enters the bars into the samples of a press.
+    /// Enters the bars into the samples of a press. Each run has the forces of its own press down.
     pub fn enter(&self, samples: &mut [Sample]) {
-        let down: Vec<Sample> = loading(samples).into_iter().cloned().collect();
-        let down: Vec<&Sample> = down.iter().collect();
+        let n_runs = samples.last().map_or(0, |s| s.run + 1);
+        let down: Vec<Vec<Sample>> = (0..n_runs)
+            .map(|run| loading(samples, run).into_iter().cloned().collect())
+            .collect();
         for sample in samples.iter_mut().filter(|s| s.outcome.is_converged()) {
+            let down: Vec<&Sample> = down[sample.run].iter().collect();
             let bar = self.of(sample, &down);
             sample.error_bar_n = bar.map(|bar| bar.half_width_n);
             let part = |i: usize| bar.map(|bar| bar.contributions_n[i]);
-            sample.error_skin_near_n = part(0);
+            sample.error_near_n = part(0);
             sample.error_skin_far_n = part(1);
-            sample.error_levels_near_n = part(2);
-            sample.error_levels_deep_n = part(3);
+            sample.error_levels_deep_n = part(2);
         }
     }
 
-    /// The bar of a sample. `loading` are the samples of the first press down. Where no depth was
+    /// The bar of a sample. `loading` are the samples of its run's first press down. Where no depth was
     /// probed, relative contributions are interpolated; above the least depth they are those at it.
     pub fn of(&self, sample: &Sample, loading: &[&Sample]) -> Option<ErrorBar> {
         let force = force_at(loading, sample.depth_mm)?;
@@ -130,16 +158,17 @@ impl ErrorBars {
         })
     }
 
-    fn changes_at(&self, depth_mm: f64) -> Option<[f64; 4]> {
-        let known = |probed: &Probed| -> Option<(f64, [f64; 4])> {
-            let mut changes = [0.0; 4];
+    fn changes_at(&self, depth_mm: f64) -> Option<[f64; N_SOURCES]> {
+        let known = |probed: &Probed| -> Option<(f64, [f64; N_SOURCES])> {
+            let mut changes = [0.0; N_SOURCES];
             for (into, change) in changes.iter_mut().zip(probed.changes) {
                 *into = change?;
             }
             Some((probed.depth_mm, changes))
         };
         // Ascending by depth.
-        let all: Vec<(f64, [f64; 4])> = self.probed.iter().rev().filter_map(known).collect();
+        let all: Vec<(f64, [f64; N_SOURCES])> =
+            self.probed.iter().rev().filter_map(known).collect();
         let after = all.partition_point(|(depth, _)| *depth < depth_mm);
         let (before, next) = (
             after.checked_sub(1).map(|i| all[i]),
@@ -158,7 +187,7 @@ impl ErrorBars {
 
 /// The converged samples of the first press down that are probed, the deepest first.
 fn probed_samples(record: &Record<'_>) -> Option<Vec<usize>> {
-    let loading = loading(&record.samples);
+    let loading = loading(&record.samples, 0);
     let deepest = loading.last()?.depth_mm;
     let nearest = |share: f64| {
         let off = |s: &&Sample| (s.depth_mm - share * deepest).abs();
@@ -178,11 +207,10 @@ fn probed_samples(record: &Record<'_>) -> Option<Vec<usize>> {
     Some(depths.into_iter().filter_map(index).collect())
 }
 
-/// The converged samples of the first press down.
-pub fn loading(samples: &[Sample]) -> Vec<&Sample> {
-    let down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
-    let good = |s: &&Sample| s.outcome.is_converged();
-    samples.iter().filter(down).filter(good).collect()
+/// The converged samples of the first press down of a run.
+pub fn loading(samples: &[Sample], run: usize) -> Vec<&Sample> {
+    let down = |s: &&Sample| s.run == run && s.is_first_loading() && s.outcome.is_converged();
+    samples.iter().filter(down).collect()
 }
 
 /// Force of the press down at a depth, N; linear between samples.

@@ -4,57 +4,67 @@ use palpa_fem::{
     Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, advance,
     equilibrate,
 };
-use palpa_mesh::refine::{RefineParams, mean_depths, refine, split_levels};
+use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
 
-use super::{ErrorBars, Probed, Source};
+use super::{ErrorBars, N_SOURCES, Probed, Source};
+use crate::build::nearest;
 use crate::continuum;
-use crate::press::tissue::{Indentation, Record};
+use crate::press::mesh::NEAR;
+use crate::press::tissue::Indentation;
 
 /// The part that is probed reaches this far beyond the tool: a multiple of the tissue's depth, and of
 /// the tool's reach.
 const PART_DEPTHS: f64 = 1.0;
 const PART_REACHES: f64 = 2.0;
-/// Triangles within this multiple of the tool's reach are near it, and intervals above this multiple
-/// of its contact radius near the skin.
-const NEAR: f64 = 1.5;
 /// Tolerance of the force balance: far below the errors that are looked for.
 const TOLERANCE: f64 = 1e-4;
 
-/// Probes the samples with these indices, the deepest first.
+/// An equilibrium of a press.
+pub(super) struct Base {
+    /// Depth of the tool, m.
+    depth: f64,
+    force_n: f64,
+    /// Displacements of the nodes, m. `[n_nodes]`
+    pub(super) displacements: Vec<Vec3>,
+}
+
+impl Base {
+    /// The equilibrium at a depth, m; `None` if there is none, or if the tool does not touch yet:
+    /// then there is no force that a change could be relative to. `guess` are displacements near
+    /// those of the equilibrium.
+    pub(super) fn find(
+        press: &Indentation,
+        ws: &mut Workspace,
+        depth: f64,
+        guess: Option<&[Vec3]>,
+    ) -> Option<Self> {
+        let (force_n, displacements) = press.elastic(ws, depth, guess)?;
+        (force_n != 0.0).then_some(Self {
+            depth,
+            force_n,
+            displacements,
+        })
+    }
+}
+
+/// Probes a press in these equilibria. `progress` as in [`ErrorBars::estimate`].
 pub(super) fn run(
-    record: &Record<'_>,
-    samples: &[usize],
+    press: &Indentation,
+    bases: &[Base],
     progress: &mut dyn FnMut(usize, usize) -> bool,
 ) -> Option<ErrorBars> {
-    let press = record.indentation();
-    let n_all = Source::ALL.len();
-    let mut bases = Vec::new();
-    let mut own = press.elastic_workspace();
-    for &index in samples {
-        let depth = record.samples[index].depth_mm * 1e-3;
-        let Some(start) = record.displacements(index) else {
-            continue;
-        };
-        // A tool that does not touch yet has no force that a change could be relative to.
-        let found = press.elastic(&mut own, depth, start);
-        let Some((force, displacements)) = found.filter(|(force, _)| *force != 0.0) else {
-            continue;
-        };
-        bases.push((depth, force, displacements));
-    }
-    drop(own);
     let mut probed: Vec<Probed> = (bases.iter())
-        .map(|(depth, force, _)| Probed {
-            depth_mm: depth * 1e3,
-            force_n: *force,
-            changes: [None; 4],
+        .map(|base| Probed {
+            depth_mm: base.depth * 1e3,
+            force_n: base.force_n,
+            changes: [None; N_SOURCES],
         })
         .collect();
     let part = part(press);
     let mut n_nodes = 0;
     for (i, source) in Source::ALL.into_iter().enumerate() {
-        if !progress(i, n_all) {
+        if !progress(i, Source::ALL.len()) {
             return None;
         }
         let Some((body, carry)) = divided(press, &part, source) else {
@@ -69,9 +79,9 @@ pub(super) fn run(
             continue;
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
-        for (probed, (depth, force, displacements)) in probed.iter_mut().zip(&bases) {
-            let found = probe.force(press, *depth, &part, displacements);
-            probed.changes[i] = found.map(|found| (found - force) / force);
+        for (probed, base) in probed.iter_mut().zip(bases) {
+            let found = probe.force(press, base.depth, &part, &base.displacements);
+            probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
         }
     }
     Some(ErrorBars { probed, n_nodes })
@@ -124,7 +134,10 @@ impl Probe {
                 .map(|v| carried[body.node(v, 0)].x > 1.0 - 1e-9)
                 .collect()
         };
-        let rim = rim(body);
+        let mut rim = vec![false; body.n_vertices()];
+        for v in body.skin.boundary_loops().into_iter().flatten() {
+            rim[v as usize] = true;
+        }
         let is_border = per_vertex(&part.is_border);
         let columns = |v: usize| (0..body.n_levels).map(move |l| (v, l));
         let border = (0..body.n_vertices())
@@ -152,9 +165,8 @@ impl Probe {
             alpha: prepared.scene.model.alpha,
         };
         let model = Model::build(body, &prepared.materials, &supports, params)?;
-        let (points, radius) = press.region();
         Ok(Self {
-            workspace: Workspace::round(&model, &points, radius),
+            workspace: Workspace::new(&model),
             model,
             carry,
             border,
@@ -188,6 +200,7 @@ impl Probe {
         state.displacements = guess;
         let params = SolveParams {
             tolerance: TOLERANCE,
+            is_near: true,
             ..press.solve_params()
         };
         let ws = &mut self.workspace;
@@ -210,81 +223,76 @@ impl Probe {
 type Carry = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
 
 /// The part with some triangles or intervals divided in two, and how displacements are carried to
-/// it.
+/// it; `None` if there is nothing to divide.
 fn divided(press: &Indentation, part: &Part, source: Source) -> Option<(LayeredBody, Carry)> {
-    let body = &part.body;
-    let (points, reach) = press.footprint();
     match source {
-        Source::SkinNear | Source::SkinFar => {
-            let lengths: Vec<f64> = (0..body.skin.triangles.len())
-                .map(|t| {
-                    let corners = body.skin.corners(t);
-                    let centre = corners.iter().sum::<Vec3>() / 3.0;
-                    let is_near = distance(&points, &centre) <= NEAR * reach;
-                    if is_near == (source == Source::SkinNear) {
-                        let sides = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm());
-                        0.99 * sides.fold(0.0, f64::max)
-                    } else {
-                        f64::INFINITY
-                    }
-                })
-                .collect();
-            if lengths.iter().all(|l| l.is_infinite()) {
-                return None;
+        Source::Near => {
+            let refined = finer_triangles(press, &part.body, true);
+            let on = refined.as_ref().map_or(&part.body, |refined| &refined.body);
+            match (finer_intervals(press, on, true), refined) {
+                (None, None) => None,
+                (None, Some(refined)) => Some(carried_by(refined)),
+                (Some(split), None) => Some(split_by(split)),
+                (Some(split), Some(refined)) => {
+                    let ((body, outer), (_, inner)) = (split_by(split), carried_by(refined));
+                    Some((body, Box::new(move |field| outer(&inner(field)))))
+                }
             }
-            let params = RefineParams {
-                max_depth: 1,
-                ..RefineParams::default()
-            };
-            let refined = refine(body, &params, |t, _| lengths[t as usize]);
-            let finer = refined.body.clone();
-            Some((finer, Box::new(move |field| refined.interpolate(field))))
         }
-        Source::LevelsNear | Source::LevelsDeep => {
-            let middle = nearest(&body.skin.points, press.place().at);
-            let depths = mean_depths(body, &[middle]);
-            let border = NEAR * press.prepared.scene.tool.contact_radius();
-            let parts: Vec<Vec<f64>> = (depths.windows(2))
-                .map(|ends| {
-                    let is_near = 0.5 * (ends[0] + ends[1]) <= border;
-                    if is_near == (source == Source::LevelsNear) {
-                        vec![0.5; 2]
-                    } else {
-                        vec![1.0]
-                    }
-                })
-                .collect();
-            if parts.iter().all(|heights| heights.len() == 1) {
-                return None;
-            }
-            let split = split_levels(body, &parts);
-            let finer = split.body.clone();
-            Some((finer, Box::new(move |field| split.interpolate(field))))
-        }
+        Source::SkinFar => finer_triangles(press, &part.body, false).map(carried_by),
+        Source::LevelsDeep => finer_intervals(press, &part.body, false).map(split_by),
     }
 }
 
-fn nearest(points: &[Vec3], at: Vec3) -> u32 {
-    let distance = |v: &u32| (points[*v as usize] - at).norm_squared();
-    let all = 0..points.len() as u32;
-    all.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap_or(0)
+fn carried_by(refined: Refined) -> (LayeredBody, Carry) {
+    let body = refined.body.clone();
+    (body, Box::new(move |field| refined.interpolate(field)))
 }
 
-/// Whether a vertex is on the rim of a body's skin. `[n_vertices]`
-fn rim(body: &LayeredBody) -> Vec<bool> {
-    let mut edges: Vec<[u32; 2]> = (body.skin.triangles.iter())
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
+fn split_by(split: LevelSplit) -> (LayeredBody, Carry) {
+    let body = split.body.clone();
+    (body, Box::new(move |field| split.interpolate(field)))
+}
+
+/// Triangles near the tool, or those around, divided in two along each edge.
+fn finer_triangles(press: &Indentation, body: &LayeredBody, near: bool) -> Option<Refined> {
+    let (points, reach) = press.footprint();
+    let lengths: Vec<f64> = (0..body.skin.triangles.len())
+        .map(|t| {
+            let corners = body.skin.corners(t);
+            let centre = corners.iter().sum::<Vec3>() / 3.0;
+            if (distance(&points, &centre) <= NEAR * reach) == near {
+                let sides = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm());
+                0.99 * sides.fold(0.0, f64::max)
+            } else {
+                f64::INFINITY
+            }
+        })
         .collect();
-    edges.sort_unstable();
-    let mut is_rim = vec![false; body.n_vertices()];
-    for same in edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
-        for &v in &same[0] {
-            is_rim[v as usize] = true;
-        }
-    }
-    is_rim
+    let params = RefineParams {
+        max_depth: 1,
+        ..RefineParams::default()
+    };
+    let is_any = lengths.iter().any(|l| l.is_finite());
+    is_any.then(|| refine(body, &params, |t, _| lengths[t as usize]))
+}
+
+/// Intervals near the skin, or deeper ones, divided in two.
+fn finer_intervals(press: &Indentation, body: &LayeredBody, near: bool) -> Option<LevelSplit> {
+    let middle = nearest(&body.skin, press.place().at) as u32;
+    let depths = mean_depths(body, &[middle]);
+    let border = NEAR * press.prepared.scene.tool.contact_radius();
+    let parts: Vec<Vec<f64>> = (depths.windows(2))
+        .map(|ends| {
+            if (0.5 * (ends[0] + ends[1]) <= border) == near {
+                vec![0.5; 2]
+            } else {
+                vec![1.0]
+            }
+        })
+        .collect();
+    let is_any = parts.iter().any(|heights| heights.len() > 1);
+    is_any.then(|| split_levels(body, &parts))
 }
 
 #[cfg(test)]
@@ -296,6 +304,7 @@ mod tests {
 
     use super::*;
     use crate::Prepared;
+    use crate::press::tissue::Record;
 
     /// A press of a block on which the part is smaller than the body.
     fn press(tool: &str) -> Indentation {
@@ -327,13 +336,13 @@ mod tests {
             let part = part(&press);
             assert!(part.body.n_vertices() < press.mesh().body.n_vertices());
             assert!(part.is_border.contains(&true));
-            let mut record = Record::new(&press);
+            let mut record = Record::with_displacements(&press);
             let mut run = press.start(0);
             while let Some(sample) = run.advance() {
                 record.push(&run, sample);
             }
             let last = record.samples.len() - 1;
-            let displacements = record.displacements(last).unwrap();
+            let displacements = record.displacements(last);
             let carry: Carry = Box::new(<[Vec3]>::to_vec);
             let mut probe = Probe::build(&press, &part, &part.body.clone(), carry).unwrap();
             let force = probe.force(&press, 2e-3, &part, displacements).unwrap();
@@ -351,14 +360,13 @@ mod tests {
     fn sources_divide_all_of_the_part_and_nothing_twice() {
         let press = press("shape = \"disc\"");
         let part = part(&press);
-        let n_prisms = part.body.n_prisms();
-        let n_levels = part.body.n_levels;
+        let (n_prisms, n_levels) = (part.body.n_prisms(), part.body.n_levels);
         let mut finer = 0;
-        for source in [Source::LevelsNear, Source::LevelsDeep] {
+        for source in [Source::Near, Source::LevelsDeep] {
             finer += divided(&press, &part, source).map_or(0, |(body, _)| body.n_levels - n_levels);
         }
         assert_eq!(finer, n_levels - 1);
-        for source in [Source::SkinNear, Source::SkinFar] {
+        for source in Source::ALL {
             let (body, carry) = divided(&press, &part, source).unwrap();
             assert!(body.n_prisms() > n_prisms);
             // Positions are carried to positions: the geometry is the same.

@@ -37,6 +37,88 @@ const SPARED: f64 = 1.05;
 /// largest wanted height between them, m.
 type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
 
+/// Triangles within this multiple of the tool's reach are near it, and intervals above this multiple
+/// of its contact radius near the skin.
+pub(crate) const NEAR: f64 = 1.5;
+
+/// A wanted size that grows with the distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Graded {
+    /// Size at distance 0, m.
+    pub h: f64,
+    /// Increase of the size with the distance, as a share of the distance.
+    pub growth: f64,
+    /// Distance from which on things are far, m.
+    pub border: f64,
+    /// Factor on near sizes.
+    pub near: f64,
+    /// Factor on far sizes.
+    pub far: f64,
+}
+
+impl Graded {
+    fn even(h: f64, growth: f64) -> Self {
+        Self {
+            h,
+            growth,
+            border: f64::INFINITY,
+            near: 1.0,
+            far: 1.0,
+        }
+    }
+
+    /// The same with another size at distance 0.
+    fn looser(self, factor: f64) -> Self {
+        Self {
+            h: factor * self.h,
+            ..self
+        }
+    }
+
+    /// The size at a distance. All in m.
+    pub fn at(&self, distance: f64) -> f64 {
+        let factor = if distance < self.border {
+            self.near
+        } else {
+            self.far
+        };
+        factor * (self.h + self.growth * distance)
+    }
+}
+
+/// Sizes of the mesh near the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    /// Lengths of the skin's edges, by distance from the part of the skin that the tool reaches.
+    pub skin: Graded,
+    /// Heights of the intervals between levels, by depth.
+    pub levels: Graded,
+}
+
+impl Sizes {
+    /// The sizes that the scene asks for; `None` for a tool that needs no refinement.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let h = scene.mesh.near_tool_of(&scene.tool)?;
+        Some(Self::even(scene, h, scene.mesh.growth))
+    }
+
+    /// Sizes of `h` (m) at the tool that grow by `growth` with the distance.
+    pub fn even(scene: &Scene, h: f64, growth: f64) -> Self {
+        let graded = Graded::even(h, growth);
+        let (_, radius) = reach(scene);
+        Self {
+            skin: Graded {
+                border: (NEAR - 1.0) * radius,
+                ..graded
+            },
+            levels: Graded {
+                border: NEAR * scene.tool.contact_radius(),
+                ..graded
+            },
+        }
+    }
+}
+
 /// A body that is refined for a press.
 #[derive(Debug)]
 pub struct PressedBody {
@@ -51,6 +133,8 @@ pub struct PressedBody {
     pub stand_off: Vec<f64>,
     /// The skin that is bonded to a disc, if the tool is one.
     pub patch: Option<Patch>,
+    /// The sizes that were asked for near the tool.
+    pub sizes: Option<Sizes>,
     /// Mean length of the skin's edges near the tool. m
     pub mesh_size: f64,
     /// Whether the mesh is as fine everywhere as it should be.
@@ -69,8 +153,8 @@ pub struct Patch {
 }
 
 impl PressedBody {
-    /// Refines the scene's body as its `[mesh]` says. `way` holds distances from the place along
-    /// the motion, m, at which the body is refined too.
+    /// Refines the scene's body as its `[mesh]` says, with these sizes near the tool. `way` holds
+    /// distances from the place along the motion, m, at which the body is refined too.
     ///
     /// # Errors
     /// When the direction or the depth does not fit the place.
@@ -78,6 +162,7 @@ impl PressedBody {
         scene: &Scene,
         built: &BuiltBody,
         lumps: &[Lump],
+        sizes: Option<Sizes>,
         way: &[f64],
         notes: &mut Vec<Note>,
     ) -> anyhow::Result<Self> {
@@ -85,7 +170,7 @@ impl PressedBody {
         // The place is checked first, before any work.
         let mut remarks = Vec::new();
         let coarse = Place::find(scene, built, &mut remarks)?;
-        let mut refined = refine_near(scene, built, &coarse, lumps, way, notes);
+        let mut refined = refine_near(scene, built, &coarse, lumps, sizes, way, notes);
         let is_between = is_between_vertices(scene);
         let mut place = if is_between {
             bring_vertex(scene, &mut refined, coarse.at);
@@ -117,7 +202,7 @@ impl PressedBody {
                 max_vertices: scene.mesh.max_vertices,
             });
         }
-        let (body, is_split) = split_near(scene, refined.body, &place, lumps);
+        let (body, is_split) = split_near(scene, refined.body, &place, lumps, sizes);
         if !is_split {
             notes.push(Note::LevelsTooHigh {
                 max_levels: MOST_LEVELS,
@@ -130,6 +215,7 @@ impl PressedBody {
             thinning,
             stand_off,
             patch,
+            sizes,
             is_resolved: is_fine && is_split,
         })
     }
@@ -153,13 +239,13 @@ fn bring_vertex(scene: &Scene, refined: &mut Refined, at: Vec3) {
     }
 }
 
-/// A region of the skin that should be fine: edges of length `h` within `radius` of the points. All
-/// in m.
+/// A region of the skin that should be fine: `size` is the length of edges by the distance beyond
+/// `radius` (m) of the points.
 #[derive(Debug, Clone)]
 struct Fine {
     points: Vec<Vec3>,
     radius: f64,
-    h: f64,
+    size: Graded,
 }
 
 /// Adds columns near the tool and above lumps.
@@ -168,21 +254,26 @@ fn refine_near(
     built: &BuiltBody,
     place: &Place,
     lumps: &[Lump],
+    sizes: Option<Sizes>,
     way: &[f64],
     notes: &mut Vec<Note>,
 ) -> Refined {
     let body = &built.growth.body;
     let mut fine = Vec::new();
-    if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
-        let (mut points, radius) = footprint(scene, built.press_at, &place.direction);
+    if let Some(sizes) = sizes {
+        let (mut points, radius) =
+            footprint(scene, built.press_at, &place.direction, sizes.skin.at(0.0));
         let along = along_skin(scene, &place.direction);
         let index = SurfaceIndex::build(&body.skin);
         for &far in way.iter().filter(|far| **far != 0.0) {
             let over = built.press_at + along * far;
             points.extend(index.closest(over).map(|closest| closest.point));
         }
-        let h = SLACK * h;
-        fine.push(Fine { points, radius, h });
+        fine.push(Fine {
+            points,
+            radius,
+            size: sizes.skin,
+        });
     }
     fine.extend(over_lumps(scene, body, lumps, notes));
     refined(scene, body, &fine)
@@ -194,9 +285,13 @@ fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
         max_vertices: scene.mesh.max_vertices,
         ..RefineParams::default()
     };
-    let near = |fine: &Fine| near_points(&fine.points, fine.radius, fine.h, scene.mesh.growth);
+    let wish = |fine: &Fine| {
+        let beyond = near_points(&fine.points, fine.radius, 0.0, 1.0);
+        let size = fine.size.looser(SLACK);
+        move |t: u32, corners: &[Vec3; 3]| size.at(beyond(t, corners))
+    };
     let fine = fine.iter().filter(|_| scene.mesh.refine);
-    let wishes: Vec<_> = fine.map(near).collect();
+    let wishes: Vec<_> = fine.map(wish).collect();
     refine(body, &params, move |t, corners| {
         wishes
             .iter()
@@ -231,7 +326,7 @@ fn over_lumps(
             fine.push(Fine {
                 points: vec![shadow.on_skin],
                 radius: radius * wide,
-                h: SLACK * h * wide,
+                size: Graded::even(h * wide, scene.mesh.growth),
             });
         }
     }
@@ -246,8 +341,8 @@ pub struct CoarseBody {
     pub body: LayeredBody,
     /// Regions that are always fine.
     fine: Vec<Fine>,
-    /// Edge length near the tool, m; `None` for a tool that needs no refinement.
-    h: Option<f64>,
+    /// Sizes near the tool; `None` for a tool that needs no refinement.
+    sizes: Option<Sizes>,
 }
 
 impl CoarseBody {
@@ -260,11 +355,11 @@ impl CoarseBody {
         // The notes are dropped: those of the first pressed body say the same.
         let mut notes = Vec::new();
         let place = Place::find(scene, built, &mut notes)?;
-        let (body, _) = split_near(scene, grown.clone(), &place, lumps);
-        let h = scene.mesh.near_tool_of(&scene.tool);
+        let sizes = Sizes::of(scene);
+        let (body, _) = split_near(scene, grown.clone(), &place, lumps, sizes);
         Ok(Self {
             fine: over_lumps(scene, &body, lumps, &mut notes),
-            h: h.map(|h| SLACK * h),
+            sizes,
             body,
         })
     }
@@ -272,22 +367,27 @@ impl CoarseBody {
     /// The body refined within `radius` of a point of the skin, m.
     pub fn fine_round(&self, scene: &Scene, point: Vec3, radius: f64) -> LayeredBody {
         let mut fine = self.fine.clone();
-        fine.extend(self.h.map(|h| Fine {
+        fine.extend(self.sizes.map(|sizes| Fine {
             points: vec![point],
             radius,
-            h,
+            size: sizes.skin,
         }));
         refined(scene, &self.body, &fine).body
     }
 }
 
-/// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
-pub(super) fn footprint(scene: &Scene, at: Vec3, direction: &Unit<Vec3>) -> (Vec<Vec3>, f64) {
+/// Points of the skin that the tool presses on, `h` apart or less, and the radius around them that
+/// it reaches, m.
+pub(super) fn footprint(
+    scene: &Scene,
+    at: Vec3,
+    direction: &Unit<Vec3>,
+    h: f64,
+) -> (Vec<Vec3>, f64) {
     let (reach, radius) = reach(scene);
     let mut points = vec![at];
     if let Some(tool) = scene.tool.contact() {
         let axes = tool.axes(direction.into_inner().into()).map(Vec3::from);
-        let h = scene.mesh.near_tool_of(&scene.tool).unwrap_or(1e-3);
         let steps = reach.map(|r| (r / h).ceil() as i32);
         for i in -steps[0]..=steps[0] {
             for j in -steps[1]..=steps[1] {
@@ -398,21 +498,21 @@ fn split_near(
     body: LayeredBody,
     place: &Place,
     lumps: &[Lump],
+    sizes: Option<Sizes>,
 ) -> (LayeredBody, bool) {
     if !scene.mesh.refine {
         return (body, true);
     }
-    let growth = scene.mesh.growth;
     let mut wishes: Vec<LevelWish> = Vec::new();
-    let mut wish = |depths: Vec<f64>, depth: f64, radius: f64, h: f64| {
-        wishes.push(Box::new(along(
-            depths,
-            near_depth(depth, radius, SPARED * h, growth),
-        )));
+    let mut wish = |depths: Vec<f64>, depth: f64, radius: f64, size: Graded| {
+        let beyond = near_depth(depth, radius, 0.0, 1.0);
+        let size = size.looser(SPARED);
+        let wanted = move |top, bottom| size.at(beyond(top, bottom));
+        wishes.push(Box::new(along(depths, wanted)));
     };
-    if let Some(h) = scene.mesh.near_tool_of(&scene.tool) {
+    if let Some(sizes) = sizes {
         let depths = mean_depths(&body, &[place.vertex as u32]);
-        wish(depths, 0.0, 0.0, h);
+        wish(depths, 0.0, 0.0, sizes.levels);
     }
     if !lumps.is_empty() {
         let shadows = Shadows::new(&body);
@@ -425,7 +525,7 @@ fn split_near(
                 let shadow = shadows.of(point);
                 let depths = mean_depths(&body, &body.skin.triangles[shadow.triangle]);
                 let depth = (point - shadow.on_skin).norm();
-                wish(depths, depth, radius, h);
+                wish(depths, depth, radius, Graded::even(h, scene.mesh.growth));
             }
         }
     }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use palpa::Prepared;
-use palpa::accuracy::{ErrorBars, loading};
+use palpa::accuracy::{End, ErrorBars, Goal, MeshChoice, choose_mesh, loading};
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa::scene::Scene;
 use palpa_testkit::{Layer, Scene as SceneText, Value};
@@ -24,7 +25,7 @@ fn set_up(scene: &SceneText) -> Indentation {
 }
 
 fn run(press: &Indentation) -> Record<'_> {
-    let mut record = Record::new(press);
+    let mut record = Record::with_displacements(press);
     let mut run = press.start(0);
     while let Some(sample) = run.advance() {
         assert!(sample.outcome.is_converged());
@@ -34,7 +35,11 @@ fn run(press: &Indentation) -> Record<'_> {
 }
 
 fn deepest(record: &Record<'_>) -> Sample {
-    loading(&record.samples).last().copied().cloned().unwrap()
+    loading(&record.samples, 0)
+        .last()
+        .copied()
+        .cloned()
+        .unwrap()
 }
 
 #[test]
@@ -56,7 +61,7 @@ fn the_force_of_a_finer_mesh_lies_within_the_bar() {
             Value::raw("0.4"),
         ));
         let mut record = run(&coarse);
-        let bars = ErrorBars::estimate(&record, |_, _| true).unwrap();
+        let bars = ErrorBars::estimate(&record, None, |_, _| true).unwrap();
         bars.enter(&mut record.samples);
         let sample = deepest(&record);
         let bar = sample.error_bar_n.unwrap();
@@ -66,9 +71,8 @@ fn the_force_of_a_finer_mesh_lies_within_the_bar() {
         assert!(error < bar, "{name}: {error} N, bar {bar} N");
         assert!(bar < 0.4 * sample.force_n, "{name}: {bar} N");
         let parts = [
-            sample.error_skin_near_n,
+            sample.error_near_n,
             sample.error_skin_far_n,
-            sample.error_levels_near_n,
             sample.error_levels_deep_n,
         ];
         let sum: f64 = parts.iter().map(|part| part.unwrap().abs()).sum();
@@ -88,10 +92,92 @@ fn probes_can_be_given_up() {
     let press = set_up(&block());
     let record = run(&press);
     let mut asked = Vec::new();
-    let bars = ErrorBars::estimate(&record, |probe, n_probes| {
+    let bars = ErrorBars::estimate(&record, None, |probe, n_probes| {
         asked.push((probe, n_probes));
         probe < 1
     });
     assert_eq!(bars, None);
-    assert_eq!(asked, [(0, 4), (1, 4)]);
+    assert_eq!(asked, [(0, 3), (1, 3)]);
+}
+
+#[test]
+fn each_run_has_the_bars_of_its_own_forces() {
+    let press = set_up(&block().set("mesh", "near_tool", "4 mm"));
+    let mut record = run(&press);
+    let bars = ErrorBars::estimate(&record, None, |_, _| true).unwrap();
+    // A run at another speed, with twice the forces.
+    let twice: Vec<Sample> = (record.samples.iter())
+        .map(|sample| Sample {
+            run: 1,
+            force_n: 2.0 * sample.force_n,
+            ..sample.clone()
+        })
+        .collect();
+    let n = twice.len();
+    record.samples.extend(twice);
+    bars.enter(&mut record.samples);
+    for (one, two) in record.samples.iter().zip(&record.samples[n..]) {
+        let [one, two] = [one, two].map(|sample| sample.error_bar_n.unwrap());
+        assert!((two - 2.0 * one).abs() < 1e-12);
+    }
+    assert!(deepest(&record).error_bar_n.unwrap() > 0.0);
+}
+
+/// The choice of a mesh for the block under a ball.
+fn choose(
+    accuracy: f64,
+    max_time: Option<Duration>,
+    max_vertices: &str,
+) -> (Indentation, MeshChoice) {
+    let scene = block()
+        .set("tool", "shape", "sphere")
+        .set("tool", "radius", "20 mm")
+        .set("mesh", "max_vertices", Value::raw(max_vertices));
+    let scene = Scene::parse(&scene.to_string(), Path::new(".")).unwrap();
+    let grown = Arc::new(palpa::build::build(&scene).unwrap());
+    let goal = Goal { accuracy, max_time };
+    let chosen = choose_mesh(&scene, &grown, &goal, |_| true).unwrap();
+    let (press, choice) = chosen.unwrap();
+    assert_eq!(press.model.n_nodes(), choice.rounds[choice.best].n_nodes);
+    (press, choice)
+}
+
+#[test]
+fn a_mesh_is_as_fine_as_the_accuracy_asks() {
+    let (coarse_press, coarse) = choose(0.5, None, "20000");
+    let wide = coarse.half_width().unwrap();
+    let (fine_press, fine) = choose(0.7 * wide, None, "20000");
+    assert_eq!((coarse.end, fine.end), (End::Reached, End::Reached));
+    assert!(wide <= 0.5 && fine.half_width().unwrap() <= 0.7 * wide);
+    assert!(fine_press.model.n_nodes() > coarse_press.model.n_nodes());
+    let force = |choice: &MeshChoice| {
+        let probed = choice.rounds[choice.best].probed.as_ref();
+        probed.unwrap().force_n
+    };
+    let (coarse, fine) = (force(&coarse), force(&fine));
+    assert!(coarse != fine && (coarse - fine).abs() < wide * coarse);
+}
+
+#[test]
+fn a_choice_says_which_limit_it_met_and_keeps_the_best_mesh() {
+    let (_, choice) = choose(0.002, None, "150");
+    let end = End::MaxVertices { max_vertices: 150 };
+    assert_eq!(choice.end, end);
+    assert!(choice.half_width().unwrap() > 0.002);
+    let (_, choice) = choose(0.002, Some(Duration::ZERO), "20000");
+    assert!(matches!(choice.end, End::MaxTime { expected_s } if expected_s > 0.0));
+    assert_eq!(choice.rounds.len(), 1);
+}
+
+#[test]
+fn a_single_node_has_no_accuracy() {
+    let scene = block().set("tool", "shape", "node");
+    let scene = Scene::parse(&scene.to_string(), Path::new(".")).unwrap();
+    let grown = Arc::new(palpa::build::build(&scene).unwrap());
+    let goal = Goal {
+        accuracy: 0.1,
+        max_time: None,
+    };
+    let why = choose_mesh(&scene, &grown, &goal, |_| true).unwrap_err();
+    assert!(why.to_string().contains("single node"), "{why}");
 }

@@ -1,6 +1,7 @@
 //! A press with the continuum model.
 
 mod fields;
+mod mesh_choice;
 mod pictures;
 mod record;
 mod report;
@@ -17,7 +18,7 @@ use self::result::result_of;
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
-use palpa::accuracy::ErrorBars;
+use palpa::accuracy::{ErrorBars, MeshChoice};
 use palpa::press::tissue::{Indentation, Record, SampleOutcome};
 use palpa::{Note, Prepared};
 
@@ -30,18 +31,27 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         ..
     } = *job;
     let spinner = context.progress(0, "growing the body");
-    let prepared = Arc::new(Prepared::build(scene)?);
-    spinner.set_message("setting up the model");
-    let indentation = Indentation::build(prepared)?;
+    let (indentation, choice) = match scene.mesh.accuracy {
+        None => {
+            let prepared = Arc::new(Prepared::build(scene)?);
+            spinner.set_message("setting up the model");
+            (Indentation::build(prepared)?, None)
+        }
+        Some(accuracy) => {
+            let (indentation, choice) = mesh_choice::choose(job, accuracy, &spinner)?;
+            (indentation, Some(choice))
+        }
+    };
     drop(spinner);
     let materials: Vec<_> = materials_of(scene);
     announce(job, &indentation, &materials)?;
 
     context.begin_recording();
     remove_older(out.path())?;
-    let mut recorded = record(job, &indentation)?;
-    let bars = if job.args.error_bar {
-        estimate_bars(job, &mut recorded)?
+    let with_bars = job.args.error_bar || choice.is_some();
+    let mut recorded = record(job, &indentation, with_bars)?;
+    let bars = if with_bars {
+        estimate_bars(job, choice.as_ref(), &mut recorded)?
     } else {
         None
     };
@@ -57,6 +67,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         press: facts(scene, &indentation),
         result,
         notes: &notes,
+        mesh_choice: choice.as_ref(),
         error_bars: bars.as_ref(),
         samples: &recorded.samples,
     };
@@ -77,10 +88,15 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
 
 /// Estimates the error bars, enters them into the samples and writes the table again; `None` if it
 /// was interrupted.
-fn estimate_bars(job: &Job<'_>, recorded: &mut Record<'_>) -> anyhow::Result<Option<ErrorBars>> {
+fn estimate_bars(
+    job: &Job<'_>,
+    choice: Option<&MeshChoice>,
+    recorded: &mut Record<'_>,
+) -> anyhow::Result<Option<ErrorBars>> {
     let context = job.context;
+    let known = choice.and_then(|choice| choice.bars.as_ref());
     let progress = context.progress(0, "error bar");
-    let bars = ErrorBars::estimate(recorded, |probe, n_probes| {
+    let bars = ErrorBars::estimate(recorded, known, |probe, n_probes| {
         progress.set_message(format!("error bar, probe {} of {n_probes}", probe + 1));
         !context.is_interrupted()
     });

@@ -9,7 +9,8 @@ mod sample;
 use std::sync::Arc;
 
 use palpa_fem::{
-    Dynamics, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, equilibrate,
+    Dynamics, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
+    equilibrate,
 };
 use palpa_mesh::Vec3;
 
@@ -33,6 +34,12 @@ const FIRST_HOLD: f64 = 0.01;
 /// Distance from the tool's footprint, in addition to the depth, within which the stiffness is
 /// computed anew in every iteration, m.
 const REGION_MARGIN: f64 = 0.01;
+
+/// Number of steps to a depth from rest.
+const FROM_REST: usize = 4;
+
+/// Distance between the points of a footprint if the mesh has no size of its own, m.
+const ANY_SIZE: f64 = 1e-3;
 
 /// An indentation that is set up: the data that stays constant while it runs.
 #[derive(Debug)]
@@ -157,6 +164,7 @@ impl Indentation {
             index,
             state: self.rest.clone(),
             workspace: self.workspace(),
+            fields: Vec::new(),
             path: self.path(self.speeds[index]),
             next: 0,
             before: Acting::default(),
@@ -168,7 +176,7 @@ impl Indentation {
     }
 
     /// Memory for the solver, prepared for touch under the tool.
-    fn workspace(&self) -> Workspace {
+    pub(crate) fn workspace(&self) -> Workspace {
         let (points, radius) = self.region();
         Workspace::round(&self.model, &points, radius)
     }
@@ -176,7 +184,11 @@ impl Indentation {
     /// Points of the skin that the tool presses on, and the radius around them that it reaches, m.
     pub(crate) fn footprint(&self) -> (Vec<Vec3>, f64) {
         let place = self.place();
-        footprint(&self.prepared.scene, place.at, &place.direction)
+        let h = self
+            .mesh()
+            .sizes
+            .map_or(ANY_SIZE, |sizes| sizes.skin.at(0.0));
+        footprint(&self.prepared.scene, place.at, &place.direction, h)
     }
 
     /// Points of the skin, and the radius around them within which contact and stiffness change
@@ -189,24 +201,39 @@ impl Indentation {
         )
     }
 
-    /// Memory for [`Self::elastic`].
-    pub(crate) fn elastic_workspace(&self) -> Workspace {
-        self.workspace()
-    }
-
     /// The force (N) and the displacements at a depth (m), without relaxation, inertia or a history
-    /// of friction; `None` if no equilibrium is found. `guess` are displacements near them.
+    /// of friction; `None` if no equilibrium is found. `guess` are displacements near them; without
+    /// them the tool comes from rest.
     pub(crate) fn elastic(
         &self,
         ws: &mut Workspace,
         depth: f64,
-        guess: &[Vec3],
+        guess: Option<&[Vec3]>,
     ) -> Option<(f64, Vec<Vec3>)> {
-        let acting = self.acting(depth);
         let mut state = State::new(&self.model);
-        state.displacements = guess.to_vec();
+        state.displacements = guess.unwrap_or(&self.rest.displacements).to_vec();
+        let (model, params) = (&self.model, &self.params);
+        let acting = self.acting(depth);
         let load = acting.load(0.0, None);
-        let report = equilibrate(&self.model, &mut state, ws, &load, &self.params);
+        let report = if guess.is_some() {
+            equilibrate(model, &mut state, ws, &load, params)
+        } else {
+            let mut before = self.acting(0.0);
+            for step in 1..FROM_REST {
+                let next = self.acting(depth * step as f64 / FROM_REST as f64);
+                let loads = [&before, &next].map(|acting| acting.load(0.0, None));
+                advance(model, &mut state, ws, &loads[0], &loads[1], params);
+                before = next;
+            }
+            advance(
+                model,
+                &mut state,
+                ws,
+                &before.load(0.0, None),
+                &load,
+                params,
+            )
+        };
         let bonded: Vec<usize> = acting.held.iter().map(|held| held.0).collect();
         (report.outcome == Outcome::Converged).then(|| {
             let force = self.force_of(&report, &bonded, ws);

@@ -1,10 +1,8 @@
 //! The record of a press: the samples of its runs, and the body at its deepest.
 
-use palpa_fem::{PrismField, level_forces, prism_fields};
+use palpa_fem::{PrismField, level_forces};
 use palpa_mesh::quality::prism_shapes;
 use palpa_mesh::{LayeredBody, Vec3};
-
-use crate::press::Phase;
 
 use super::{Failure, Indentation, Run, Sample, SampleOutcome};
 
@@ -36,8 +34,9 @@ pub struct Record<'a> {
     pub failures: Vec<Failure>,
     /// The body at the deepest sample of the first run.
     pub deepest: Deepest,
-    /// Displacements of the nodes at the samples of the first press down, m.
-    down: Vec<(usize, Vec<Vec3>)>,
+    /// Displacements of the nodes at the samples of the first press down, m; `None` if they are not
+    /// kept.
+    down: Option<Vec<(usize, Vec<Vec3>)>>,
 }
 
 /// The body at its deepest sample.
@@ -74,7 +73,7 @@ impl<'a> Record<'a> {
             indentation,
             samples: Vec::new(),
             failures: Vec::new(),
-            down: Vec::new(),
+            down: None,
             deepest: Deepest {
                 sample: 0,
                 depth_mm: 0.0,
@@ -86,6 +85,15 @@ impl<'a> Record<'a> {
         }
     }
 
+    /// A record without samples that will keep all that [`crate::accuracy`] needs: the
+    /// displacements of the first press down.
+    pub fn with_displacements(indentation: &'a Indentation) -> Self {
+        Self {
+            down: Some(Vec::new()),
+            ..Self::new(indentation)
+        }
+    }
+
     /// Adds the sample that `run` has just returned. The runs come one after the other, the first
     /// one first.
     pub fn push(&mut self, run: &Run<'_>, sample: Sample) {
@@ -94,10 +102,12 @@ impl<'a> Record<'a> {
         } else if run.index == 0 && sample.depth_mm > self.deepest.depth_mm {
             self.deepest = Deepest::new(run, self.samples.len(), sample.depth_mm);
         }
-        let is_down = sample.run == 0 && sample.cycle == 0 && sample.phase == Phase::Load;
-        if is_down && sample.outcome.is_converged() {
-            let displacements = run.state.displacements.clone();
-            self.down.push((self.samples.len(), displacements));
+        if let Some(down) = &mut self.down
+            && sample.run == 0
+            && sample.is_first_loading()
+            && sample.outcome.is_converged()
+        {
+            down.push((self.samples.len(), run.state.displacements.clone()));
         }
         self.samples.push(sample);
     }
@@ -107,10 +117,14 @@ impl<'a> Record<'a> {
         self.indentation
     }
 
-    /// Displacements of the nodes at a sample of the first press down, m. `[n_nodes]`
-    pub(crate) fn displacements(&self, sample: usize) -> Option<&[Vec3]> {
-        let of = self.down.iter().find(|(index, _)| *index == sample);
-        of.map(|(_, displacements)| &displacements[..])
+    /// Displacements of the nodes at a converged sample of the first press down, m. `[n_nodes]`
+    ///
+    /// # Panics
+    /// If they were not kept.
+    pub(crate) fn displacements(&self, sample: usize) -> &[Vec3] {
+        let mut kept = self.down.iter().flatten();
+        let of = kept.find(|(index, _)| *index == sample);
+        &of.expect("a record that keeps displacements").1
     }
 
     /// Converged, or how the first step that failed ended.
@@ -129,13 +143,12 @@ impl<'a> Record<'a> {
 impl Deepest {
     fn new(run: &Run<'_>, sample: usize, depth_mm: f64) -> Self {
         let (model, state, ws) = (&run.indentation.model, &run.state, &run.workspace);
-        let fields = prism_fields(model, state, ws);
         Self {
             sample,
             depth_mm,
             displacements: state.displacements.clone(),
             level_forces: level_forces(model, state, ws),
-            von_mises: fields.iter().map(PrismField::von_mises).collect(),
+            von_mises: run.fields.iter().map(PrismField::von_mises).collect(),
             turned: turned(&run.indentation.mesh().body, &state.positions(model)),
         }
     }

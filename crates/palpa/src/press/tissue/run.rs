@@ -1,8 +1,8 @@
 //! One run of a press at one speed, sample by sample.
 
 use palpa_fem::{
-    Dynamics, Load, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
-    equilibrate, prism_fields,
+    Dynamics, Load, Outcome, PosedTool, PrismField, SolveParams, State, StepReport, Workspace,
+    advance, equilibrate, prism_fields,
 };
 use palpa_mesh::Vec3;
 
@@ -24,6 +24,8 @@ pub struct Run<'a> {
     pub state: State,
     /// Memory of the solver, reused between steps.
     pub workspace: Workspace,
+    /// State of every prism at the last sample that converged. `[n_prisms]`
+    pub fields: Vec<PrismField>,
     pub(super) path: Vec<Waypoint>,
     pub(super) next: usize,
     /// The load of the previous sample.
@@ -103,6 +105,9 @@ impl Run<'_> {
         let speed_mm_s = tidy(indentation.speeds[self.index] * 1e3);
         let depth_mm = tidy(waypoint.depth * 1e3);
         let outcome = report.outcome;
+        if outcome == Outcome::Converged || self.last.is_none() {
+            self.fields = prism_fields(&indentation.model, &self.state, &self.workspace);
+        }
         let sample = if outcome == Outcome::Converged {
             self.before = acting;
             self.next += 1;
@@ -193,8 +198,7 @@ impl Run<'_> {
             Grip::Bond { areas, .. } if areas.iter().all(|&area| area == 0.0) => None,
             _ => Some((indentation.skin_pressure(self).into_iter()).fold(0.0, f64::max)),
         };
-        let fields = prism_fields(&indentation.model, &self.state, &self.workspace);
-        let ratios = fields.iter().map(|field| field.volume_ratio);
+        let ratios = self.fields.iter().map(|field| field.volume_ratio);
         let contact = &report.contact;
         // Adding zero turns -0 into 0.
         let force_n = -pull.dot(direction) + 0.0;
@@ -231,9 +235,8 @@ impl Run<'_> {
             volume_ratio_min: ratios.clone().fold(f64::INFINITY, f64::min),
             volume_ratio_max: ratios.fold(0.0, f64::max),
             error_bar_n: None,
-            error_skin_near_n: None,
+            error_near_n: None,
             error_skin_far_n: None,
-            error_levels_near_n: None,
             error_levels_deep_n: None,
             layer_thickness_mm: (indentation.thicknesses(&self.state).iter())
                 .map(|t| t * 1e3)

@@ -69,16 +69,21 @@ pub struct Sample {
     /// Half the width of the force's error bar, N; `None` if it was not estimated. See
     /// [`crate::accuracy`].
     pub error_bar_n: Option<f64>,
-    /// Change of the force by finer triangles near the tool, N.
-    pub error_skin_near_n: Option<f64>,
+    /// Change of the force by finer prisms near the tool, N.
+    pub error_near_n: Option<f64>,
     /// Change of the force by finer triangles around them, N.
     pub error_skin_far_n: Option<f64>,
-    /// Change of the force by finer intervals near the skin, N.
-    pub error_levels_near_n: Option<f64>,
     /// Change of the force by finer deep intervals, N.
     pub error_levels_deep_n: Option<f64>,
     /// Thickness of each layer along the pressed column, mm. `[n_layers]`
     pub layer_thickness_mm: Vec<f64>,
+}
+
+impl Sample {
+    /// Whether the sample is on the first way down of its run.
+    pub fn is_first_loading(&self) -> bool {
+        self.cycle == 0 && self.phase == Phase::Load
+    }
 }
 
 /// Result of the step to a sample; [`Failure`] says where a step failed.

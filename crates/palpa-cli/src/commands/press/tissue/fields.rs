@@ -1,6 +1,6 @@
 //! One frame of the series: the deformed body with its fields.
 
-use palpa_fem::{PrismField, prism_fields};
+use palpa_fem::PrismField;
 
 use super::super::files::with_making;
 use palpa::press::tissue::{Indentation, Run};
@@ -13,7 +13,7 @@ use palpa_plot::vtu::Grid;
 pub(super) fn grid(indentation: &Indentation, lump_shares: &[f64], run: &Run<'_>) -> Grid {
     let (model, mesh) = (&indentation.model, indentation.mesh());
     let body = &mesh.body;
-    let fields = prism_fields(model, &run.state, &run.workspace);
+    let fields = &run.fields;
     let scalar = |of: fn(&PrismField) -> f64| fields.iter().map(of).collect::<Vec<f64>>();
     let cauchy: Vec<_> = fields.iter().map(|field| field.cauchy).collect();
     let mut pressure = vec![0.0; body.n_nodes()];

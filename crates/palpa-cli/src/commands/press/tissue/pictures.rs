@@ -196,7 +196,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
             }
             let mut back = points(&[Phase::Retract]);
             let bars = (of_run.iter())
-                .filter(|s| s.cycle == 0 && cycle == 0 && s.phase == Phase::Load)
+                .filter(|s| cycle == 0 && s.is_first_loading())
                 .filter_map(|s| {
                     let bar = s.error_bar_n?;
                     Some([s.depth_mm, s.force_n - bar, s.force_n + bar])
@@ -271,7 +271,7 @@ fn layers(samples: &[&Sample], indentation: &Indentation) -> Chart {
     )
     .title("Layers under the tool");
     let down: Vec<&&Sample> = (samples.iter())
-        .filter(|s| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load)
+        .filter(|s| s.run == 0 && s.is_first_loading())
         .collect();
     let Some(rest) = down.first() else {
         return chart;

@@ -8,10 +8,11 @@ use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa_plot::output::CsvTable;
 
 /// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
-/// run leaves a valid table.
+/// run leaves a valid table. `with_bars` says whether error bars are wanted later.
 pub(super) fn record<'a>(
     job: &Job<'_>,
     indentation: &'a Indentation,
+    with_bars: bool,
 ) -> anyhow::Result<Record<'a>> {
     let Job {
         args, context, out, ..
@@ -20,7 +21,11 @@ pub(super) fn record<'a>(
     let n_samples = indentation.n_samples();
     let lump_shares = indentation.prepared.lump_shares();
     let mut series = Series::new(args.frames, n_samples, indentation.deepest());
-    let mut record = Record::new(indentation);
+    let mut record = if with_bars {
+        Record::with_displacements(indentation)
+    } else {
+        Record::new(indentation)
+    };
     let n_runs = indentation.speeds.len();
     let progress = context.progress(n_samples * n_runs, "pressing");
     'runs: for index in 0..n_runs {

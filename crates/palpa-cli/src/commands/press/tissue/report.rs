@@ -10,9 +10,8 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
-use palpa::accuracy::ErrorBars;
+use palpa::accuracy::{ErrorBars, MeshChoice};
 use palpa::build::in_mm;
-use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
 /// Content of press.json and of the `--json` output.
@@ -27,6 +26,8 @@ pub(super) struct PressReport<'a> {
     pub(super) press: PressFacts,
     pub(super) result: PressResult,
     pub(super) notes: &'a [String],
+    /// How the mesh was chosen; `None` if no accuracy was asked for.
+    pub(super) mesh_choice: Option<&'a MeshChoice>,
     /// Contributions to the force's error at the depths that were probed; `None` if they were not.
     pub(super) error_bars: Option<&'a ErrorBars>,
     pub(super) samples: &'a [Sample],
@@ -221,7 +222,7 @@ fn run_in_words(run: &RunResult) -> String {
 /// Prints the table of the first loading.
 fn say_table(job: &Job<'_>, indentation: &Indentation, samples: &[Sample]) -> anyhow::Result<()> {
     const ROWS: usize = 12;
-    let is_down = |s: &&Sample| s.run == 0 && s.cycle == 0 && s.phase == Phase::Load;
+    let is_down = |s: &&Sample| s.run == 0 && s.is_first_loading();
     let loading: Vec<&Sample> = samples.iter().filter(is_down).collect();
     let names = indentation.mesh().body.layer_names.join(", ");
     let mut table = Table::new([
@@ -267,9 +268,8 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
         return Ok(());
     };
     let words = [
-        "triangles near the tool",
+        "prisms near the tool",
         "triangles around them",
-        "intervals near the skin",
         "deep intervals",
     ];
     let changes = (words.iter().zip(probed.changes)).map(|(word, change)| match change {

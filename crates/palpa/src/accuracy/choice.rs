@@ -1,0 +1,362 @@
+//! The choice of a mesh by its error bar: finer where it matters, coarser where it does not.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use palpa_mesh::{LayeredBody, SurfaceIndex, Vec3};
+use palpa_scene::Scene;
+use serde::Serialize;
+
+use super::probe::{self, Base};
+use super::{ErrorBars, Probed, SAFETY, Source};
+use crate::Prepared;
+use crate::build::BuiltBody;
+use crate::note::Note;
+use crate::press::mesh::Sizes;
+use crate::press::tissue::Indentation;
+
+/// Most meshes that are tried, and most sizes for a mesh that differs from the one before.
+const MOST_ROUNDS: usize = 10;
+const MOST_TRIES: usize = 8;
+/// Edges of the first mesh, as a share of the contact radius, and their limits, m.
+const FIRST: f64 = 0.35;
+const LIMITS: (f64, f64) = (0.1e-3, 10e-3);
+/// Share of the bar that the part near the tool may have.
+const NEAR_SHARE: f64 = 0.65;
+/// A mesh is aimed at a bar smaller than what is asked by this factor.
+const AIM: f64 = 0.9;
+/// Expected order of a contribution in its size: at the sharp edge of a bonded disc, and else.
+const EDGE_ORDER: f64 = 1.0;
+const ORDER: f64 = 1.5;
+/// Range of factors on a size from one mesh to the next.
+const FACTORS: (f64, f64) = (0.6, 1.4);
+/// Factor on sizes whose probe found no equilibrium, or on all if the press found none. Since
+/// triangles are divided in two, a factor nearer to 1 would change little.
+const BLIND: f64 = 0.7;
+/// Expected growth of the time of a round with the number of nodes.
+const TIME_ORDER: f64 = 1.4;
+
+/// What is asked of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Half the width of the error bar at the deepest, as a share of the force.
+    pub accuracy: f64,
+    /// Longest time for the choice; `None` without limit.
+    pub max_time: Option<Duration>,
+}
+
+/// One mesh that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Round {
+    /// Number of nodes.
+    pub n_nodes: usize,
+    /// Number of levels.
+    pub n_levels: usize,
+    /// Mean length of the skin's edges near the tool, mm.
+    pub edge_mm: f64,
+    /// The probes at the deepest; `None` if the press found no equilibrium.
+    pub probed: Option<Probed>,
+    /// Half the width of the bar as a share of the force; `None` if a probe failed.
+    pub half_width: Option<f64>,
+    /// Time for this mesh, s.
+    pub seconds: f64,
+}
+
+/// How a choice ended.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum End {
+    /// The bar is small enough.
+    Reached,
+    /// The next mesh would have more skin vertices than are allowed.
+    MaxVertices {
+        /// The number allowed.
+        max_vertices: usize,
+    },
+    /// The next mesh would have too many levels.
+    MaxLevels,
+    /// The next mesh would probably take longer than what is left of the time.
+    MaxTime {
+        /// Time that it would take, s.
+        expected_s: f64,
+    },
+    /// Finer meshes did not make the bar smaller, or none found an equilibrium.
+    NoProgress,
+}
+
+/// How a mesh was chosen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeshChoice {
+    /// Half the width of the bar that was asked for, as a share of the force.
+    pub accuracy: f64,
+    /// The meshes that were tried, in their order.
+    pub rounds: Vec<Round>,
+    /// Index of the best.
+    pub best: usize,
+    /// How the choice ended.
+    pub end: End,
+    /// The contributions at the deepest on the best mesh, if they were found.
+    #[serde(skip)]
+    pub bars: Option<ErrorBars>,
+}
+
+impl MeshChoice {
+    /// Half the width of the best bar as a share of the force.
+    pub fn half_width(&self) -> Option<f64> {
+        self.rounds[self.best].half_width
+    }
+}
+
+/// Factors on the sizes of a mesh: near the tool, and far from it. Edges and heights have the same
+/// factor, since prisms that are flat or tall have larger errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Factors {
+    near: f64,
+    far: f64,
+    /// Whether the sizes had to be smaller than those before.
+    is_smaller: [bool; 2],
+}
+
+impl Factors {
+    fn sizes(self, scene: &Scene) -> Sizes {
+        let h = (FIRST * scene.tool.contact_radius()).clamp(LIMITS.0, LIMITS.1);
+        let mut sizes = Sizes::even(scene, h, scene.mesh.growth);
+        for graded in [&mut sizes.skin, &mut sizes.levels] {
+            (graded.near, graded.far) = (self.near, self.far);
+        }
+        sizes
+    }
+
+    /// The factors after a mesh with these contributions.
+    fn after(self, round: &Round, accuracy: f64, is_edged: bool, is_first: bool) -> Self {
+        let probed = round.probed.as_ref();
+        // Only the first mesh is made coarser where it is too fine: else sizes would go to and fro.
+        let most = if is_first && round.half_width.is_some_and(|half| half < accuracy) {
+            FACTORS.1
+        } else {
+            1.0
+        };
+        let size = |sources: &[Source]| -> Option<f64> {
+            let size = |source: &Source| probed?.changes[*source as usize].map(f64::abs);
+            sources.iter().map(size).sum()
+        };
+        let sums = [
+            size(&[Source::Near]),
+            size(&[Source::SkinFar, Source::LevelsDeep]),
+        ];
+        // Each part may have its share of the bar, and what the other part leaves of its own.
+        let all = AIM * accuracy / SAFETY;
+        let shares = [NEAR_SHARE * all, (1.0 - NEAR_SHARE) * all];
+        let left = |i: usize| sums[1 - i].map_or(0.0, |other| (shares[1 - i] - other).max(0.0));
+        let orders = [if is_edged { EDGE_ORDER } else { ORDER }, ORDER];
+        let factor = |i: usize| {
+            let Some(sum) = sums[i] else {
+                return BLIND;
+            };
+            // The share of a part that is too coarse is not spent elsewhere.
+            let wanted = ((shares[i] + left(i)) / sum).powf(1.0 / orders[i]);
+            if wanted < 1.0 {
+                wanted.clamp(FACTORS.0, BLIND)
+            } else {
+                wanted.min(most)
+            }
+        };
+        let [near, far] = [factor(0), factor(1)];
+        Self {
+            near: self.near * near,
+            far: self.far * far,
+            is_smaller: [near < 1.0, far < 1.0],
+        }
+    }
+
+    /// Smaller sizes where they had to be smaller.
+    fn finer(self) -> Self {
+        let [near, far] = self.is_smaller.map(|is| if is { BLIND } else { 1.0 });
+        Self {
+            near: self.near * near,
+            far: self.far * far,
+            ..self
+        }
+    }
+}
+
+/// Chooses the mesh for the press of a scene, on a body grown for it. `progress` is called before
+/// each mesh and probe with the meshes so far; if it returns false, the choice is given up. Returns
+/// the press on the best mesh; `None` if the choice was given up.
+///
+/// The first mesh has edges of about a third of the contact radius. Its probes say how much each size
+/// contributes to the bar; the sizes of the next mesh follow from that.
+///
+/// # Errors
+/// When place, depth, tissues or lumps do not fit the body, or the tool has no size.
+pub fn choose_mesh(
+    scene: &Scene,
+    grown: &Arc<BuiltBody>,
+    goal: &Goal,
+    mut progress: impl FnMut(&[Round]) -> bool,
+) -> anyhow::Result<Option<(Indentation, MeshChoice)>> {
+    if scene.tool.contact_radius() <= 0.0 {
+        anyhow::bail!(
+            "a tool of a single node has a force that grows without limit as the mesh gets finer, so that no accuracy \
+             can be reached; press with a disc or another shape"
+        );
+    }
+    let start = Instant::now();
+    let mut factors = Factors {
+        near: 1.0,
+        far: 1.0,
+        is_smaller: [false; 2],
+    };
+    let mut rounds: Vec<Round> = Vec::new();
+    // The last mesh with an equilibrium, and its displacements.
+    let mut solved: Option<(LayeredBody, Vec<Vec3>)> = None;
+    let mut best: Option<(usize, Indentation, Option<ErrorBars>)> = None;
+    let end = loop {
+        if !progress(&rounds) {
+            return Ok(None);
+        }
+        let begin = Instant::now();
+        let prepared = next_mesh(scene, grown, &mut factors, rounds.last())?;
+        if let Some(last) = rounds.last() {
+            let n_nodes = prepared.mesh.body.n_nodes();
+            if let Some(limit) = limit_met(&prepared) {
+                break limit;
+            }
+            let growth = (n_nodes as f64 / last.n_nodes as f64).powf(TIME_ORDER);
+            let expected_s = start.elapsed().as_secs_f64() + last.seconds * growth.max(1.0);
+            if (goal.max_time).is_some_and(|most| expected_s > most.as_secs_f64()) {
+                break End::MaxTime { expected_s };
+            }
+        }
+        let press = Indentation::build(Arc::new(prepared))?;
+        let base = deepest(&press, solved.as_ref());
+        let bars = match &base {
+            Some(base) => {
+                let base = std::slice::from_ref(base);
+                let Some(bars) = probe::run(&press, base, &mut |_, _| progress(&rounds)) else {
+                    return Ok(None);
+                };
+                Some(bars)
+            }
+            None => None,
+        };
+        if let Some(base) = base {
+            solved = Some((press.mesh().body.clone(), base.displacements));
+        }
+        let probed = bars.as_ref().and_then(|bars| bars.probed.first().cloned());
+        let half_width = probed.as_ref().and_then(Probed::half_width);
+        let is_best = best.as_ref().is_none_or(|(index, ..)| {
+            let before = rounds[*index].half_width.unwrap_or(f64::INFINITY);
+            half_width.is_some_and(|now| now < before)
+        });
+        let round = Round {
+            n_nodes: press.model.n_nodes(),
+            n_levels: press.mesh().body.n_levels,
+            edge_mm: press.mesh().mesh_size * 1e3,
+            probed,
+            half_width,
+            seconds: begin.elapsed().as_secs_f64(),
+        };
+        let is_edged = scene.tool.is_bonded();
+        factors = factors.after(&round, goal.accuracy, is_edged, rounds.is_empty());
+        rounds.push(round);
+        if is_best {
+            best = Some((rounds.len() - 1, press, bars));
+        }
+        if half_width.is_some_and(|half| half <= goal.accuracy) {
+            break End::Reached;
+        }
+        if rounds.len() == MOST_ROUNDS {
+            break End::NoProgress;
+        }
+    };
+    let Some((best, press, bars)) = best else {
+        unreachable!("the first mesh is the best at first");
+    };
+    let choice = MeshChoice {
+        accuracy: goal.accuracy,
+        rounds,
+        best,
+        end,
+        bars,
+    };
+    Ok(Some((press, choice)))
+}
+
+/// The mesh with these sizes. If it is the last one again, sizes are made smaller: triangles are
+/// divided in two, so that a somewhat smaller size may change nothing.
+fn next_mesh(
+    scene: &Scene,
+    grown: &Arc<BuiltBody>,
+    factors: &mut Factors,
+    last: Option<&Round>,
+) -> anyhow::Result<Prepared> {
+    let mut n_tries = 0;
+    loop {
+        let sizes = Some(factors.sizes(scene));
+        let prepared = Prepared::with_sizes(scene, Arc::clone(grown), sizes, &[])?;
+        let is_new = last.is_none_or(|last| last.n_nodes != prepared.mesh.body.n_nodes());
+        if is_new || n_tries == MOST_TRIES {
+            return Ok(prepared);
+        }
+        *factors = factors.finer();
+        n_tries += 1;
+    }
+}
+
+/// The equilibrium at the deepest, from that of another mesh if it is known.
+fn deepest(press: &Indentation, solved: Option<&(LayeredBody, Vec<Vec3>)>) -> Option<Base> {
+    let (mut ws, depth) = (press.workspace(), press.prepared.scene.press.depth);
+    let guess = solved.map(|(body, found)| carried(body, found, &press.mesh().body));
+    guess
+        .and_then(|guess| Base::find(press, &mut ws, depth, Some(&guess)))
+        .or_else(|| Base::find(press, &mut ws, depth, None))
+}
+
+/// Displacements (m, `[n_nodes]`) of a mesh, carried to another mesh of the same body.
+fn carried(from: &LayeredBody, displacements: &[Vec3], to: &LayeredBody) -> Vec<Vec3> {
+    let index = SurfaceIndex::build(&from.skin);
+    let lengths = |column: &[Vec3]| -> Vec<f64> {
+        let mut length = 0.0;
+        let steps = column.windows(2).map(|ends| (ends[1] - ends[0]).norm());
+        let below = steps.map(|step| {
+            length += step;
+            length
+        });
+        std::iter::once(0.0).chain(below).collect()
+    };
+    let mut carried = Vec::with_capacity(to.n_nodes());
+    for (column, p) in to.positions.chunks(to.n_levels).zip(&to.skin.points) {
+        let Some(closest) = index.closest(*p) else {
+            carried.extend(column.iter().map(|_| Vec3::zeros()));
+            continue;
+        };
+        let corners = from.skin.triangles[closest.triangle as usize];
+        let mean = |field: &[Vec3], l: usize| -> Vec3 {
+            let of = |(&v, weight): (&u32, f64)| field[from.node(v as usize, l)] * weight;
+            corners.iter().zip(closest.weights).map(of).sum()
+        };
+        let levels = 0..from.n_levels;
+        let old: Vec<Vec3> = levels.map(|l| mean(&from.positions, l)).collect();
+        let (old, new) = (lengths(&old), lengths(column));
+        let stretch = old[old.len() - 1] / new[new.len() - 1];
+        for at in new.into_iter().map(|at| at * stretch) {
+            let below = old.partition_point(|&l| l < at).clamp(1, old.len() - 1);
+            let share = (at - old[below - 1]) / (old[below] - old[below - 1]);
+            let ends = [below - 1, below].map(|l| mean(displacements, l));
+            carried.push(ends[0].lerp(&ends[1], share.clamp(0.0, 1.0)));
+        }
+    }
+    carried
+}
+
+/// The limit that kept a mesh from being as fine as wanted.
+fn limit_met(prepared: &Prepared) -> Option<End> {
+    prepared.notes.iter().find_map(|note| match note {
+        Note::SkinTooCoarse { max_vertices, .. } => Some(End::MaxVertices {
+            max_vertices: *max_vertices,
+        }),
+        Note::LevelsTooHigh { .. } => Some(End::MaxLevels),
+        _ => None,
+    })
+}
