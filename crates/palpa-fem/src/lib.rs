@@ -33,7 +33,8 @@ pub use model::{Model, ModelParams, Supports};
 pub use posed_tool::PosedTool;
 pub use state::{State, Touch};
 pub use statics::{
-    ContactResiduals, Load, Outcome, SolveParams, StepReport, Workspace, advance, equilibrate,
+    ContactResiduals, Load, Outcome, SolveParams, StepReport, Workspace, advance, assume_touches,
+    equilibrate,
 };
 
 /// A 3 × 3 matrix, such as a deformation gradient.

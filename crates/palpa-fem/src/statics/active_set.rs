@@ -11,7 +11,7 @@ use palpa_mesh::Vec3;
 use crate::Mat3;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
-use crate::state::Touch;
+use crate::state::{State, Touch};
 use crate::system::Hold;
 
 /// A slip below this (m) has no defined direction.
@@ -93,19 +93,9 @@ impl ActiveSet {
                     .min_by(|&a, &b| depth(a).total_cmp(&depth(b)))
             });
             let Some(k) = k else { continue };
-            let PosedTool { tool, pose } = &tools[k];
             if *touch == Touch::Open {
                 n_new += 1;
-                let distance = tool.distance_at(pose, &x);
-                let surface = x - distance.normal * distance.distance;
-                let anchor = pose.inverse_transform_point(&surface.into()).coords;
-                let has_friction = tool.friction() > 0.0;
-                let tool = k as u32;
-                *touch = if has_friction && self.smoothing == 0.0 {
-                    Touch::Stick { tool, anchor }
-                } else {
-                    Touch::Slip { tool, anchor }
-                };
+                *touch = first_touch(tools, k, &x, self.smoothing == 0.0);
             }
             let contact = ActiveVertex::new(node, vertex, *touch, &tools[k], &x);
             self.active.push(ActiveVertex {
@@ -307,6 +297,45 @@ impl ActiveVertex {
     }
 }
 
+/// The touch of a vertex at `x` that has come into contact with tool `k`.
+fn first_touch(tools: &[PosedTool], k: usize, x: &Vec3, may_stick: bool) -> Touch {
+    let anchor = anchor(&tools[k], x);
+    let (tool, has_friction) = (k as u32, tools[k].tool.friction() > 0.0);
+    if has_friction && may_stick {
+        Touch::Stick { tool, anchor }
+    } else {
+        Touch::Slip { tool, anchor }
+    }
+}
+
+/// The point of a tool's surface nearest to `x`, in the tool's frame, m.
+fn anchor(tool: &PosedTool, x: &Vec3) -> Vec3 {
+    let PosedTool { tool, pose } = tool;
+    let distance = tool.distance_at(pose, x);
+    let surface = x - distance.normal * distance.distance;
+    pose.inverse_transform_point(&surface.into()).coords
+}
+
+/// Marks open vertices as touching the nearest tool where they are, for a state whose displacements
+/// are near an equilibrium in which those vertices touch. `is_touching` as `[n_vertices]`.
+///
+/// A vertex that is not marked is found only once it is inside a tool. From displacements of another
+/// mesh, half of the vertices under the tool are a little outside.
+pub fn assume_touches(model: &Model, state: &mut State, tools: &[PosedTool], is_touching: &[bool]) {
+    for (vertex, touch) in state.touches.iter_mut().enumerate() {
+        if !is_touching[vertex] || *touch != Touch::Open {
+            continue;
+        }
+        let node = model.body.node(vertex, 0);
+        let x = model.body.positions[node] + state.displacements[node];
+        let distance = |k: &usize| tools[*k].tool.distance_at(&tools[*k].pose, &x).distance;
+        let nearest = (0..tools.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(k) = nearest {
+            *touch = first_touch(tools, k, &x, true);
+        }
+    }
+}
+
 /// Ends a step: sets the anchors of sliding vertices to their present positions.
 pub(super) fn anchor_slides(
     model: &Model,
@@ -315,14 +344,11 @@ pub(super) fn anchor_slides(
     touches: &mut [Touch],
 ) {
     for (vertex, touch) in touches.iter_mut().enumerate() {
-        let Touch::Slip { tool, anchor } = touch else {
+        let Touch::Slip { tool, anchor: at } = touch else {
             continue;
         };
         let node = model.body.node(vertex, 0);
         let x = model.body.positions[node] + displacements[node];
-        let PosedTool { tool, pose } = &tools[*tool as usize];
-        let distance = tool.distance_at(pose, &x);
-        let surface = x - distance.normal * distance.distance;
-        *anchor = pose.inverse_transform_point(&surface.into()).coords;
+        *at = anchor(&tools[*tool as usize], &x);
     }
 }

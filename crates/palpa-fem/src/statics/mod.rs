@@ -27,7 +27,7 @@ mod report;
 mod smoothing;
 mod workspace;
 
-pub use active_set::ContactResiduals;
+pub use active_set::{ContactResiduals, assume_touches};
 pub use load::{Load, SolveParams};
 pub use load_steps::advance;
 pub use newton::equilibrate;

@@ -4,7 +4,7 @@ use palpa_fem::law::NeoHookean;
 use palpa_fem::shape::{Pose, Sphere, Tool};
 use palpa_fem::{
     Load, Material, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State,
-    StepReport, Supports, Workspace, advance,
+    StepReport, Supports, Workspace, advance, assume_touches, equilibrate,
 };
 use palpa_mesh::Vec3;
 use palpa_mesh::generate::{GradedBlock, GradedLayer, LevelStack, Outline, graded_block};
@@ -88,4 +88,44 @@ fn forces_do_not_depend_on_whether_factors_are_kept() {
         }
         assert!(fresh.last().unwrap().tool_forces[0].z > 0.1);
     }
+}
+
+/// From the displacements of an equilibrium and its touches, there is nothing left to do.
+#[test]
+fn an_equilibrium_with_its_touches_is_taken_over_at_once() {
+    let model = block();
+    let tool = Tool::new(Sphere::new(8e-3).unwrap(), 0.0).unwrap();
+    let at = |depth: f64| {
+        [PosedTool {
+            tool,
+            pose: Pose::translation(0.0, 0.0, -depth),
+        }]
+    };
+    let [before, tools] = [at(0.0), at(4e-3)];
+    let load = |tools| Load {
+        tools,
+        ..Load::default()
+    };
+    let params = SolveParams::default();
+    let mut ws = Workspace::new(&model);
+    let mut found = State::new(&model);
+    advance(
+        &model,
+        &mut found,
+        &mut ws,
+        &load(&before),
+        &load(&tools),
+        &params,
+    );
+    let is_touching: Vec<bool> = found.touches.iter().map(|t| t.tool().is_some()).collect();
+    let n_touching = is_touching.iter().filter(|is| **is).count();
+    assert!(n_touching > 10);
+
+    let mut taken = State::new(&model);
+    taken.displacements.clone_from(&found.displacements);
+    assume_touches(&model, &mut taken, &tools, &is_touching);
+    let report = equilibrate(&model, &mut taken, &mut ws, &load(&tools), &params);
+    assert_eq!(report.outcome, Outcome::Converged);
+    assert_eq!(report.iterations, 0);
+    assert_eq!(taken.displacements, found.displacements);
 }

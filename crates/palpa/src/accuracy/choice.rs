@@ -3,17 +3,19 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use palpa_mesh::{LayeredBody, SurfaceIndex, Vec3};
+use palpa_mesh::refine::mean_depths;
+use palpa_mesh::{LayeredBody, Vec3};
 use palpa_scene::Scene;
 use serde::Serialize;
 
 use super::probe::{self, Base};
-use super::{ErrorBars, Probed, SAFETY, Source};
+use super::{Probed, SAFETY, Source};
 use crate::Prepared;
 use crate::build::BuiltBody;
 use crate::note::Note;
 use crate::press::mesh::Sizes;
-use crate::press::tissue::Indentation;
+use crate::press::tissue::{Deformed, Indentation};
+use crate::skin::Skin;
 
 /// Most meshes that are tried, and most sizes for a mesh that differs from the one before.
 const MOST_ROUNDS: usize = 10;
@@ -23,7 +25,7 @@ const FIRST: f64 = 0.35;
 const LIMITS: (f64, f64) = (0.1e-3, 10e-3);
 /// Share of the bar that the part near the tool may have.
 const NEAR_SHARE: f64 = 0.65;
-/// A mesh is aimed at a bar smaller than what is asked by this factor.
+/// Each mesh aims at this share of the bar that is asked for.
 const AIM: f64 = 0.9;
 /// Expected order of a contribution in its size: at the sharp edge of a bonded disc, and else.
 const EDGE_ORDER: f64 = 1.0;
@@ -36,7 +38,7 @@ const BLIND: f64 = 0.7;
 /// Expected growth of the time of a round with the number of nodes.
 const TIME_ORDER: f64 = 1.4;
 
-/// What is asked of a mesh.
+/// The accuracy that is asked for, and the time it may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
     /// Half the width of the error bar at the deepest, as a share of the force.
@@ -95,15 +97,17 @@ pub struct MeshChoice {
     pub best: usize,
     /// How the choice ended.
     pub end: End,
-    /// The contributions at the deepest on the best mesh, if they were found.
-    #[serde(skip)]
-    pub bars: Option<ErrorBars>,
 }
 
 impl MeshChoice {
     /// Half the width of the best bar as a share of the force.
     pub fn half_width(&self) -> Option<f64> {
         self.rounds[self.best].half_width
+    }
+
+    /// The contributions at the deepest on the best mesh, if they were found.
+    pub fn probed(&self) -> Option<&Probed> {
+        self.rounds[self.best].probed.as_ref()
     }
 }
 
@@ -208,9 +212,9 @@ pub fn choose_mesh(
         is_smaller: [false; 2],
     };
     let mut rounds: Vec<Round> = Vec::new();
-    // The last mesh with an equilibrium, and its displacements.
-    let mut solved: Option<(LayeredBody, Vec<Vec3>)> = None;
-    let mut best: Option<(usize, Indentation, Option<ErrorBars>)> = None;
+    // The last mesh with an equilibrium, and the body deformed in it.
+    let mut solved: Option<(LayeredBody, Deformed)> = None;
+    let mut best: Option<(usize, Indentation)> = None;
     let end = loop {
         if !progress(&rounds) {
             return Ok(None);
@@ -230,22 +234,19 @@ pub fn choose_mesh(
         }
         let press = Indentation::build(Arc::new(prepared))?;
         let base = deepest(&press, solved.as_ref());
-        let bars = match &base {
-            Some(base) => {
-                let base = std::slice::from_ref(base);
-                let Some(bars) = probe::run(&press, base, &mut |_, _| progress(&rounds)) else {
-                    return Ok(None);
-                };
-                Some(bars)
-            }
-            None => None,
-        };
-        if let Some(base) = base {
-            solved = Some((press.mesh().body.clone(), base.displacements));
+        let mut probed = None;
+        if let Some(base) = &base {
+            let base = std::slice::from_ref(base);
+            let Some(bars) = probe::run(&press, base, &mut |_, _| progress(&rounds)) else {
+                return Ok(None);
+            };
+            probed = bars.probed.into_iter().next();
         }
-        let probed = bars.as_ref().and_then(|bars| bars.probed.first().cloned());
+        if let Some(base) = base {
+            solved = Some((press.mesh().body.clone(), base.deformed));
+        }
         let half_width = probed.as_ref().and_then(Probed::half_width);
-        let is_best = best.as_ref().is_none_or(|(index, ..)| {
+        let is_best = best.as_ref().is_none_or(|(index, _)| {
             let before = rounds[*index].half_width.unwrap_or(f64::INFINITY);
             half_width.is_some_and(|now| now < before)
         });
@@ -261,7 +262,7 @@ pub fn choose_mesh(
         factors = factors.after(&round, goal.accuracy, is_edged, rounds.is_empty());
         rounds.push(round);
         if is_best {
-            best = Some((rounds.len() - 1, press, bars));
+            best = Some((rounds.len() - 1, press));
         }
         if half_width.is_some_and(|half| half <= goal.accuracy) {
             break End::Reached;
@@ -270,7 +271,7 @@ pub fn choose_mesh(
             break End::NoProgress;
         }
     };
-    let Some((best, press, bars)) = best else {
+    let Some((best, press)) = best else {
         unreachable!("the first mesh is the best at first");
     };
     let choice = MeshChoice {
@@ -278,7 +279,6 @@ pub fn choose_mesh(
         rounds,
         best,
         end,
-        bars,
     };
     Ok(Some((press, choice)))
 }
@@ -305,7 +305,7 @@ fn next_mesh(
 }
 
 /// The equilibrium at the deepest, from that of another mesh if it is known.
-fn deepest(press: &Indentation, solved: Option<&(LayeredBody, Vec<Vec3>)>) -> Option<Base> {
+fn deepest(press: &Indentation, solved: Option<&(LayeredBody, Deformed)>) -> Option<Base> {
     let (mut ws, depth) = (press.workspace(), press.prepared.scene.press.depth);
     let guess = solved.map(|(body, found)| carried(body, found, &press.mesh().body));
     guess
@@ -313,41 +313,37 @@ fn deepest(press: &Indentation, solved: Option<&(LayeredBody, Vec<Vec3>)>) -> Op
         .or_else(|| Base::find(press, &mut ws, depth, None))
 }
 
-/// Displacements (m, `[n_nodes]`) of a mesh, carried to another mesh of the same body.
-fn carried(from: &LayeredBody, displacements: &[Vec3], to: &LayeredBody) -> Vec<Vec3> {
-    let index = SurfaceIndex::build(&from.skin);
-    let lengths = |column: &[Vec3]| -> Vec<f64> {
-        let mut length = 0.0;
-        let steps = column.windows(2).map(|ends| (ends[1] - ends[0]).norm());
-        let below = steps.map(|step| {
-            length += step;
-            length
-        });
-        std::iter::once(0.0).chain(below).collect()
-    };
-    let mut carried = Vec::with_capacity(to.n_nodes());
-    for (column, p) in to.positions.chunks(to.n_levels).zip(&to.skin.points) {
-        let Some(closest) = index.closest(*p) else {
-            carried.extend(column.iter().map(|_| Vec3::zeros()));
+/// The deformed body of a mesh, carried to another mesh of the same body.
+fn carried(from: &LayeredBody, deformed: &Deformed, to: &LayeredBody) -> Deformed {
+    let skin = Skin::new(&from.skin);
+    let mut displacements = Vec::with_capacity(to.n_nodes());
+    let mut is_touching = vec![false; to.n_vertices()];
+    for (v, p) in to.skin.points.iter().enumerate() {
+        let Some(point) = skin.nearest(*p) else {
+            displacements.extend(vec![Vec3::zeros(); to.n_levels]);
             continue;
         };
-        let corners = from.skin.triangles[closest.triangle as usize];
-        let mean = |field: &[Vec3], l: usize| -> Vec3 {
-            let of = |(&v, weight): (&u32, f64)| field[from.node(v as usize, l)] * weight;
-            corners.iter().zip(closest.weights).map(of).sum()
-        };
-        let levels = 0..from.n_levels;
-        let old: Vec<Vec3> = levels.map(|l| mean(&from.positions, l)).collect();
-        let (old, new) = (lengths(&old), lengths(column));
+        let touching = point.mean(|v| Vec3::repeat(f64::from(deformed.is_touching[v])));
+        is_touching[v] = touching.x > 0.5;
+        let mean = |field: &[Vec3], l: usize| point.mean(|v| field[from.node(v, l)]);
+        let mut old = vec![0.0; from.n_levels];
+        for l in 1..from.n_levels {
+            let below = mean(&from.positions, l) - mean(&from.positions, l - 1);
+            old[l] = old[l - 1] + below.norm();
+        }
+        let new = mean_depths(to, &[v as u32]);
         let stretch = old[old.len() - 1] / new[new.len() - 1];
         for at in new.into_iter().map(|at| at * stretch) {
             let below = old.partition_point(|&l| l < at).clamp(1, old.len() - 1);
             let share = (at - old[below - 1]) / (old[below] - old[below - 1]);
-            let ends = [below - 1, below].map(|l| mean(displacements, l));
-            carried.push(ends[0].lerp(&ends[1], share.clamp(0.0, 1.0)));
+            let ends = [below - 1, below].map(|l| mean(&deformed.displacements, l));
+            displacements.push(ends[0].lerp(&ends[1], share.clamp(0.0, 1.0)));
         }
     }
-    carried
+    Deformed {
+        displacements,
+        is_touching,
+    }
 }
 
 /// The limit that kept a mesh from being as fine as wanted.

@@ -93,7 +93,7 @@ pub struct ErrorBars {
 
 impl ErrorBars {
     /// Probes the first press down of a record that keeps displacements. `known` are contributions
-    /// at its deepest, if they have been found before. `progress` is called before each probe with
+    /// at one of its depths, if they have been found before. `progress` is called before each probe with
     /// its number and the number of all; if it returns false, the probes are given up. `None` if
     /// they were, or if no sample converged.
     ///
@@ -101,14 +101,13 @@ impl ErrorBars {
     /// If the record is not [`Record::with_displacements`].
     pub fn estimate(
         record: &Record<'_>,
-        known: Option<&Self>,
+        known: Option<&Probed>,
         mut progress: impl FnMut(usize, usize) -> bool,
     ) -> Option<Self> {
         let press = record.indentation();
         let mut ws = press.workspace();
-        let known = known.into_iter().flat_map(|bars| &bars.probed);
         let mut bars = Self {
-            probed: known.cloned().collect(),
+            probed: known.cloned().into_iter().collect(),
             n_nodes: 0,
         };
         let mut bases = Vec::new();
@@ -116,8 +115,9 @@ impl ErrorBars {
             let depth_mm = record.samples[index].depth_mm;
             let is_same = |probed: &Probed| (probed.depth_mm - depth_mm).abs() < SAME_DEPTH;
             if !bars.probed.iter().any(is_same) {
-                let guess = Some(record.displacements(index));
-                bases.extend(Base::find(press, &mut ws, depth_mm * 1e-3, guess));
+                let depth = depth_mm * 1e-3;
+                let guess = press.deformed(record.displacements(index), depth);
+                bases.extend(Base::find(press, &mut ws, depth, Some(&guess)));
             }
         }
         drop(ws);
@@ -131,13 +131,11 @@ impl ErrorBars {
 
     /// Enters the bars into the samples of a press. Each run has the forces of its own press down.
     pub fn enter(&self, samples: &mut [Sample]) {
-        let n_runs = samples.last().map_or(0, |s| s.run + 1);
-        let down: Vec<Vec<Sample>> = (0..n_runs)
-            .map(|run| loading(samples, run).into_iter().cloned().collect())
+        let of = |sample: &Sample| self.of(sample, &loading(samples, sample.run));
+        let bars: Vec<Option<ErrorBar>> = (samples.iter())
+            .map(|s| s.outcome.is_converged().then(|| of(s)).flatten())
             .collect();
-        for sample in samples.iter_mut().filter(|s| s.outcome.is_converged()) {
-            let down: Vec<&Sample> = down[sample.run].iter().collect();
-            let bar = self.of(sample, &down);
+        for (sample, bar) in samples.iter_mut().zip(bars) {
             sample.error_bar_n = bar.map(|bar| bar.half_width_n);
             let part = |i: usize| bar.map(|bar| bar.contributions_n[i]);
             sample.error_near_n = part(0);

@@ -2,7 +2,7 @@
 
 use palpa_fem::{
     Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, advance,
-    equilibrate,
+    assume_touches, equilibrate,
 };
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
@@ -11,7 +11,7 @@ use super::{ErrorBars, N_SOURCES, Probed, Source};
 use crate::build::nearest;
 use crate::continuum;
 use crate::press::mesh::NEAR;
-use crate::press::tissue::Indentation;
+use crate::press::tissue::{Deformed, Indentation};
 
 /// The part that is probed reaches this far beyond the tool: a multiple of the tissue's depth, and of
 /// the tool's reach.
@@ -25,25 +25,23 @@ pub(super) struct Base {
     /// Depth of the tool, m.
     depth: f64,
     force_n: f64,
-    /// Displacements of the nodes, m. `[n_nodes]`
-    pub(super) displacements: Vec<Vec3>,
+    pub(super) deformed: Deformed,
 }
 
 impl Base {
     /// The equilibrium at a depth, m; `None` if there is none, or if the tool does not touch yet:
-    /// then there is no force that a change could be relative to. `guess` are displacements near
-    /// those of the equilibrium.
+    /// then there is no force that a change could be relative to. `guess` is near it.
     pub(super) fn find(
         press: &Indentation,
         ws: &mut Workspace,
         depth: f64,
-        guess: Option<&[Vec3]>,
+        guess: Option<&Deformed>,
     ) -> Option<Self> {
-        let (force_n, displacements) = press.elastic(ws, depth, guess)?;
+        let (force_n, deformed) = press.elastic(ws, depth, guess)?;
         (force_n != 0.0).then_some(Self {
             depth,
             force_n,
-            displacements,
+            deformed,
         })
     }
 }
@@ -80,7 +78,7 @@ pub(super) fn run(
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
         for (probed, base) in probed.iter_mut().zip(bases) {
-            let found = probe.force(press, base.depth, &part, &base.displacements);
+            let found = probe.force(press, base.depth, &part, &base.deformed);
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
         }
     }
@@ -123,17 +121,8 @@ impl Probe {
         body: &LayeredBody,
         carry: Carry,
     ) -> anyhow::Result<Self> {
-        let per_vertex = |marks: &[bool]| -> Vec<bool> {
-            // A vertex is marked if all vertices between which it lies are.
-            let n = part.body.n_levels;
-            let marks: Vec<Vec3> = (marks.iter())
-                .flat_map(|&m| vec![Vec3::repeat(f64::from(u8::from(m))); n])
-                .collect();
-            let carried = carry(&marks);
-            (0..body.n_vertices())
-                .map(|v| carried[body.node(v, 0)].x > 1.0 - 1e-9)
-                .collect()
-        };
+        // Marked are the vertices that lie between marked vertices only.
+        let per_vertex = |marks: &[bool]| carried_marks(&carry, marks, part, body, 1.0 - 1e-9);
         let mut rim = vec![false; body.n_vertices()];
         for v in body.skin.boundary_loops().into_iter().flatten() {
             rim[v as usize] = true;
@@ -174,17 +163,17 @@ impl Probe {
         })
     }
 
-    /// The force at a depth, N, with the displacements of the press there; `None` if no equilibrium
+    /// The force at a depth, N, with the deformed body of the press there; `None` if no equilibrium
     /// is found.
     fn force(
         &mut self,
         press: &Indentation,
         depth: f64,
         part: &Part,
-        displacements: &[Vec3],
+        deformed: &Deformed,
     ) -> Option<f64> {
         let n_levels = part.body.n_levels;
-        let guess = (self.carry)(&part.take(displacements, n_levels));
+        let guess = (self.carry)(&part.take(&deformed.displacements, n_levels));
         let way = press.place().direction.into_inner() * depth;
         let rest = (self.carry)(&part.take(press.rest_displacements(), n_levels));
         let held: Vec<(usize, Vec3)> = (self.border.iter().map(|&node| (node, guess[node])))
@@ -198,6 +187,10 @@ impl Probe {
         };
         let mut state = State::new(&self.model);
         state.displacements = guess;
+        let is_touching = part.take(&deformed.is_touching, 1);
+        let body = &self.model.body();
+        let is_touching = carried_marks(&self.carry, &is_touching, part, body, 0.5 - 1e-9);
+        assume_touches(&self.model, &mut state, &tools, &is_touching);
         let params = SolveParams {
             tolerance: TOLERANCE,
             is_near: true,
@@ -218,6 +211,22 @@ impl Probe {
         let report = advance(&self.model, &mut state, ws, &before, &load, &params);
         (report.outcome == Outcome::Converged).then(|| press.force_of(&report, &self.bonded, ws))
     }
+}
+
+/// Marks of the part's vertices, carried to a finer mesh of it: a vertex is marked if more than
+/// `share` of the vertices between which it lies are.
+fn carried_marks(
+    carry: &Carry,
+    marks: &[bool],
+    part: &Part,
+    body: &LayeredBody,
+    share: f64,
+) -> Vec<bool> {
+    let as_field = |&mark: &bool| vec![Vec3::repeat(f64::from(mark)); part.body.n_levels];
+    let carried = carry(&marks.iter().flat_map(as_field).collect::<Vec<Vec3>>());
+    (0..body.n_vertices())
+        .map(|v| carried[body.node(v, 0)].x > share)
+        .collect()
 }
 
 type Carry = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
@@ -342,10 +351,10 @@ mod tests {
                 record.push(&run, sample);
             }
             let last = record.samples.len() - 1;
-            let displacements = record.displacements(last);
+            let deformed = press.deformed(record.displacements(last), 2e-3);
             let carry: Carry = Box::new(<[Vec3]>::to_vec);
             let mut probe = Probe::build(&press, &part, &part.body.clone(), carry).unwrap();
-            let force = probe.force(&press, 2e-3, &part, displacements).unwrap();
+            let force = probe.force(&press, 2e-3, &part, &deformed).unwrap();
             let expected = record.samples[last].force_n;
             assert!(expected > 0.01);
             // The triangles of the part are paired anew, which changes the force a little.

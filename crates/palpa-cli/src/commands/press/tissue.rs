@@ -94,7 +94,7 @@ fn estimate_bars(
     recorded: &mut Record<'_>,
 ) -> anyhow::Result<Option<ErrorBars>> {
     let context = job.context;
-    let known = choice.and_then(|choice| choice.bars.as_ref());
+    let known = choice.and_then(MeshChoice::probed);
     let progress = context.progress(0, "error bar");
     let bars = ErrorBars::estimate(recorded, known, |probe, n_probes| {
         progress.set_message(format!("error bar, probe {} of {n_probes}", probe + 1));

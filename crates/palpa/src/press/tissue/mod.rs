@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use palpa_fem::{
     Dynamics, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
-    equilibrate,
+    assume_touches, equilibrate,
 };
 use palpa_mesh::Vec3;
 
@@ -61,6 +61,18 @@ pub struct Indentation {
     rest: State,
     params: SolveParams,
     dynamics: Option<Dynamics>,
+}
+
+/// A gap below which a vertex of an equilibrium touches the tool, m.
+const TOUCHING: f64 = 1e-6;
+
+/// A deformed body in an equilibrium or near one: displacements, and which vertices touch the tool.
+#[derive(Debug, Clone)]
+pub(crate) struct Deformed {
+    /// Displacements of the nodes, m. `[n_nodes]`
+    pub displacements: Vec<Vec3>,
+    /// Whether each vertex of the skin touches the tool. `[n_vertices]`
+    pub is_touching: Vec<bool>,
 }
 
 /// The contact between tool and skin.
@@ -201,43 +213,65 @@ impl Indentation {
         )
     }
 
-    /// The force (N) and the displacements at a depth (m), without relaxation, inertia or a history
-    /// of friction; `None` if no equilibrium is found. `guess` are displacements near them; without
-    /// them the tool comes from rest.
+    /// The body with these displacements in an equilibrium, with the tool at a depth, m.
+    pub(crate) fn deformed(&self, displacements: &[Vec3], depth: f64) -> Deformed {
+        let body = &self.mesh().body;
+        let tool = self.tool_at(depth);
+        let is_touching = |v: usize| {
+            let node = body.node(v, 0);
+            let x = body.positions[node] + displacements[node];
+            tool.is_some_and(|t| t.tool.distance_at(&t.pose, &x).distance < TOUCHING)
+        };
+        Deformed {
+            is_touching: (0..body.n_vertices()).map(is_touching).collect(),
+            displacements: displacements.to_vec(),
+        }
+    }
+
+    /// The force (N) and the deformed body at a depth (m), without relaxation, inertia or a
+    /// history of friction; `None` if no equilibrium is found. `guess` is near it; without it
+    /// the tool comes from rest.
     pub(crate) fn elastic(
         &self,
         ws: &mut Workspace,
         depth: f64,
-        guess: Option<&[Vec3]>,
-    ) -> Option<(f64, Vec<Vec3>)> {
+        guess: Option<&Deformed>,
+    ) -> Option<(f64, Deformed)> {
         let mut state = State::new(&self.model);
-        state.displacements = guess.unwrap_or(&self.rest.displacements).to_vec();
         let (model, params) = (&self.model, &self.params);
-        let acting = self.acting(depth);
-        let load = acting.load(0.0, None);
-        let report = if guess.is_some() {
-            equilibrate(model, &mut state, ws, &load, params)
+        let mut acting = self.acting(depth);
+        let report = if let Some(guess) = guess {
+            state.displacements.clone_from(&guess.displacements);
+            assume_touches(model, &mut state, &acting.tools, &guess.is_touching);
+            let params = SolveParams {
+                is_near: true,
+                ..*params
+            };
+            equilibrate(model, &mut state, ws, &acting.load(0.0, None), &params)
         } else {
-            let mut before = self.acting(0.0);
-            for step in 1..FROM_REST {
+            state.displacements.clone_from(&self.rest.displacements);
+            acting = self.acting(0.0);
+            let mut step = 0;
+            loop {
+                step += 1;
                 let next = self.acting(depth * step as f64 / FROM_REST as f64);
-                let loads = [&before, &next].map(|acting| acting.load(0.0, None));
-                advance(model, &mut state, ws, &loads[0], &loads[1], params);
-                before = next;
+                let loads = [&acting, &next].map(|acting| acting.load(0.0, None));
+                let report = advance(model, &mut state, ws, &loads[0], &loads[1], params);
+                acting = next;
+                if step == FROM_REST || report.outcome != Outcome::Converged {
+                    break report;
+                }
             }
-            advance(
-                model,
-                &mut state,
-                ws,
-                &before.load(0.0, None),
-                &load,
-                params,
-            )
         };
         let bonded: Vec<usize> = acting.held.iter().map(|held| held.0).collect();
         (report.outcome == Outcome::Converged).then(|| {
             let force = self.force_of(&report, &bonded, ws);
-            (force, state.displacements)
+            let is_touching = state.touches.iter().map(|t| t.tool().is_some());
+            let deformed = Deformed {
+                is_touching: is_touching.collect(),
+                displacements: state.displacements,
+            };
+            (force, deformed)
         })
     }
 

@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use anyhow::bail;
 use indicatif::ProgressBar;
-use palpa::PrepareParams;
 use palpa::accuracy::{End, Goal, MeshChoice, Round, choose_mesh};
-use palpa::build::build_within;
+use palpa::build::build;
 use palpa::press::tissue::Indentation;
 use palpa_scene::units::Share;
 
@@ -20,7 +19,7 @@ pub(super) fn choose(
     progress: &ProgressBar,
 ) -> anyhow::Result<(Indentation, MeshChoice)> {
     let scene = job.scene;
-    let grown = build_within(scene, PrepareParams::default().max_nodes)?.into();
+    let grown = build(scene)?.into();
     let goal = Goal {
         accuracy,
         max_time: scene.mesh.max_time.map(Duration::from_secs_f64),
