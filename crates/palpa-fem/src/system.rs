@@ -248,10 +248,13 @@ impl LinearSystem {
     }
 
     /// Factors the matrix with the least shift that works, in the region only if that is enough.
-    /// Returns the shift; `None` if none works.
+    /// After a shifted factor, the search begins a little below its shift. Returns the shift; `None`
+    /// if none works.
     fn factor_shifted(&mut self, structure: &Structure) -> Option<f64> {
         let is_outer_good = self.factor_exterior(structure, 0.0).is_ok();
+        let least = self.shift / SHIFT_GROWTH;
         let shifts = (0..MOST_SHIFTS).map(|i| FIRST_SHIFT * SHIFT_GROWTH.powi(i));
+        let shifts = shifts.filter(|shift| *shift >= 0.99 * least);
         let unshifted = is_outer_good.then_some(0.0);
         (unshifted.into_iter().chain(shifts)).find(|&shift| {
             (is_outer_good || self.factor_exterior(structure, shift).is_ok())

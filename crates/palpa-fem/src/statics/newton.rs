@@ -266,7 +266,9 @@ impl Newton<'_> {
         let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
         // The first step of a load is the largest. After it, the stiffness is near that at the end.
         let is_large = is_large && ws.system.region.is_none() && self.iterations != 2;
-        let is_kept = ws.system.is_factored && (is_large || self.params.is_near);
+        // A shifted factor is a poor approximation.
+        let is_near = self.params.is_near && ws.system.shift == 0.0;
+        let is_kept = ws.system.is_factored && (is_large || is_near);
         let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.holds);
         if !(is_usable && self.solve(ws, true)) {
             match ws.system.refactor(&model.structure, &ws.holds) {

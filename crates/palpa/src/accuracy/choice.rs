@@ -3,19 +3,16 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use palpa_mesh::refine::mean_depths;
-use palpa_mesh::{LayeredBody, Vec3};
 use palpa_scene::Scene;
 use serde::Serialize;
 
-use super::probe::{self, Base};
+use super::deepest::Deepest;
 use super::{Probed, SAFETY, Source};
 use crate::Prepared;
 use crate::build::BuiltBody;
 use crate::note::Note;
 use crate::press::mesh::Sizes;
-use crate::press::tissue::{Deformed, Indentation};
-use crate::skin::Skin;
+use crate::press::tissue::Indentation;
 
 /// Most meshes that are tried, and most sizes for a mesh that differs from the one before.
 const MOST_ROUNDS: usize = 10;
@@ -212,8 +209,7 @@ pub fn choose_mesh(
         is_smaller: [false; 2],
     };
     let mut rounds: Vec<Round> = Vec::new();
-    // The last mesh with an equilibrium, and the body deformed in it.
-    let mut solved: Option<(LayeredBody, Deformed)> = None;
+    let mut solved: Option<Deepest> = None;
     let mut best: Option<(usize, Indentation)> = None;
     let end = loop {
         if !progress(&rounds) {
@@ -233,17 +229,13 @@ pub fn choose_mesh(
             }
         }
         let press = Indentation::build(Arc::new(prepared))?;
-        let base = deepest(&press, solved.as_ref());
         let mut probed = None;
-        if let Some(base) = &base {
-            let base = std::slice::from_ref(base);
-            let Some(bars) = probe::run(&press, base, &mut |_, _| progress(&rounds)) else {
+        if let Some(deepest) = Deepest::find(&press, solved.as_ref()) {
+            probed = deepest.probe(&press, |_, _| progress(&rounds));
+            if probed.is_none() {
                 return Ok(None);
-            };
-            probed = bars.probed.into_iter().next();
-        }
-        if let Some(base) = base {
-            solved = Some((press.mesh().body.clone(), base.deformed));
+            }
+            solved = Some(deepest);
         }
         let half_width = probed.as_ref().and_then(Probed::half_width);
         let is_best = best.as_ref().is_none_or(|(index, _)| {
@@ -301,48 +293,6 @@ fn next_mesh(
         }
         *factors = factors.finer();
         n_tries += 1;
-    }
-}
-
-/// The equilibrium at the deepest, from that of another mesh if it is known.
-fn deepest(press: &Indentation, solved: Option<&(LayeredBody, Deformed)>) -> Option<Base> {
-    let (mut ws, depth) = (press.workspace(), press.prepared.scene.press.depth);
-    let guess = solved.map(|(body, found)| carried(body, found, &press.mesh().body));
-    guess
-        .and_then(|guess| Base::find(press, &mut ws, depth, Some(&guess)))
-        .or_else(|| Base::find(press, &mut ws, depth, None))
-}
-
-/// The deformed body of a mesh, carried to another mesh of the same body.
-fn carried(from: &LayeredBody, deformed: &Deformed, to: &LayeredBody) -> Deformed {
-    let skin = Skin::new(&from.skin);
-    let mut displacements = Vec::with_capacity(to.n_nodes());
-    let mut is_touching = vec![false; to.n_vertices()];
-    for (v, p) in to.skin.points.iter().enumerate() {
-        let Some(point) = skin.nearest(*p) else {
-            displacements.extend(vec![Vec3::zeros(); to.n_levels]);
-            continue;
-        };
-        let touching = point.mean(|v| Vec3::repeat(f64::from(deformed.is_touching[v])));
-        is_touching[v] = touching.x > 0.5;
-        let mean = |field: &[Vec3], l: usize| point.mean(|v| field[from.node(v, l)]);
-        let mut old = vec![0.0; from.n_levels];
-        for l in 1..from.n_levels {
-            let below = mean(&from.positions, l) - mean(&from.positions, l - 1);
-            old[l] = old[l - 1] + below.norm();
-        }
-        let new = mean_depths(to, &[v as u32]);
-        let stretch = old[old.len() - 1] / new[new.len() - 1];
-        for at in new.into_iter().map(|at| at * stretch) {
-            let below = old.partition_point(|&l| l < at).clamp(1, old.len() - 1);
-            let share = (at - old[below - 1]) / (old[below] - old[below - 1]);
-            let ends = [below - 1, below].map(|l| mean(&deformed.displacements, l));
-            displacements.push(ends[0].lerp(&ends[1], share.clamp(0.0, 1.0)));
-        }
-    }
-    Deformed {
-        displacements,
-        is_touching,
     }
 }
 

@@ -14,11 +14,13 @@
 //! bar.
 
 mod choice;
+mod deepest;
 mod probe;
 
 use serde::Serialize;
 
 pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
+pub use self::deepest::Deepest;
 use self::probe::Base;
 use crate::press::tissue::{Record, Sample};
 

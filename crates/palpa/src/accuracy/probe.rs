@@ -21,10 +21,11 @@ const PART_REACHES: f64 = 2.0;
 const TOLERANCE: f64 = 1e-4;
 
 /// An equilibrium of a press.
+#[derive(Debug)]
 pub(super) struct Base {
     /// Depth of the tool, m.
     depth: f64,
-    force_n: f64,
+    pub(super) force_n: f64,
     pub(super) deformed: Deformed,
 }
 

@@ -1,0 +1,238 @@
+//! Whether error bars hold: presses that are drawn at random, against the same presses on meshes
+//! with less than half the size.
+
+mod draw;
+mod picture;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Context as _;
+use palpa::Prepared;
+use palpa::accuracy::{Deepest, Source};
+use palpa::build::{BuiltBody, build};
+use palpa::press::mesh::Sizes;
+use palpa::press::tissue::Indentation;
+use palpa_scene::Scene;
+use serde::{Deserialize, Serialize};
+
+pub use self::draw::{Drawn, draw_scene};
+pub use self::picture::draw;
+
+/// Factors on the sizes near and far of the meshes on the way to the reference, the reference last.
+const FINER: [[f64; 2]; 2] = [[0.7, 0.7], [0.45, 0.55]];
+/// Least share of the true forces that shall lie within the bars, and largest median of bar by true
+/// error.
+pub const LEAST_COVERAGE: f64 = 0.9;
+/// See [`LEAST_COVERAGE`].
+pub const MOST_WIDTH: f64 = 3.0;
+
+/// The press of one drawn scene at its deepest.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Case {
+    /// Seed of the scene.
+    pub seed: u64,
+    /// Shape of the tool.
+    pub tool: String,
+    /// Body, number of layers and lumps.
+    pub body: String,
+    /// Depth, mm.
+    pub depth_mm: f64,
+    /// Number of nodes.
+    pub n_nodes: usize,
+    /// Force, N; `None` without equilibrium.
+    pub force_n: Option<f64>,
+    /// Half the width of the error bar, N; `None` if a probe failed.
+    pub error_bar_n: Option<f64>,
+    /// Contribution near the tool, N.
+    pub error_near_n: Option<f64>,
+    /// Contribution of the skin around it, N.
+    pub error_skin_far_n: Option<f64>,
+    /// Contribution of deep levels, N.
+    pub error_levels_deep_n: Option<f64>,
+    /// Number of nodes of the reference.
+    pub reference_nodes: Option<usize>,
+    /// Force of the reference, N; `None` without equilibrium, or if its mesh is too large.
+    pub reference_n: Option<f64>,
+    /// Change of the force from the mesh before the reference to the reference, N.
+    pub reference_change_n: Option<f64>,
+    /// Time for the press, s.
+    pub press_s: f64,
+    /// Time for the probes, s.
+    pub probes_s: f64,
+    /// Time for the reference, s.
+    pub reference_s: f64,
+    /// Why a force, a bar or the reference is missing.
+    pub missing: String,
+}
+
+impl Case {
+    /// True error, N: force of the reference minus force.
+    pub fn error_n(&self) -> Option<f64> {
+        Some(self.reference_n? - self.force_n?)
+    }
+
+    /// Width of the bar in true errors; `None` without bar or reference.
+    pub fn width(&self) -> Option<f64> {
+        Some(self.error_bar_n? / self.error_n()?.abs())
+    }
+}
+
+/// What the cases with bar and reference say.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of cases.
+    pub n_cases: usize,
+    /// Number of cases with bar and reference.
+    pub n_judged: usize,
+    /// Share of the judged cases in which the reference lies within the bar.
+    pub coverage: f64,
+    /// Median of half the bar's width by the size of the true error.
+    pub median_width: f64,
+    /// Median size of the true error as a share of the force.
+    pub median_error: f64,
+    /// Median of half the bar's width as a share of the force.
+    pub median_bar: f64,
+    /// Median time of the probes by the time of the press.
+    pub median_cost: f64,
+    /// Seeds of the cases in which the reference lies outside.
+    pub outside: Vec<u64>,
+}
+
+impl Summary {
+    /// Sums up cases; `None` if none can be judged.
+    pub fn of(cases: &[Case]) -> Option<Self> {
+        let judged: Vec<&Case> = cases.iter().filter(|case| case.width().is_some()).collect();
+        let median = |of: &dyn Fn(&Case) -> Option<f64>| -> Option<f64> {
+            let mut all: Vec<f64> = judged.iter().filter_map(|case| of(case)).collect();
+            all.sort_by(f64::total_cmp);
+            all.get(all.len() / 2).copied()
+        };
+        let outside: Vec<u64> = (judged.iter())
+            .filter(|case| case.width().is_some_and(|width| width < 1.0))
+            .map(|case| case.seed)
+            .collect();
+        Some(Self {
+            n_cases: cases.len(),
+            n_judged: judged.len(),
+            coverage: 1.0 - outside.len() as f64 / judged.len() as f64,
+            median_width: median(&Case::width)?,
+            median_error: median(&|case| Some(case.error_n()?.abs() / case.force_n?))?,
+            median_bar: median(&|case| Some(case.error_bar_n? / case.force_n?))?,
+            median_cost: median(&|case| Some(case.probes_s / case.press_s))?,
+            outside,
+        })
+    }
+
+    /// Whether the bars hold and are not too wide.
+    pub fn is_good(&self) -> bool {
+        self.coverage >= LEAST_COVERAGE && self.median_width <= MOST_WIDTH
+    }
+}
+
+/// The cases of a table (`.csv`); none if there is no such file.
+///
+/// # Errors
+/// If the file is something else.
+pub fn read(path: &Path) -> anyhow::Result<Vec<Case>> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let rows = csv::Reader::from_path(path).and_then(|mut reader| reader.deserialize().collect());
+    rows.with_context(|| {
+        format!(
+            "{} is not a table of error bars; remove it, or choose another folder with --out",
+            path.display()
+        )
+    })
+}
+
+/// Presses the scene of a seed with its error bar, and on the mesh of the reference. `progress` is
+/// called before each part; if it returns false, the case is given up, and there is no result.
+///
+/// # Errors
+/// If the scene of the seed cannot be read: the draw is wrong then.
+pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Option<Case>> {
+    let drawn = draw_scene(seed);
+    let scene = Scene::parse(&drawn.text, Path::new("."))
+        .with_context(|| format!("the scene drawn for seed {seed}"))?;
+    let mut case = Case {
+        seed,
+        tool: drawn.tool.to_owned(),
+        body: drawn.body,
+        depth_mm: scene.press.depth * 1e3,
+        ..Case::default()
+    };
+    let begin = Instant::now();
+    let grown: Arc<BuiltBody> = build(&scene)?.into();
+    let sizes = Sizes::of(&scene).context("a drawn tool has a size")?;
+    let press = press_of(&scene, &grown, sizes)?;
+    case.n_nodes = press.model.n_nodes();
+    let Some(deepest) = Deepest::find(&press, None) else {
+        "no equilibrium".clone_into(&mut case.missing);
+        return Ok(Some(case));
+    };
+    case.force_n = Some(deepest.force_n());
+    case.press_s = begin.elapsed().as_secs_f64();
+
+    let begin = Instant::now();
+    let Some(probed) = deepest.probe(&press, |_, _| progress()) else {
+        return Ok(None);
+    };
+    case.probes_s = begin.elapsed().as_secs_f64();
+    let part = |source: Source| probed.changes[source as usize].map(|c| c * probed.force_n);
+    case.error_bar_n = probed.half_width().map(|half| half * probed.force_n);
+    case.error_near_n = part(Source::Near);
+    case.error_skin_far_n = part(Source::SkinFar);
+    case.error_levels_deep_n = part(Source::LevelsDeep);
+    drop(press);
+
+    let begin = Instant::now();
+    let mut found = deepest;
+    for factors in FINER {
+        if !progress() {
+            return Ok(None);
+        }
+        match finer(&scene, &grown, sizes, factors, &found) {
+            Ok((n_nodes, next)) => {
+                case.reference_nodes = Some(n_nodes);
+                case.reference_change_n = Some(next.force_n() - found.force_n());
+                case.reference_n = Some(next.force_n());
+                found = next;
+            }
+            Err(error) => {
+                case.reference_n = None;
+                case.missing = format!("reference: {error:#}");
+                break;
+            }
+        }
+    }
+    case.reference_s = begin.elapsed().as_secs_f64();
+    Ok(Some(case))
+}
+
+fn press_of(scene: &Scene, grown: &Arc<BuiltBody>, sizes: Sizes) -> anyhow::Result<Indentation> {
+    let prepared = Prepared::with_sizes(scene, Arc::clone(grown), Some(sizes), &[])?;
+    anyhow::ensure!(prepared.mesh.is_resolved, "its mesh would be too large");
+    Indentation::build(Arc::new(prepared))
+}
+
+/// The press on a finer mesh: its number of nodes, and its equilibrium.
+fn finer(
+    scene: &Scene,
+    grown: &Arc<BuiltBody>,
+    mut sizes: Sizes,
+    [near, far]: [f64; 2],
+    from: &Deepest,
+) -> anyhow::Result<(usize, Deepest)> {
+    let mut scene = scene.clone();
+    let lump = scene.lumps.first();
+    scene.mesh.near_lumps = lump.and_then(|lump| scene.mesh.near_lump_of(lump).map(|h| far * h));
+    for graded in [&mut sizes.skin, &mut sizes.levels] {
+        (graded.near, graded.far) = (near, far);
+    }
+    let press = press_of(&scene, grown, sizes)?;
+    let deepest = Deepest::find(&press, Some(from)).context("no equilibrium")?;
+    Ok((press.model.n_nodes(), deepest))
+}
