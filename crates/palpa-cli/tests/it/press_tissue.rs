@@ -116,7 +116,7 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
 }
 
 /// The columns of press.csv before the layers: programs read them by these names.
-const COLUMNS: [&str; 31] = [
+const COLUMNS: [&str; 32] = [
     "run",
     "speed_mm_s",
     "phase",
@@ -145,6 +145,7 @@ const COLUMNS: [&str; 31] = [
     "volume_ratio_min",
     "volume_ratio_max",
     "error_bar_n",
+    "extrapolated_n",
     "error_near_n",
     "error_skin_far_n",
     "error_levels_deep_n",

@@ -157,3 +157,38 @@ fn the_list_names_every_case() {
     assert_eq!(listed[0]["needs_reference"], true);
     assert!(!bench.path("out").exists());
 }
+
+#[test]
+fn error_bars_of_drawn_presses_are_checked_and_kept() {
+    let bench = palpa();
+    let run = || bench.run(&["verify", "--error-bars", "1", "--out", "out"]);
+    let (code, stdout, stderr) = run();
+    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
+    assert!(stdout.starts_with("0: disc on limb"), "{stdout}");
+    assert!(stdout.contains("1 of 1 presses"), "{stdout}");
+    let table = bench.read("out/error_bars.csv");
+    assert!(table.starts_with("seed,tool,body,depth_mm,"), "{table}");
+    let json: Value = serde_json::from_str(&bench.read("out/error_bars.json")).unwrap();
+    assert_eq!(json["summary"]["coverage"], json!(1.0));
+    assert!(json["summary"]["median_error"].as_f64().unwrap() > 0.005);
+    assert!(bench.read("out/error_bars.svg").contains("true error"));
+    assert!(bench.path("out/error_bars.png").is_file());
+
+    // A press that is in the table is not computed again.
+    let (code, stdout, _) = run();
+    assert_eq!(code, 0);
+    assert!(!stdout.contains("0: disc"), "{stdout}");
+    assert_eq!(bench.read("out/error_bars.csv"), table);
+
+    fs::write(bench.path("out/error_bars.csv"), "a,b\n1,2\n").unwrap();
+    let (code, _, stderr) = run();
+    assert_eq!(code, 2);
+    assert!(
+        stderr.contains("is not a table of error bars; remove it"),
+        "{stderr}"
+    );
+    assert_eq!(bench.read("out/error_bars.csv"), "a,b\n1,2\n");
+    let (code, _, stderr) = bench.run(&["verify", "--error-bars", "0"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("at least one press"), "{stderr}");
+}

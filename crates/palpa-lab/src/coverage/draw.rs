@@ -9,6 +9,9 @@ const MOST_VERTICES: usize = 60_000;
 /// Range of the finest edges, in default lengths: a user's mesh may be coarser than the default.
 const EDGES: (f64, f64) = (1.0, 1.6);
 
+/// The tool that is bonded to the skin.
+pub(super) const DISC: &str = "disc";
+
 /// A drawn scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Drawn {
@@ -145,7 +148,7 @@ fn draw_tool(rng: &mut Rng) -> (&'static str, String, f64, f64) {
         0..=2 => {
             let r = even(rng, 4.0, 11.0);
             let sizes = format!("radius = \"{r:.1} mm\"\n");
-            return ("disc", format!("shape = \"disc\"\n{sizes}"), r, r / 4.0);
+            return (DISC, format!("shape = \"{DISC}\"\n{sizes}"), r, r / 4.0);
         }
         3..=5 => {
             let r = even(rng, 4.0, 15.0);

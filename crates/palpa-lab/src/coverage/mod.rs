@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use palpa::Prepared;
-use palpa::accuracy::{Deepest, Source};
+use palpa::accuracy::{Deepest, EXTRAPOLATION, SAFETY, Source};
 use palpa::build::{BuiltBody, build};
 use palpa::press::mesh::Sizes;
 use palpa::press::tissue::Indentation;
@@ -22,6 +22,10 @@ pub use self::picture::draw;
 
 /// Factors on the sizes near and far of the meshes on the way to the reference, the reference last.
 const FINER: [[f64; 2]; 2] = [[0.7, 0.7], [0.45, 0.55]];
+/// Order of convergence of the force in the size: under a bonded disc, whose edge is sharp, and under
+/// a tool in contact.
+const EDGE_ORDER: f64 = 1.0;
+const ORDER: f64 = 1.5;
 /// Least share of the true forces that shall lie within the bars, and largest median of bar by true
 /// error.
 pub const LEAST_COVERAGE: f64 = 0.9;
@@ -43,8 +47,6 @@ pub struct Case {
     pub n_nodes: usize,
     /// Force, N; `None` without equilibrium.
     pub force_n: Option<f64>,
-    /// Half the width of the error bar, N; `None` if a probe failed.
-    pub error_bar_n: Option<f64>,
     /// Contribution near the tool, N.
     pub error_near_n: Option<f64>,
     /// Contribution of the skin around it, N.
@@ -68,14 +70,41 @@ pub struct Case {
 }
 
 impl Case {
-    /// True error, N: force of the reference minus force.
+    /// True error, N: force of an infinitely fine mesh minus force. What the reference lacks of it
+    /// is taken into account by the order of convergence.
     pub fn error_n(&self) -> Option<f64> {
-        Some(self.reference_n? - self.force_n?)
+        let order = if self.tool == draw::DISC {
+            EDGE_ORDER
+        } else {
+            ORDER
+        };
+        let lacks = FINER[FINER.len() - 1][0].powf(order);
+        Some((self.reference_n? - self.force_n?) / (1.0 - lacks))
+    }
+
+    fn contributions_n(&self) -> Option<[f64; 3]> {
+        Some([
+            self.error_near_n?,
+            self.error_skin_far_n?,
+            self.error_levels_deep_n?,
+        ])
+    }
+
+    /// Half the width of the error bar, N; `None` if a probe failed.
+    pub fn error_bar_n(&self) -> Option<f64> {
+        let sizes = self.contributions_n()?.map(f64::abs);
+        Some(SAFETY * sizes.iter().sum::<f64>())
+    }
+
+    /// The force extrapolated to an infinitely fine mesh, N.
+    pub fn extrapolated_n(&self) -> Option<f64> {
+        let sum: f64 = self.contributions_n()?.iter().sum();
+        Some(self.force_n? + EXTRAPOLATION * sum)
     }
 
     /// Width of the bar in true errors; `None` without bar or reference.
     pub fn width(&self) -> Option<f64> {
-        Some(self.error_bar_n? / self.error_n()?.abs())
+        Some(self.error_bar_n()? / self.error_n()?.abs())
     }
 }
 
@@ -86,17 +115,19 @@ pub struct Summary {
     pub n_cases: usize,
     /// Number of cases with bar and reference.
     pub n_judged: usize,
-    /// Share of the judged cases in which the reference lies within the bar.
+    /// Share of the judged cases in which the true force lies within the bar.
     pub coverage: f64,
     /// Median of half the bar's width by the size of the true error.
     pub median_width: f64,
     /// Median size of the true error as a share of the force.
     pub median_error: f64,
+    /// Median distance of the extrapolated force from the truth, as a share of the force.
+    pub median_extrapolated_error: f64,
     /// Median of half the bar's width as a share of the force.
     pub median_bar: f64,
     /// Median time of the probes by the time of the press.
     pub median_cost: f64,
-    /// Seeds of the cases in which the reference lies outside.
+    /// Seeds of the cases in which it lies outside.
     pub outside: Vec<u64>,
 }
 
@@ -119,7 +150,11 @@ impl Summary {
             coverage: 1.0 - outside.len() as f64 / judged.len() as f64,
             median_width: median(&Case::width)?,
             median_error: median(&|case| Some(case.error_n()?.abs() / case.force_n?))?,
-            median_bar: median(&|case| Some(case.error_bar_n? / case.force_n?))?,
+            median_extrapolated_error: median(&|case| {
+                let left = case.force_n? + case.error_n()? - case.extrapolated_n()?;
+                Some(left.abs() / case.force_n?)
+            })?,
+            median_bar: median(&|case| Some(case.error_bar_n()? / case.force_n?))?,
             median_cost: median(&|case| Some(case.probes_s / case.press_s))?,
             outside,
         })
@@ -169,7 +204,7 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     let sizes = Sizes::of(&scene).context("a drawn tool has a size")?;
     let press = press_of(&scene, &grown, sizes)?;
     case.n_nodes = press.model.n_nodes();
-    let Some(deepest) = Deepest::find(&press, None) else {
+    let Some(deepest) = Deepest::from_rest(&press) else {
         "no equilibrium".clone_into(&mut case.missing);
         return Ok(Some(case));
     };
@@ -182,7 +217,6 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     };
     case.probes_s = begin.elapsed().as_secs_f64();
     let part = |source: Source| probed.changes[source as usize].map(|c| c * probed.force_n);
-    case.error_bar_n = probed.half_width().map(|half| half * probed.force_n);
     case.error_near_n = part(Source::Near);
     case.error_skin_far_n = part(Source::SkinFar);
     case.error_levels_deep_n = part(Source::LevelsDeep);
@@ -233,6 +267,49 @@ fn finer(
         (graded.near, graded.far) = (near, far);
     }
     let press = press_of(&scene, grown, sizes)?;
-    let deepest = Deepest::find(&press, Some(from)).context("no equilibrium")?;
+    let deepest =
+        Deepest::near(&press, from).context("no equilibrium was found near that of the press")?;
     Ok((press.model.n_nodes(), deepest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A press with a true error of 4 % and this contribution near the tool.
+    fn case(seed: u64, near: f64) -> Case {
+        Case {
+            seed,
+            tool: "sphere".to_owned(),
+            force_n: Some(1.0),
+            error_near_n: Some(near),
+            error_skin_far_n: Some(0.0),
+            error_levels_deep_n: Some(0.0),
+            reference_n: Some(1.0 + 0.04 * (1.0 - 0.45_f64.powf(1.5))),
+            press_s: 1.0,
+            probes_s: 2.0,
+            ..Case::default()
+        }
+    }
+
+    #[test]
+    fn bars_that_are_too_narrow_or_too_wide_are_not_good() {
+        let good = Summary::of(&[case(0, 0.03), case(1, 0.04), case(2, -0.05)]).unwrap();
+        assert_eq!((good.n_judged, good.outside.len()), (3, 0));
+        assert!((good.median_error - 0.04).abs() < 1e-12);
+        assert!(
+            (good.median_width - 2.0).abs() < 1e-12,
+            "{}",
+            good.median_width
+        );
+        assert!(good.is_good());
+        let narrow = Summary::of(&[case(0, 0.01), case(7, 0.015), case(2, 0.05)]).unwrap();
+        assert_eq!(narrow.outside, [0, 7]);
+        assert!((narrow.coverage - 1.0 / 3.0).abs() < 1e-12);
+        assert!(!narrow.is_good());
+        assert!(!Summary::of(&[case(0, 0.2)]).unwrap().is_good());
+        let missing = Case::default();
+        assert!(Summary::of(std::slice::from_ref(&missing)).is_none());
+        assert_eq!(Summary::of(&[missing, case(0, 0.03)]).unwrap().n_judged, 1);
+    }
 }

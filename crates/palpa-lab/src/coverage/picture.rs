@@ -29,7 +29,7 @@ pub fn draw(cases: &[Case], summary: &Summary) -> Picture {
             .filter_map(|case| {
                 let share = |n: f64| Some(100.0 * n / case.force_n?);
                 let error = share(case.error_n()?.abs())?.max(RANGE[0]);
-                Some([share(case.error_bar_n?)?, error])
+                Some([share(case.error_bar_n()?)?, error])
             })
             .collect();
         scatter = scatter.series(Series::new(tool, points).only_markers().with_color(color));

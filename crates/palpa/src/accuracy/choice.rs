@@ -230,7 +230,8 @@ pub fn choose_mesh(
         }
         let press = Indentation::build(Arc::new(prepared))?;
         let mut probed = None;
-        if let Some(deepest) = Deepest::find(&press, solved.as_ref()) {
+        let near = solved.as_ref().and_then(|last| Deepest::near(&press, last));
+        if let Some(deepest) = near.or_else(|| Deepest::from_rest(&press)) {
             probed = deepest.probe(&press, |_, _| progress(&rounds));
             if probed.is_none() {
                 return Ok(None);

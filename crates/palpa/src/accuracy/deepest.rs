@@ -17,19 +17,23 @@ pub struct Deepest {
 }
 
 impl Deepest {
-    /// Finds the equilibrium, starting from that on another mesh of the same body if one is given;
-    /// `None` if there is none, or if the tool does not touch.
-    pub fn find(press: &Indentation, from: Option<&Self>) -> Option<Self> {
-        let body = &press.mesh().body;
-        let (mut ws, depth) = (press.workspace(), press.prepared.scene.press.depth);
-        let guess = from.map(|from| carried(&from.body, &from.base.deformed, body));
-        guess
-            .and_then(|guess| Base::find(press, &mut ws, depth, Some(&guess)))
-            .or_else(|| Base::find(press, &mut ws, depth, None))
-            .map(|base| Self {
-                body: body.clone(),
-                base,
-            })
+    /// Finds the equilibrium from rest; `None` if there is none, or if the tool does not touch.
+    pub fn from_rest(press: &Indentation) -> Option<Self> {
+        Self::find(press, None)
+    }
+
+    /// Finds the equilibrium near that on another mesh of the same body; `None` if none is found.
+    pub fn near(press: &Indentation, other: &Self) -> Option<Self> {
+        let guess = carried(&other.body, &other.base.deformed, &press.mesh().body);
+        Self::find(press, Some(&guess))
+    }
+
+    fn find(press: &Indentation, guess: Option<&Deformed>) -> Option<Self> {
+        let depth = press.prepared.scene.press.depth;
+        Some(Self {
+            base: Base::find(press, &mut press.workspace(), depth, guess)?,
+            body: press.mesh().body.clone(),
+        })
     }
 
     /// Force on the tool, N.

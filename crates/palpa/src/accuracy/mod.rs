@@ -27,6 +27,9 @@ use crate::press::tissue::{Record, Sample};
 /// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
 /// first order and three quarters of one of second order.
 pub const SAFETY: f64 = 2.0;
+/// Factor between the sum of the signed contributions and the expected error. Halving a size shows
+/// three quarters of an error of second order.
+pub const EXTRAPOLATION: f64 = 4.0 / 3.0;
 /// Depths that are probed, as shares of the deepest.
 const DEPTHS: [f64; 3] = [1.0, 0.5, 0.25];
 
@@ -73,6 +76,12 @@ impl Probed {
         let sizes: Option<Vec<f64>> = self.changes.iter().map(|c| c.map(f64::abs)).collect();
         sizes.map(|sizes| SAFETY * sizes.iter().sum::<f64>())
     }
+
+    /// The force extrapolated to an infinitely fine mesh, N; `None` if a probe failed.
+    pub fn extrapolated_n(&self) -> Option<f64> {
+        let sum: Option<f64> = self.changes.into_iter().sum();
+        sum.map(|sum| self.force_n * (1.0 + EXTRAPOLATION * sum))
+    }
 }
 
 /// The error bar of a force.
@@ -80,6 +89,8 @@ impl Probed {
 pub struct ErrorBar {
     /// Half the width of the bar, N.
     pub half_width_n: f64,
+    /// The force extrapolated to an infinitely fine mesh, N.
+    pub extrapolated_n: f64,
     /// Signed contributions, N, in the order of [`Source::ALL`].
     pub contributions_n: [f64; N_SOURCES],
 }
@@ -139,6 +150,7 @@ impl ErrorBars {
             .collect();
         for (sample, bar) in samples.iter_mut().zip(bars) {
             sample.error_bar_n = bar.map(|bar| bar.half_width_n);
+            sample.extrapolated_n = bar.map(|bar| bar.extrapolated_n);
             let part = |i: usize| bar.map(|bar| bar.contributions_n[i]);
             sample.error_near_n = part(0);
             sample.error_skin_far_n = part(1);
@@ -154,6 +166,7 @@ impl ErrorBars {
         let contributions_n = changes.map(|change| change * force);
         Some(ErrorBar {
             half_width_n: SAFETY * contributions_n.iter().map(|c| c.abs()).sum::<f64>(),
+            extrapolated_n: sample.force_n + EXTRAPOLATION * contributions_n.iter().sum::<f64>(),
             contributions_n,
         })
     }

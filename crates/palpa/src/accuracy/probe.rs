@@ -1,8 +1,8 @@
 //! The probes: the same press on finer meshes of the part near the tool.
 
 use palpa_fem::{
-    Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, advance,
-    assume_touches, equilibrate,
+    Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, assume_touches,
+    equilibrate,
 };
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
@@ -194,22 +194,10 @@ impl Probe {
         assume_touches(&self.model, &mut state, &tools, &is_touching);
         let params = SolveParams {
             tolerance: TOLERANCE,
-            is_near: true,
-            ..press.solve_params()
+            ..press.near_params()
         };
         let ws = &mut self.workspace;
         let report = equilibrate(&self.model, &mut state, ws, &load, &params);
-        if report.outcome == Outcome::Converged {
-            return Some(press.force_of(&report, &self.bonded, ws));
-        }
-        // From rest, in as many steps as needed.
-        let first: Vec<PosedTool> = press.tool_at(0.0).into_iter().collect();
-        let before = Load {
-            tools: &first,
-            ..Load::default()
-        };
-        let mut state = State::new(&self.model);
-        let report = advance(&self.model, &mut state, ws, &before, &load, &params);
         (report.outcome == Outcome::Converged).then(|| press.force_of(&report, &self.bonded, ws))
     }
 }

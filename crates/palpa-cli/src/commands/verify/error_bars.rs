@@ -80,7 +80,7 @@ fn line(case: &Case) -> String {
     let Case {
         seed, tool, body, ..
     } = case;
-    let (error, bar) = (share(case.error_n()), share(case.error_bar_n));
+    let (error, bar) = (share(case.error_n()), share(case.error_bar_n()));
     let bar = bar.trim_start_matches('+');
     let missing = &case.missing;
     format!("{seed}: {tool} on {body}: true error {error}, bar ±{bar} {missing}")
@@ -94,6 +94,7 @@ fn say(context: &Context, out: &OutDir, cases: &[Case], summary: &Summary) -> an
         "presses",
         "inside",
         "median true error",
+        "extrapolated",
         "median bar",
     ])
     .with_left_names();
@@ -114,6 +115,7 @@ fn say(context: &Context, out: &OutDir, cases: &[Case], summary: &Summary) -> an
             of.n_judged.to_string(),
             format!("{:.1} %", 100.0 * of.coverage),
             format!("{:.2} %", 100.0 * of.median_error),
+            format!("{:.2} %", 100.0 * of.median_extrapolated_error),
             format!("±{:.2} %", 100.0 * of.median_bar),
         ]);
     }

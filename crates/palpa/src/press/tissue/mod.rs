@@ -35,6 +35,9 @@ const FIRST_HOLD: f64 = 0.01;
 /// computed anew in every iteration, m.
 const REGION_MARGIN: f64 = 0.01;
 
+/// Number of iterations after which a start was not near enough to the equilibrium.
+const NEAR_ITERATIONS: usize = 20;
+
 /// Number of steps to a depth from rest.
 const FROM_REST: usize = 4;
 
@@ -243,11 +246,8 @@ impl Indentation {
         let report = if let Some(guess) = guess {
             state.displacements.clone_from(&guess.displacements);
             assume_touches(model, &mut state, &acting.tools, &guess.is_touching);
-            let params = SolveParams {
-                is_near: true,
-                ..*params
-            };
-            equilibrate(model, &mut state, ws, &acting.load(0.0, None), &params)
+            let load = acting.load(0.0, None);
+            equilibrate(model, &mut state, ws, &load, &self.near_params())
         } else {
             state.displacements.clone_from(&self.rest.displacements);
             acting = self.acting(0.0);
@@ -299,9 +299,13 @@ impl Indentation {
         &self.rest.displacements
     }
 
-    /// Tolerances of a step.
-    pub(crate) fn solve_params(&self) -> SolveParams {
-        self.params
+    /// Tolerances for a solve that starts near the equilibrium.
+    pub(crate) fn near_params(&self) -> SolveParams {
+        SolveParams {
+            is_near: true,
+            max_iterations: NEAR_ITERATIONS,
+            ..self.params
+        }
     }
 
     /// The rigid tool with its pose at a depth (m); `None` if the skin is bonded to it.

@@ -235,6 +235,7 @@ impl Run<'_> {
             volume_ratio_min: ratios.clone().fold(f64::INFINITY, f64::min),
             volume_ratio_max: ratios.fold(0.0, f64::max),
             error_bar_n: None,
+            extrapolated_n: None,
             error_near_n: None,
             error_skin_far_n: None,
             error_levels_deep_n: None,

@@ -69,6 +69,8 @@ pub struct Sample {
     /// Half the width of the force's error bar, N; `None` if it was not estimated. See
     /// [`crate::accuracy`].
     pub error_bar_n: Option<f64>,
+    /// The force extrapolated to an infinitely fine mesh, N.
+    pub extrapolated_n: Option<f64>,
     /// Change of the force by finer prisms near the tool, N.
     pub error_near_n: Option<f64>,
     /// Change of the force by finer triangles around them, N.

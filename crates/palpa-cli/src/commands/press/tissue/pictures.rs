@@ -203,6 +203,19 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
                 });
             let series = Series::new(name, down.clone()).with_color(color);
             chart = chart.series(series.with_spread(bars.collect()));
+            let extrapolated: Vec<[f64; 2]> = (of_run.iter())
+                .filter(|s| cycle == 0 && s.is_first_loading())
+                .filter_map(|s| Some([s.depth_mm, s.extrapolated_n?]))
+                .collect();
+            if !extrapolated.is_empty() {
+                let name = if n_runs == 1 {
+                    "extrapolated to a fine mesh"
+                } else {
+                    ""
+                };
+                let series = Series::new(name, extrapolated).only_markers();
+                chart = chart.series(series.with_color(PALETTE[7 % PALETTE.len()]));
+            }
             if !back.is_empty() {
                 back.splice(0..0, down.last().copied());
                 let name = if (cycle, n_runs) == (0, 1) {

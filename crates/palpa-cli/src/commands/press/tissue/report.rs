@@ -284,7 +284,14 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
         "error bar at {:.2} mm: {bar}; halving sizes changes the force by: {}",
         probed.depth_mm,
         changes.collect::<Vec<_>>().join(", ")
-    ))
+    ))?;
+    if let Some(extrapolated) = probed.extrapolated_n() {
+        let share = 100.0 * (extrapolated / probed.force_n - 1.0);
+        job.context.say(format!(
+            "extrapolated to an infinitely fine mesh, the force is {extrapolated:.4} N ({share:+.1} %)"
+        ))?;
+    }
+    Ok(())
 }
 
 /// Prints which layer deforms most, and the force that each layer passes on.
