@@ -86,13 +86,10 @@ impl ActiveSet {
                 continue;
             }
             let x = model.body.positions[node] + displacements[node];
-            let k = touch.tool().or_else(|| {
-                let depth = |k: usize| tools[k].tool.distance_at(&tools[k].pose, &x).distance;
-                (0..tools.len())
-                    .filter(|&k| depth(k) < -tolerance)
-                    .min_by(|&a, &b| depth(a).total_cmp(&depth(b)))
-            });
-            let Some(k) = k else { continue };
+            let inside = || nearest_tool(tools, &x).filter(|nearest| nearest.1 < -tolerance);
+            let Some(k) = touch.tool().or_else(|| inside().map(|nearest| nearest.0)) else {
+                continue;
+            };
             if *touch == Touch::Open {
                 n_new += 1;
                 *touch = first_touch(tools, k, &x, self.smoothing == 0.0);
@@ -297,6 +294,13 @@ impl ActiveVertex {
     }
 }
 
+/// The tool nearest to `x`, and its distance, m, negative inside; `None` if there is no tool.
+fn nearest_tool(tools: &[PosedTool], x: &Vec3) -> Option<(usize, f64)> {
+    let distance = |PosedTool { tool, pose }: &PosedTool| tool.distance_at(pose, x).distance;
+    let all = tools.iter().map(distance).enumerate();
+    all.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 /// The touch of a vertex at `x` that has come into contact with tool `k`.
 fn first_touch(tools: &[PosedTool], k: usize, x: &Vec3, may_stick: bool) -> Touch {
     let anchor = anchor(&tools[k], x);
@@ -328,9 +332,7 @@ pub fn assume_touches(model: &Model, state: &mut State, tools: &[PosedTool], is_
         }
         let node = model.body.node(vertex, 0);
         let x = model.body.positions[node] + state.displacements[node];
-        let distance = |k: &usize| tools[*k].tool.distance_at(&tools[*k].pose, &x).distance;
-        let nearest = (0..tools.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        if let Some(k) = nearest {
+        if let Some((k, _)) = nearest_tool(tools, &x) {
             *touch = first_touch(tools, k, &x, true);
         }
     }

@@ -166,6 +166,14 @@ impl Summary {
     }
 }
 
+/// The shapes of tools in cases, each once, in alphabetical order.
+pub fn tools(cases: &[Case]) -> Vec<&str> {
+    let mut tools: Vec<&str> = cases.iter().map(|case| case.tool.as_str()).collect();
+    tools.sort_unstable();
+    tools.dedup();
+    tools
+}
+
 /// The cases of a table (`.csv`); none if there is no such file.
 ///
 /// # Errors

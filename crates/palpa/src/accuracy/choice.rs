@@ -81,6 +81,8 @@ pub enum End {
     },
     /// Finer meshes did not make the bar smaller, or none found an equilibrium.
     NoProgress,
+    /// It was given up before its end.
+    Interrupted,
 }
 
 /// How a mesh was chosen.
@@ -183,7 +185,7 @@ impl Factors {
 
 /// Chooses the mesh for the press of a scene, on a body grown for it. `progress` is called before
 /// each mesh and probe with the meshes so far; if it returns false, the choice is given up. Returns
-/// the press on the best mesh; `None` if the choice was given up.
+/// the press on the best mesh; `None` if the choice was given up during the first one.
 ///
 /// The first mesh has edges of about a third of the contact radius. Its probes say how much each size
 /// contributes to the bar; the sizes of the next mesh follow from that.
@@ -213,7 +215,7 @@ pub fn choose_mesh(
     let mut best: Option<(usize, Indentation)> = None;
     let end = loop {
         if !progress(&rounds) {
-            return Ok(None);
+            break End::Interrupted;
         }
         let begin = Instant::now();
         let prepared = next_mesh(scene, grown, &mut factors, rounds.last())?;
@@ -234,7 +236,7 @@ pub fn choose_mesh(
         if let Some(deepest) = near.or_else(|| Deepest::from_rest(&press)) {
             probed = deepest.probe(&press, |_, _| progress(&rounds));
             if probed.is_none() {
-                return Ok(None);
+                break End::Interrupted;
             }
             solved = Some(deepest);
         }
@@ -265,7 +267,8 @@ pub fn choose_mesh(
         }
     };
     let Some((best, press)) = best else {
-        unreachable!("the first mesh is the best at first");
+        // The first mesh is the best at first.
+        return Ok(None);
     };
     let choice = MeshChoice {
         accuracy: goal.accuracy,

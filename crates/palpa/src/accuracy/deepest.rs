@@ -48,8 +48,8 @@ impl Deepest {
         press: &Indentation,
         mut progress: impl FnMut(usize, usize) -> bool,
     ) -> Option<Probed> {
-        let bars = probe::run(press, std::slice::from_ref(&self.base), &mut progress)?;
-        bars.probed.into_iter().next()
+        let (probed, _) = probe::run(press, std::slice::from_ref(&self.base), &mut progress)?;
+        probed.into_iter().next()
     }
 }
 

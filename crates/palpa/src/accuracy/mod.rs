@@ -134,11 +134,11 @@ impl ErrorBars {
             }
         }
         drop(ws);
-        let found = probe::run(press, &bases, &mut progress)?;
-        bars.probed.extend(found.probed);
+        let (probed, n_nodes) = probe::run(press, &bases, &mut progress)?;
+        bars.probed.extend(probed);
         bars.probed
             .sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-        bars.n_nodes = found.n_nodes;
+        bars.n_nodes = n_nodes;
         Some(bars)
     }
 

@@ -7,7 +7,7 @@ use palpa_fem::{
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
 
-use super::{ErrorBars, N_SOURCES, Probed, Source};
+use super::{N_SOURCES, Probed, Source};
 use crate::build::nearest;
 use crate::continuum;
 use crate::press::mesh::NEAR;
@@ -47,12 +47,13 @@ impl Base {
     }
 }
 
-/// Probes a press in these equilibria. `progress` as in [`ErrorBars::estimate`].
+/// Probes a press in these equilibria: the contributions, and the number of nodes of the largest
+/// probe. `progress` as in [`ErrorBars::estimate`](super::ErrorBars::estimate).
 pub(super) fn run(
     press: &Indentation,
     bases: &[Base],
     progress: &mut dyn FnMut(usize, usize) -> bool,
-) -> Option<ErrorBars> {
+) -> Option<(Vec<Probed>, usize)> {
     let mut probed: Vec<Probed> = (bases.iter())
         .map(|base| Probed {
             depth_mm: base.depth * 1e3,
@@ -83,7 +84,7 @@ pub(super) fn run(
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
         }
     }
-    Some(ErrorBars { probed, n_nodes })
+    Some((probed, n_nodes))
 }
 
 /// The part of the body that is probed.

@@ -7,7 +7,7 @@ use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa::scene::Scene;
 use palpa::{Note, Prepared};
-use palpa_testkit::{Layer, Scene as SceneText};
+use palpa_testkit::{Layer, Scene as SceneText, Value};
 
 /// A block of gel under a ball, with a coarse mesh.
 fn gel() -> SceneText {
@@ -79,8 +79,12 @@ fn a_contact_of_few_edges_is_noted_and_bonded_skin_is_not() {
 
 #[test]
 fn a_failed_step_is_noted_and_its_sample_does_not_count() {
-    // The whole block under a disc, pressed flat.
-    let flat = gel().disc(8.0).press(15.999).set("press", "step", "5 mm");
+    // Gel that keeps its volume cannot leave the gap of 0.1 mm between disc and bone.
+    let gel = r#"{ name = "gel", young = "10 kPa", poisson = 0.4999 }"#;
+    let flat = (self::gel().with_layer(0, |layer| layer.set("tissue", Value::raw(gel))))
+        .disc(8.0)
+        .press(15.9)
+        .set("press", "step", "5 mm");
     let press = indentation(&flat);
     let record = pressed(&press);
     let last = record.samples.last().unwrap();

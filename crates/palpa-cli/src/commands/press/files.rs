@@ -19,7 +19,7 @@ pub(super) fn remove_older(folder: &Path) -> anyhow::Result<()> {
         "section",
         "stress",
     ];
-    let mut older: Vec<PathBuf> = ["press.csv", "press.json", "press.pvd"]
+    let mut older: Vec<PathBuf> = ["press.csv", "press.json", "press.pvd", "mesh_choice.json"]
         .map(|name| folder.join(name))
         .into();
     older.extend(

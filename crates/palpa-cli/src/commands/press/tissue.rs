@@ -35,19 +35,20 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         None => {
             let prepared = Arc::new(Prepared::build(scene)?);
             spinner.set_message("setting up the model");
-            (Indentation::build(prepared)?, None)
+            let indentation = Indentation::build(prepared)?;
+            context.begin_recording();
+            remove_older(out.path())?;
+            (indentation, None)
         }
-        Some(accuracy) => {
-            let (indentation, choice) = mesh_choice::choose(job, accuracy, &spinner)?;
-            (indentation, Some(choice))
-        }
+        Some(accuracy) => match mesh_choice::choose(job, accuracy, &spinner)? {
+            Some((indentation, choice)) => (indentation, Some(choice)),
+            None => return Ok(Outcome::Interrupted),
+        },
     };
     drop(spinner);
     let materials: Vec<_> = materials_of(scene);
     announce(job, &indentation, &materials)?;
 
-    context.begin_recording();
-    remove_older(out.path())?;
     let with_bars = job.args.error_bar || choice.is_some();
     let mut recorded = record(job, &indentation, with_bars)?;
     let bars = if with_bars {

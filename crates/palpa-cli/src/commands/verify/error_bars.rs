@@ -98,11 +98,8 @@ fn say(context: &Context, out: &OutDir, cases: &[Case], summary: &Summary) -> an
         "median bar",
     ])
     .with_left_names();
-    let mut tools: Vec<&str> = cases.iter().map(|case| case.tool.as_str()).collect();
-    tools.sort_unstable();
-    tools.dedup();
     let all = std::iter::once(("all", cases.to_vec()));
-    let each = tools.into_iter().map(|tool| {
+    let each = coverage::tools(cases).into_iter().map(|tool| {
         let own = cases.iter().filter(|case| case.tool == tool);
         (tool, own.cloned().collect())
     });

@@ -35,6 +35,9 @@ const FIRST_HOLD: f64 = 0.01;
 /// computed anew in every iteration, m.
 const REGION_MARGIN: f64 = 0.01;
 
+/// A gap below which a vertex of an equilibrium touches the tool, m.
+const TOUCHING: f64 = 1e-6;
+
 /// Number of iterations after which a start was not near enough to the equilibrium.
 const NEAR_ITERATIONS: usize = 20;
 
@@ -65,9 +68,6 @@ pub struct Indentation {
     params: SolveParams,
     dynamics: Option<Dynamics>,
 }
-
-/// A gap below which a vertex of an equilibrium touches the tool, m.
-const TOUCHING: f64 = 1e-6;
 
 /// A deformed body in an equilibrium or near one: displacements, and which vertices touch the tool.
 #[derive(Debug, Clone)]
@@ -241,30 +241,14 @@ impl Indentation {
         guess: Option<&Deformed>,
     ) -> Option<(f64, Deformed)> {
         let mut state = State::new(&self.model);
-        let (model, params) = (&self.model, &self.params);
-        let mut acting = self.acting(depth);
-        let report = if let Some(guess) = guess {
-            state.displacements.clone_from(&guess.displacements);
-            assume_touches(model, &mut state, &acting.tools, &guess.is_touching);
-            let load = acting.load(0.0, None);
-            equilibrate(model, &mut state, ws, &load, &self.near_params())
-        } else {
-            state.displacements.clone_from(&self.rest.displacements);
-            acting = self.acting(0.0);
-            let mut step = 0;
-            loop {
-                step += 1;
-                let next = self.acting(depth * step as f64 / FROM_REST as f64);
-                let loads = [&acting, &next].map(|acting| acting.load(0.0, None));
-                let report = advance(model, &mut state, ws, &loads[0], &loads[1], params);
-                acting = next;
-                if step == FROM_REST || report.outcome != Outcome::Converged {
-                    break report;
-                }
-            }
+        let report = match guess {
+            Some(guess) => self.settle(ws, &mut state, depth, guess),
+            None => self.descend(ws, &mut state, depth),
         };
-        let bonded: Vec<usize> = acting.held.iter().map(|held| held.0).collect();
         (report.outcome == Outcome::Converged).then(|| {
+            let bonded: Vec<usize> = (self.acting(depth).held.iter())
+                .map(|held| held.0)
+                .collect();
             let force = self.force_of(&report, &bonded, ws);
             let is_touching = state.touches.iter().map(|t| t.tool().is_some());
             let deformed = Deformed {
@@ -273,6 +257,38 @@ impl Indentation {
             };
             (force, deformed)
         })
+    }
+
+    /// Solves the equilibrium at a depth, m, from a guess near it.
+    fn settle(
+        &self,
+        ws: &mut Workspace,
+        state: &mut State,
+        depth: f64,
+        guess: &Deformed,
+    ) -> StepReport {
+        let acting = self.acting(depth);
+        state.displacements.clone_from(&guess.displacements);
+        assume_touches(&self.model, state, &acting.tools, &guess.is_touching);
+        let load = acting.load(0.0, None);
+        equilibrate(&self.model, state, ws, &load, &self.near_params())
+    }
+
+    /// Brings the tool from rest to a depth, m, in a few steps.
+    fn descend(&self, ws: &mut Workspace, state: &mut State, depth: f64) -> StepReport {
+        state.displacements.clone_from(&self.rest.displacements);
+        let mut before = self.acting(0.0);
+        let mut step = 0;
+        loop {
+            step += 1;
+            let next = self.acting(depth * step as f64 / FROM_REST as f64);
+            let loads = [&before, &next].map(|acting| acting.load(0.0, None));
+            let report = advance(&self.model, state, ws, &loads[0], &loads[1], &self.params);
+            before = next;
+            if step == FROM_REST || report.outcome != Outcome::Converged {
+                return report;
+            }
+        }
     }
 
     /// The force on the tool against its direction, N. `bonded` are the nodes bonded to it.

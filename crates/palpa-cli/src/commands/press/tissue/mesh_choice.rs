@@ -10,16 +10,20 @@ use palpa::press::tissue::Indentation;
 use palpa_scene::units::Share;
 
 use super::super::Job;
+use super::super::files::remove_older;
 use crate::table::Table;
 
-/// The press on a mesh with this accuracy, a share, and how the mesh was chosen.
+/// The press on a mesh with this accuracy, a share, and how the mesh was chosen; `None` if it was
+/// interrupted. The meshes that were tried are then kept.
 pub(super) fn choose(
     job: &Job<'_>,
     accuracy: f64,
     progress: &ProgressBar,
-) -> anyhow::Result<(Indentation, MeshChoice)> {
-    let scene = job.scene;
+) -> anyhow::Result<Option<(Indentation, MeshChoice)>> {
+    let (context, scene) = (job.context, job.scene);
     let grown = build(scene)?.into();
+    context.begin_recording();
+    remove_older(job.out.path())?;
     let goal = Goal {
         accuracy,
         max_time: scene.mesh.max_time.map(Duration::from_secs_f64),
@@ -34,17 +38,18 @@ pub(super) fn choose(
                 rounds.len() + 1
             ),
         });
-        true
+        !context.is_interrupted()
     })?;
     let Some((indentation, choice)) = chosen else {
-        bail!("the choice of the mesh was interrupted");
+        return Ok(None);
     };
     job.out.write_json("mesh_choice.json", &choice)?;
     say_rounds(job, &choice)?;
-    if choice.end != End::Reached {
-        bail!("{}", refusal(&choice));
+    match choice.end {
+        End::Reached => Ok(Some((indentation, choice))),
+        End::Interrupted => Ok(None),
+        _ => bail!("{}", refusal(&choice)),
     }
-    Ok((indentation, choice))
 }
 
 fn say_rounds(job: &Job<'_>, choice: &MeshChoice) -> anyhow::Result<()> {
@@ -99,7 +104,7 @@ fn refusal(choice: &MeshChoice) -> String {
             format!("with the next mesh the choice would take about {expected_s:.0} s"),
             "raise --max-time",
         ),
-        End::Reached | End::NoProgress => (
+        End::Reached | End::Interrupted | End::NoProgress => (
             "finer meshes did not make the error bar smaller".to_owned(),
             "look at the contributions in mesh_choice.json",
         ),

@@ -195,16 +195,14 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
                 down.splice(0..0, before.map(|s| [s.depth_mm, s.force_n]));
             }
             let mut back = points(&[Phase::Retract]);
-            let bars = (of_run.iter())
-                .filter(|s| cycle == 0 && s.is_first_loading())
-                .filter_map(|s| {
-                    let bar = s.error_bar_n?;
-                    Some([s.depth_mm, s.force_n - bar, s.force_n + bar])
-                });
+            let first = || (of_run.iter()).filter(|s| cycle == 0 && s.is_first_loading());
+            let bars = first().filter_map(|s| {
+                let bar = s.error_bar_n?;
+                Some([s.depth_mm, s.force_n - bar, s.force_n + bar])
+            });
             let series = Series::new(name, down.clone()).with_color(color);
             chart = chart.series(series.with_spread(bars.collect()));
-            let extrapolated: Vec<[f64; 2]> = (of_run.iter())
-                .filter(|s| cycle == 0 && s.is_first_loading())
+            let extrapolated: Vec<[f64; 2]> = first()
                 .filter_map(|s| Some([s.depth_mm, s.extrapolated_n?]))
                 .collect();
             if !extrapolated.is_empty() {
@@ -214,7 +212,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
                     ""
                 };
                 let series = Series::new(name, extrapolated).only_markers();
-                chart = chart.series(series.with_color(PALETTE[7 % PALETTE.len()]));
+                chart = chart.series(series.with_color(color));
             }
             if !back.is_empty() {
                 back.splice(0..0, down.last().copied());
