@@ -19,11 +19,14 @@ has_target() {
 # Debian's compiler with the source of its standard library, into $debian. Its version need not be
 # the toolchain's: it compiles everything here.
 unpack_debian() {
-    [ -x "$debian/rustc" ] && return
+    [ -x "$debian/rustc" ] && is_new_enough "$("$debian/rustc" --version | cut -d ' ' -f 2)" && return
     command -v apt-get dpkg >/dev/null || return 1
     rm -rf "$debian" && mkdir -p "$debian/packages"
-    # The lists of packages of a fresh machine are empty.
-    if ! apt-cache show rust-web-src >/dev/null 2>&1; then apt-get update >/dev/null 2>&1 || return 1; fi
+    # The lists of packages of a fresh machine are empty or old.
+    if ! offers_compiler; then
+        apt-get update >/dev/null 2>&1 || return 1
+        offers_compiler || return 1
+    fi
     local std llvm
     std=$(depends_of libstd-rust-web-dev 'libstd-rust-web-[0-9.]+') && llvm=$(depends_of "$std" 'libllvm[0-9]+') || return 1
     echo "cross: rustup does not have every target; unpacking Debian's $std with its source"
@@ -43,6 +46,16 @@ unpack_debian() {
         "$debian/root/usr/lib/x86_64-linux-gnu" "$debian/root/usr/bin/rustc" >"$debian/rustc.new"
     chmod +x "$debian/rustc.new"
     "$debian/rustc.new" --version && mv "$debian/rustc.new" "$debian/rustc"
+}
+
+# Whether the lists of packages have a compiler that is new enough for the workspace.
+offers_compiler() {
+    is_new_enough "$(apt-cache show --no-all-versions rust-web-src 2>/dev/null | sed -n 's/^Version: //p')"
+}
+
+# Whether $1, the version of a compiler, is what the workspace asks for or later.
+is_new_enough() {
+    dpkg --compare-versions "$1" ge "$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' Cargo.toml)"
 }
 
 # The first package that matches $2 among those that $1 depends on.
