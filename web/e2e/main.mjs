@@ -1,6 +1,7 @@
 // All tests in one process, so that they share viewer and browser. Each file also runs alone.
 
 import './touch.test.mjs';
+import './bars.test.mjs';
 import './cutaway.test.mjs';
 import './game.test.mjs';
 import './recording.test.mjs';

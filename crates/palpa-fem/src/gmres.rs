@@ -22,11 +22,12 @@ fn norm(a: &[Vec3]) -> f64 {
 
 /// Solves `A x = b` (Saad & Schultz 1986). `apply(r, z, y)` sets `z = M⁻¹ r` with an approximation
 /// M of A, and adds `A z` to `y`. Keeping all `z` saves a last `M⁻¹` (Saad 1993). Stops when the
-/// relative residual is `tolerance`, when the basis has `most` vectors, or when these would not be
-/// enough at the present rate.
+/// relative residual is `tolerance`, when the basis has `most` vectors, or when it would still be above
+/// `accepted` with these at the present rate.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,
+    accepted: f64,
     most: usize,
     mut apply: impl FnMut(&[Vec3], &mut [Vec3], &mut [Vec3]),
 ) -> Solution {
@@ -77,7 +78,7 @@ pub(crate) fn gmres(
         let residual = right[j + 1].abs() / size;
         // Extrapolates the convergence so far to `most` vectors.
         let is_too_slow =
-            3 * (j + 1) >= most && residual.powf(most as f64 / (j + 1) as f64) > tolerance;
+            3 * (j + 1) >= most && residual.powf(most as f64 / (j + 1) as f64) > accepted;
         if residual <= tolerance || is_too_slow || rest <= f64::EPSILON * length {
             break;
         }
@@ -130,9 +131,9 @@ mod tests {
         let Solution {
             vector: x,
             residual,
-        } = gmres(&b, 1e-12, 40, halved);
+        } = gmres(&b, 1e-12, 1e-12, 40, halved);
         assert!(residual < 1e-12);
-        let one = gmres(&b, 1e-12, 1, halved);
+        let one = gmres(&b, 1e-12, 1e-12, 1, halved);
         let error: f64 = apply(&x).iter().zip(&b).map(|(x, b)| (x - b).norm()).sum();
         assert!(error < 1e-10, "{error}");
         let left: f64 = apply(&one.vector)

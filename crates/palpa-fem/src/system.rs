@@ -247,6 +247,15 @@ impl LinearSystem {
         Ok(self.shift)
     }
 
+    /// Factors the blocks under constraints, without a shift. Returns whether that works.
+    pub(crate) fn factor_unshifted(&mut self, structure: &Structure, holds: &[Hold]) -> bool {
+        self.holds.copy_from_slice(holds);
+        self.shift = 0.0;
+        self.is_factored = self.factor_exterior(structure, 0.0).is_ok()
+            && self.factor_zone(structure, 0.0).is_ok();
+        self.is_factored
+    }
+
     /// Factors the matrix with the least shift that works, in the region only if that is enough.
     /// After a shifted factor, the search begins a little below its shift. Returns the shift; `None`
     /// if none works.

@@ -15,6 +15,7 @@ use palpa_scene::Scene;
 use palpa_viewer::control::{Field, Hand, NoticeKind, NoticeLevel, Phase, Problem, Request};
 use palpa_viewer::{Answer, Clients, HostFile, Publisher};
 
+use crate::bars::Bars;
 use crate::builder::{Builder, Wanted};
 use crate::drill::Drills;
 use crate::game::Game;
@@ -28,6 +29,14 @@ use crate::veil::Veil;
 use crate::world::World;
 use crate::{edit, gallery};
 
+/// The threads beside the session's own.
+pub(crate) struct Workers {
+    /// Fields over the nodes.
+    pub(crate) fields: Fields,
+    /// Error bars.
+    pub(crate) bars: Bars,
+}
+
 /// The parts of a session.
 pub(crate) struct Desk {
     /// The folder for recordings.
@@ -39,6 +48,7 @@ pub(crate) struct Desk {
     builder: Builder,
     tape: Tape,
     game: Option<Game>,
+    bars: Bars,
     drills: Drills,
     screen: Screen,
     status: Status,
@@ -52,7 +62,7 @@ impl Desk {
         orders: Sender<Order>,
         problem: Arc<Mutex<Option<String>>>,
         publisher: Publisher,
-        fields: Fields,
+        workers: Workers,
     ) -> Self {
         let wanted = Wanted {
             scene: params.scene,
@@ -66,8 +76,9 @@ impl Desk {
             builder: Builder::new(wanted, orders),
             tape: Tape::default(),
             game: None,
+            bars: workers.bars,
             drills: Drills::new(params.allows_faults),
-            screen: Screen::new(publisher.clone(), fields),
+            screen: Screen::new(publisher.clone(), workers.fields),
             status: Status::new(publisher, params.allows_faults, problem),
         }
     }
@@ -373,6 +384,9 @@ impl Desk {
                 self.status.change();
             }
         }
+        let may_probe = self.screen.is_watched() && self.veil().shows_error_bars();
+        let live = self.stage.live().filter(|_| may_probe);
+        self.bars.advance(live, dt);
         let engine = self.stage.live().map(|live| &live.running.engine);
         self.drills
             .advance(engine.map(palpa_rt::Engine::faults), now);
@@ -429,7 +443,8 @@ impl Desk {
             0 => live.world.n_nodes(),
             n => n,
         };
-        let (figures, notices) = live.figures(n_nodes, self.screen.n_frames());
+        let (mut figures, notices) = live.figures(n_nodes, self.screen.n_frames());
+        figures.error_bar = self.bars.present();
         self.status.tell_figures(figures, notices);
     }
 

@@ -8,12 +8,14 @@
 //!        │     └ hand  who leads the tool, and its way:         hand ───► device
 //!        ├─► replay    the recording, and what is shown of it
 //!        ├─► game      find the lump;  veil: what pages may not see meanwhile
+//!        ├─► bars      error bars of the force, computed on a thread of their own
 //!        ├─► drill     faults on purpose
 //!        └─► publish   frames, meshes, fields, state, figures, notices ──► server
 //! ```
-//! The session's thread never waits. Bodies and fields are computed on threads of their own, and a
+//! The session's thread never waits. Bodies, fields and error bars are computed on threads of their own, and a
 //! file is written on the server's thread that requested it.
 
+mod bars;
 mod builder;
 mod desk;
 mod drill;

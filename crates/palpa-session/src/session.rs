@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use palpa_scene::Scene;
 use palpa_viewer::Publisher;
 
-use crate::desk::Desk;
+use crate::bars::Bars;
+use crate::desk::{Desk, Workers};
 use crate::publish::Fields;
 use crate::remote::{Order, Remote};
 use crate::world::BEFORE_THE_BROWSER;
@@ -91,14 +92,17 @@ impl Session {
     /// When the system gives no thread.
     pub fn start(self, publisher: Publisher) -> anyhow::Result<Handle> {
         let orders = self.orders.clone();
-        let fields = Fields::start()?;
+        let workers = Workers {
+            fields: Fields::start()?,
+            bars: Bars::start()?,
+        };
         let thread = thread::Builder::new()
             .name("palpa-session".to_owned())
             .spawn(move || {
                 // This thread moves the hand. It gets the same priority as the tissue's thread, if
                 // the system grants it.
                 BEFORE_THE_BROWSER.ask("palpa-session");
-                let desk = Desk::new(self.params, self.orders, self.problem, publisher, fields);
+                let desk = Desk::new(self.params, self.orders, self.problem, publisher, workers);
                 run(desk, &self.inbox);
             })?;
         Ok(Handle {

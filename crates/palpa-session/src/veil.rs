@@ -59,6 +59,11 @@ impl<'a> Veil<'a> {
         !self.is_drawn()
     }
 
+    /// Whether error bars may be shown: they are smaller where the mesh is finer around lumps.
+    pub(crate) fn shows_error_bars(self) -> bool {
+        !self.is_drawn()
+    }
+
     /// Whether a mesh may carry the stiffness of lumps.
     pub(crate) fn shows_lumps(self) -> bool {
         !self.is_drawn()

@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use self::engine::{
-    DeviceTrouble, EngineFigures, EventInfo, EventKind, ForceLimit, GrantedInfo, InjectedFault,
-    LawFault, LostRecords, PriorityInfo, StepResult,
+    BarProblem, DeviceTrouble, EngineFigures, ErrorBar, EventInfo, EventKind, ForceLimit,
+    GrantedInfo, InjectedFault, LawFault, LostRecords, PriorityInfo, StepResult,
 };
 
 /// A point or a vector.

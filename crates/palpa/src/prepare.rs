@@ -54,7 +54,7 @@ pub struct Prepared {
     /// The body as it was grown, with its bones.
     pub grown: Arc<BuiltBody>,
     /// Materials of the layers, then of the lumps, and the placed lumps.
-    pub materials: Materials,
+    pub materials: Arc<Materials>,
     /// The refined body, and the place that is pressed.
     pub mesh: PressedBody,
     /// The supports: which nodes of the body are fixed.
@@ -113,18 +113,34 @@ impl Prepared {
         Ok(Self {
             scene: scene.clone(),
             grown,
-            materials: Materials {
+            materials: Arc::new(Materials {
                 materials,
                 layers: (0..scene.layers.len()).collect(),
                 lumps,
                 stiffness: None,
-            },
+            }),
             mesh,
             supports,
             notes,
             drawn,
             model: OnceLock::new(),
         })
+    }
+
+    /// The same tissues on another mesh of the body, whose finite elements exist already, pressed
+    /// at another place. `scene` is the present one with another tool's axis, place or depth.
+    pub(crate) fn on_mesh(&self, scene: Scene, model: &Arc<Model>, place: Place) -> Self {
+        let body = model.body().clone();
+        Self {
+            supports: continuum::supports(scene.body.cut_faces, &body, &mut Vec::new()),
+            mesh: PressedBody::refined_before(&scene, body, place),
+            grown: Arc::clone(&self.grown),
+            materials: Arc::clone(&self.materials),
+            notes: Vec::new(),
+            drawn: self.drawn.clone(),
+            model: Arc::clone(model).into(),
+            scene,
+        }
     }
 
     /// The place that the scene presses.

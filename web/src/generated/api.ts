@@ -537,6 +537,27 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description Why there is no error bar. */
+        BarProblem: {
+            /** @constant */
+            kind: "too_large";
+            /**
+             * Format: uint32
+             * @description Number of its nodes.
+             */
+            n_nodes: number;
+        } | {
+            /** @constant */
+            kind: "not_touching";
+        } | {
+            /** @constant */
+            kind: "no_equilibrium";
+        } | {
+            /** @constant */
+            kind: "other";
+            /** @description The reason, in English. */
+            text: string;
+        };
         /**
          * @description The shape of a rigid tool. All lengths in metres. In its own frame the tip is the origin, x
          *     points along the length, and z points out of the tissue. At depth 0 the tip, in the middle of
@@ -647,6 +668,8 @@ export interface components {
              * @description Energy given to the hand since the start, J.
              */
             energy_out: number;
+            /** @description The error bar of the force where the tool presses. */
+            error_bar: components["schemas"]["ErrorBar"];
             /** @description The latest events, newest last. */
             events: components["schemas"]["EventInfo"][];
             /** @description The faults since the last figures. */
@@ -814,6 +837,67 @@ export interface components {
             /** @constant */
             type: "restart";
         });
+        /**
+         * @description How far the force may be from that of an infinitely fine mesh of the same body, where the tool
+         *     presses. Lengths in m, forces in N.
+         */
+        ErrorBar: {
+            /** @constant */
+            kind: "none";
+        } | {
+            /** @constant */
+            kind: "unknown";
+        } | {
+            /**
+             * Format: double
+             * @description Depth at which the bar was computed.
+             */
+            depth: number;
+            /**
+             * Format: double
+             * @description That force, extrapolated to an infinitely fine mesh.
+             */
+            extrapolated: number;
+            /**
+             * Format: double
+             * @description Force of the static press at that place and depth on the same mesh.
+             */
+            force: number;
+            /**
+             * Format: double
+             * @description Half the width of the bar, as a share of the force.
+             */
+            half_width: number;
+            /** @constant */
+            kind: "known";
+            /**
+             * Format: double
+             * @description The same for deep intervals between levels.
+             */
+            levels_deep: number;
+            /**
+             * Format: double
+             * @description Relative change of the force when prisms near the tool are made finer.
+             */
+            near: number;
+            /** @description The place of the skin, at rest, at which it was computed. */
+            point: number[];
+            /**
+             * Format: double
+             * @description The same for triangles of the skin around them.
+             */
+            skin_far: number;
+        } | {
+            /**
+             * Format: double
+             * @description Depth at which it was tried.
+             */
+            depth: number;
+            /** @constant */
+            kind: "failed";
+            /** @description The reason. */
+            why: components["schemas"]["BarProblem"];
+        };
         /** @description An entry of the engine's log. */
         EventInfo: {
             /** @description Severity. */
@@ -1358,11 +1442,13 @@ export interface components {
     headers: never;
     pathItems: never;
 }
+export type BarProblem = components['schemas']['BarProblem'];
 export type ContactShape = components['schemas']['ContactShape'];
 export type DeviceTrouble = components['schemas']['DeviceTrouble'];
 export type Edit = components['schemas']['Edit'];
 export type EngineFigures = components['schemas']['EngineFigures'];
 export type Envelope = components['schemas']['Envelope'];
+export type ErrorBar = components['schemas']['ErrorBar'];
 export type EventInfo = components['schemas']['EventInfo'];
 export type EventKind = components['schemas']['EventKind'];
 export type FaultKind = components['schemas']['FaultKind'];

@@ -3,7 +3,8 @@
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { t } from '../i18n';
-import { isReplaying, latestFrame, onFrame, state } from '../store';
+import { figures, isReplaying, latestFrame, onFrame, state, status } from '../store';
+import type { BarProblem } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
 import { axes } from './axes';
 import { Button } from './controls';
@@ -35,6 +36,67 @@ export function Readout() {
 /** Small forces of the reference method are shown in mN: the thesis has dyn. */
 export function written(force: number): string {
   return force > 0 && force < 0.005 && state.peek()?.method === 'reference' ? withPrefix(force, 'N', 2) : `${force.toFixed(2)} N`;
+}
+
+/** The error bar of the force shown: none of a recording, or while the engine cannot be heard. */
+function presentBar() {
+  const bar = figures.value?.error_bar;
+  return isReplaying.value || status.value !== 'open' || bar === undefined || bar.kind === 'none' ? null : bar;
+}
+
+/** Half the width of the bar, or a change, as text in %. */
+const percent = (share: number): string => formatNumber(100 * share, 2);
+const signed = (share: number): string => `${share > 0 ? '+' : ''}${percent(share)}`.replace('-', '−');
+
+/** The error bar beside the force, in per cent of it. */
+function ErrorBarNumber() {
+  const bar = presentBar();
+  if (bar === null) return null;
+  if (bar.kind !== 'known') return <span class="force-bar" data-testid="force-bar" data-kind={bar.kind} aria-hidden="true">±?</span>;
+  return (
+    <span class="force-bar" data-testid="force-bar" data-kind="known" data-share={bar.half_width} title={barTitle(bar)}>
+      {`± ${percent(bar.half_width)} %`}
+    </span>
+  );
+}
+
+/** Where the error bar was computed, or why there is none. The line keeps its height. */
+function ErrorBarWords() {
+  const bar = presentBar();
+  return (
+    <p class="force-bar-words" data-testid="force-bar-words" title={bar === null ? undefined : bar.kind === 'known' ? barTitle(bar) : t('readout.bar_unknown_title')}>
+      {bar === null
+        ? '\u00a0'
+        : bar.kind === 'known'
+          ? t('readout.bar_at', { depth: inMillimetres(bar.depth) })
+          : bar.kind === 'failed'
+            ? t('readout.bar_failed', { depth: inMillimetres(bar.depth), why: reason(bar.why) })
+            : t('readout.bar_unknown')}
+    </p>
+  );
+}
+
+function barTitle(bar: { half_width: number; depth: number; near: number; skin_far: number; levels_deep: number }): string {
+  return t('readout.bar_title', {
+    half: percent(bar.half_width),
+    depth: inMillimetres(bar.depth),
+    near: signed(bar.near),
+    skin: signed(bar.skin_far),
+    deep: signed(bar.levels_deep),
+  });
+}
+
+function reason(why: BarProblem): string {
+  switch (why.kind) {
+    case 'too_large':
+      return t('readout.bar_too_large', { n: why.n_nodes });
+    case 'not_touching':
+      return t('readout.bar_not_touching');
+    case 'no_equilibrium':
+      return t('readout.bar_no_equilibrium');
+    case 'other':
+      return why.text;
+  }
 }
 
 function ForceNumber() {
@@ -95,7 +157,11 @@ function ForceNumber() {
         <h2 id="force-title">{t(isReplaying.value ? 'readout.force_replayed' : 'readout.force')}</h2>
         <Button kind="quiet" label={t('readout.speak')} onClick={speak}><Icon name="speak" /></Button>
       </div>
-      <output ref={number} class="force-number" aria-live="off" data-testid="force-number" data-newtons="0" data-tick="0">0.00 N</output>
+      <div class="force-line">
+        <output ref={number} class="force-number" aria-live="off" data-testid="force-number" data-newtons="0" data-tick="0">0.00 N</output>
+        <ErrorBarNumber />
+      </div>
+      <ErrorBarWords />
       <div ref={gauge} class="gauge" role="meter" aria-label={t('readout.force')} aria-valuemin={0} aria-valuemax={1} aria-valuenow={0}>
         <div ref={bar} class="gauge-bar" />
       </div>

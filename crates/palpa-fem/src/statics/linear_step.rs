@@ -16,6 +16,11 @@ const GMRES_VECTORS: usize = 40;
 /// save no iteration, and with a larger basis a new factor is cheaper.
 const STALE_TOLERANCE: f64 = 1e-3;
 const STALE_VECTORS: usize = 16;
+/// Near an equilibrium: the residual at which a system counts as solved, and the one up to which the
+/// step is taken all the same. The first factor is kept as long as this works, since a factor is the
+/// dearest part of a solve of few iterations.
+const NEAR_TOLERANCES: [f64; 2] = [1e-2, 0.1];
+const NEAR_VECTORS: usize = 30;
 
 impl Newton<'_> {
     /// Finds the step `δ`: the prescribed displacements in held directions, and the balance of the
@@ -52,19 +57,21 @@ impl Newton<'_> {
         if sliding.is_empty() && !is_stale && system.is_exact() {
             system.solve(structure, &carried, delta);
         } else {
-            let (tolerance, most) = if is_stale || sliding.is_empty() {
-                (STALE_TOLERANCE, STALE_VECTORS)
+            let ([tolerance, accepted], most) = if self.params.is_near {
+                (NEAR_TOLERANCES, NEAR_VECTORS)
+            } else if is_stale || sliding.is_empty() {
+                ([STALE_TOLERANCE; 2], STALE_VECTORS)
             } else {
-                (GMRES_TOLERANCE, GMRES_VECTORS)
+                ([GMRES_TOLERANCE; 2], GMRES_VECTORS)
             };
-            let solution = gmres(&carried, tolerance, most, |force, step, out| {
+            let solution = gmres(&carried, tolerance, accepted, most, |force, step, out| {
                 system.solve(structure, force, step);
                 keep_free(holds, step);
                 structure.multiply(&system.blocks, step, out);
                 couple(&sliding, out);
                 keep_free(holds, out);
             });
-            is_solved = solution.residual <= tolerance;
+            is_solved = solution.residual <= accepted;
             *delta = solution.vector;
         }
         for (delta, demand) in delta.iter_mut().zip(demand.iter()) {

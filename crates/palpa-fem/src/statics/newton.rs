@@ -260,7 +260,8 @@ impl Newton<'_> {
 
     /// Solves the linear system, with as little of a new factor as works: with a new factor of the
     /// region round the tools; in a large body without a region, with the factor of an earlier
-    /// iteration; else with a new factor of everything.
+    /// iteration; else with a new factor of everything. Near an equilibrium, the last factor is kept
+    /// first of all.
     fn find_step(&mut self, ws: &mut Workspace) -> ControlFlow<Outcome> {
         let model = self.model;
         let is_large = model.n_free_nodes() >= self.params.keep_factor_from;
@@ -270,14 +271,46 @@ impl Newton<'_> {
         let is_near = self.params.is_near && ws.system.shift == 0.0;
         let is_kept = ws.system.is_factored && (is_large || is_near);
         let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.holds);
-        if !(is_usable && self.solve(ws, true)) {
-            match ws.system.refactor(&model.structure, &ws.holds) {
-                Ok(shift) => self.shift = self.shift.max(shift),
-                Err(_) => return ControlFlow::Break(Outcome::Singular),
-            }
-            self.solve(ws, false);
+        if is_usable && self.solve(ws, true) {
+            return ControlFlow::Continue(());
         }
+        if self.params.is_near {
+            let is_definite = ws.system.factor_unshifted(&model.structure, &ws.holds);
+            let is_solved = if is_definite {
+                self.solve(ws, false)
+            } else {
+                self.solve_from_rest(ws)
+            };
+            if is_solved {
+                return ControlFlow::Continue(());
+            }
+        }
+        match ws.system.refactor(&model.structure, &ws.holds) {
+            Ok(shift) => self.shift = self.shift.max(shift),
+            Err(_) => return ControlFlow::Break(Outcome::Singular),
+        }
+        self.solve(ws, false);
         ControlFlow::Continue(())
+    }
+
+    /// Solves the linear system with the factor of the body at rest. Displacements that come from a
+    /// coarser mesh press some prisms and stretch others, so that the stiffness there may not be
+    /// positive definite, although it is both at rest and in equilibrium.
+    fn solve_from_rest(&self, ws: &mut Workspace) -> bool {
+        let model = self.model;
+        let present = ws.system.blocks.clone();
+        ws.trial.fill(Vec3::zeros());
+        let assembled = ws.assembler.stiffness(
+            model,
+            &ws.memory,
+            &ws.trial,
+            &mut ws.trial_forces,
+            &mut ws.system,
+        );
+        let is_factored =
+            assembled.is_ok() && ws.system.factor_unshifted(&model.structure, &ws.holds);
+        ws.system.blocks = present;
+        is_factored && self.solve(ws, true)
     }
 
     /// Takes the step as far as the line search allows, and keeps the forces that the linear system

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use palpa_rt::{Level, Quantiles, Report, StepRecord, TickEntry};
 use palpa_servo::{Faults, Limits};
-use palpa_viewer::control::{EngineFigures, EventInfo, Notice, NoticeKind, NoticeLevel};
+use palpa_viewer::control::{EngineFigures, ErrorBar, EventInfo, Notice, NoticeKind, NoticeLevel};
 
 use super::events;
 
@@ -87,6 +87,7 @@ impl Figures {
                 })
                 .collect(),
             snapshot_rate: rate(snapshots, self.snapshots),
+            error_bar: ErrorBar::None,
         };
         let notices = report.events[self.n_events.min(report.events.len())..]
             .iter()

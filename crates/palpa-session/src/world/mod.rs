@@ -11,10 +11,10 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use nalgebra::Point3;
-use palpa::Note;
 use palpa::build::BuiltBody;
 use palpa::live::{LiveScene, SpringScene};
 use palpa::press;
+use palpa::{Note, Prepared};
 use palpa_fem::Model;
 use palpa_fem::lump::Lump as PlacedLump;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
@@ -151,6 +151,14 @@ impl World {
         match &self.kind {
             Kind::Tissue(live) => live.prepared.lumps(),
             Kind::Springs(_) => &[],
+        }
+    }
+
+    /// The prepared scene of a body of finite elements.
+    pub(crate) fn prepared(&self) -> Option<&Arc<Prepared>> {
+        match &self.kind {
+            Kind::Tissue(live) => Some(&live.prepared),
+            Kind::Springs(_) => None,
         }
     }
 

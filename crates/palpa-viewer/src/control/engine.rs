@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NoticeLevel;
+use super::{NoticeLevel, Vec3};
 
 /// Figures of the engine.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +49,67 @@ pub struct EngineFigures {
     pub events: Vec<EventInfo>,
     /// Snapshots per second, since the last figures.
     pub snapshot_rate: f64,
+    /// The error bar of the force where the tool presses.
+    pub error_bar: ErrorBar,
+}
+
+/// How far the force may be from that of an infinitely fine mesh of the same body, where the tool
+/// presses. Lengths in m, forces in N.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ErrorBar {
+    /// The tool does not press, or error bars are not computed: during a game, and in the reference
+    /// method.
+    #[default]
+    None,
+    /// No error bar of this place and depth is known yet.
+    Unknown,
+    /// The error bar was computed here, or near enough.
+    Known {
+        /// Half the width of the bar, as a share of the force.
+        half_width: f64,
+        /// Force of the static press at that place and depth on the same mesh.
+        force: f64,
+        /// That force, extrapolated to an infinitely fine mesh.
+        extrapolated: f64,
+        /// Depth at which the bar was computed.
+        depth: f64,
+        /// The place of the skin, at rest, at which it was computed.
+        point: Vec3,
+        /// Relative change of the force when prisms near the tool are made finer.
+        near: f64,
+        /// The same for triangles of the skin around them.
+        skin_far: f64,
+        /// The same for deep intervals between levels.
+        levels_deep: f64,
+    },
+    /// There is no error bar at this place and depth.
+    Failed {
+        /// The reason.
+        why: BarProblem,
+        /// Depth at which it was tried.
+        depth: f64,
+    },
+}
+
+/// Why there is no error bar.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum BarProblem {
+    /// The mesh has too many nodes to be probed beside the loop.
+    TooLarge {
+        /// Number of its nodes.
+        n_nodes: u32,
+    },
+    /// In a static press, the tool would not touch the skin there.
+    NotTouching,
+    /// The static press or a probe found no equilibrium.
+    NoEquilibrium,
+    /// Another reason.
+    Other {
+        /// The reason, in English.
+        text: String,
+    },
 }
 
 /// A limit that a force met.

@@ -79,7 +79,8 @@ pub(super) fn run(
             continue;
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
-        for (probed, base) in probed.iter_mut().zip(bases) {
+        // From the least depth on, so that each probe starts with the correction of the one before.
+        for (probed, base) in probed.iter_mut().zip(bases).rev() {
             let found = probe.force(press, base.depth, &part, &base.deformed);
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
         }
@@ -113,6 +114,16 @@ struct Probe {
     border: Vec<usize>,
     /// Nodes that are bonded to the tool.
     bonded: Vec<usize>,
+    /// What the probes so far changed, by ascending depth.
+    corrections: Vec<Correction>,
+}
+
+/// The difference between a probe's displacements and those of the press.
+struct Correction {
+    /// Depth of the tool, m.
+    depth: f64,
+    /// Differences, m. `[n_nodes]`
+    displacements: Vec<Vec3>,
 }
 
 impl Probe {
@@ -162,6 +173,7 @@ impl Probe {
             carry,
             border,
             bonded,
+            corrections: Vec::new(),
         })
     }
 
@@ -187,19 +199,55 @@ impl Probe {
             held: &held,
             ..Load::default()
         };
-        let mut state = State::new(&self.model);
-        state.displacements = guess;
         let is_touching = part.take(&deformed.is_touching, 1);
-        let body = &self.model.body();
+        let body = self.model.body();
         let is_touching = carried_marks(&self.carry, &is_touching, part, body, 0.5 - 1e-9);
-        assume_touches(&self.model, &mut state, &tools, &is_touching);
         let params = SolveParams {
             tolerance: TOLERANCE,
             ..press.near_params()
         };
-        let ws = &mut self.workspace;
-        let report = equilibrate(&self.model, &mut state, ws, &load, &params);
-        (report.outcome == Outcome::Converged).then(|| press.force_of(&report, &self.bonded, ws))
+        let starts = [self.expected_correction(depth), Some(Vec::new())];
+        for correction in starts.into_iter().flatten() {
+            let mut state = State::new(&self.model);
+            state.displacements.clone_from(&guess);
+            for (u, more) in state.displacements.iter_mut().zip(&correction) {
+                *u += more;
+            }
+            for &(node, u) in &held {
+                state.displacements[node] = u;
+            }
+            assume_touches(&self.model, &mut state, &tools, &is_touching);
+            let report = equilibrate(&self.model, &mut state, &mut self.workspace, &load, &params);
+            if report.outcome == Outcome::Converged {
+                let displacements = state.displacements.iter().zip(&guess);
+                self.corrections.push(Correction {
+                    depth,
+                    displacements: displacements.map(|(u, guess)| u - guess).collect(),
+                });
+                return Some(press.force_of(&report, &self.bonded, &self.workspace));
+            }
+        }
+        None
+    }
+
+    /// The difference to the press that is expected at a depth, m, from the two depths before;
+    /// `None` at the first.
+    fn expected_correction(&self, depth: f64) -> Option<Vec<Vec3>> {
+        let [before @ .., last] = &self.corrections[..] else {
+            return None;
+        };
+        let before = before.last();
+        let before_depth = before.map_or(0.0, |before| before.depth);
+        let share = (depth - last.depth) / (last.depth - before_depth);
+        let more = |i: usize, u: &Vec3| {
+            let earlier = before.map_or(Vec3::zeros(), |before| before.displacements[i]);
+            u + (u - earlier) * share
+        };
+        Some(
+            (last.displacements.iter().enumerate())
+                .map(|(i, u)| more(i, u))
+                .collect(),
+        )
     }
 }
 

@@ -108,7 +108,7 @@ pub fn once_from(at: Vec3, scene: &Scene, scene_from_device: &Pose) -> Path {
 }
 
 /// Unit vector in the device's plane along which the hand moves across the skin.
-fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
+pub fn across(motion: &Motion, scene_from_device: &Pose) -> Vec3 {
     let along = motion.along.map_or(Vec3::x(), |along| {
         scene_from_device
             .rotation

@@ -8,17 +8,21 @@
 //! tool's length. Its origin is the rest position of the tool's tip, [`palpa_scene::Motion::above`]
 //! over the first touch.
 
+mod error_bar;
 mod fine;
 mod hand;
 mod moving;
+mod prober;
 mod record;
 mod rehearsal;
 mod springs;
 mod watch;
 
+pub use error_bar::{LiveBar, Moment, NoBar, probe};
 pub use fine::FineScene;
-pub use hand::{device_model, grip, once_from, open_device, path, servo_params};
+pub use hand::{across, device_model, grip, once_from, open_device, path, servo_params};
 pub use moving::LiveTissue;
+pub use prober::Prober;
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
 pub use springs::{SpringScene, SpringTissue};

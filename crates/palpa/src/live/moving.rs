@@ -163,7 +163,7 @@ impl Tissue for LiveTissue {
         self.fill(patch);
         self.last = Some(report);
         if let Some(watch) = &mut self.watch {
-            watch.look(input.step, input.now, &self.body);
+            watch.look(input.step, input.now, &self.body, self.posed.first());
         }
         TissueStep {
             status: match report.outcome {

@@ -1,5 +1,6 @@
 //! The viewer's copy of the tissue's displacements, passed on without waiting on either side.
 
+use palpa_fem::PosedTool;
 use palpa_fem::realtime::{Glance, Roaming};
 use palpa_mesh::Vec3;
 use palpa_rt::{Reader, Writer, mailbox};
@@ -13,6 +14,9 @@ pub struct Look {
     pub mesh: u64,
     /// Centre (at rest, m) and radius (m) of the fine part of the mesh; `None` if it does not move.
     pub fine: Option<(Vec3, f64)>,
+    /// The first tool with the pose that the step was given, in the scene's frame; `None` for a
+    /// network of bars.
+    pub tool: Option<PosedTool>,
     /// The displacements; `None` before the first look.
     pub body: Option<Seen>,
 }
@@ -48,9 +52,16 @@ impl Watch {
     }
 
     /// Makes a look at a body of finite elements, if one is due. Cost: a copy of the displacements.
-    pub(super) fn look(&mut self, step: u64, now: f64, body: &Roaming) {
+    pub(super) fn look(&mut self, step: u64, now: f64, body: &Roaming, tool: Option<&PosedTool>) {
         let [mesh, _] = body.n_meshes();
-        self.leave(step, now, mesh, body.fine(), |old| {
+        let look = Look {
+            step,
+            mesh,
+            fine: body.fine(),
+            tool: tool.copied(),
+            body: None,
+        };
+        self.leave(look, now, |old| {
             let old = match old {
                 Some(Seen::Tissue(glance)) => Some(glance),
                 _ => None,
@@ -66,31 +77,23 @@ impl Watch {
         now: f64,
         displacements: impl Iterator<Item = Vec3>,
     ) {
-        self.leave(step, now, 1, None, |_| {
-            Seen::Springs(displacements.collect())
-        });
+        let look = Look {
+            step,
+            mesh: 1,
+            ..Look::default()
+        };
+        self.leave(look, now, |_| Seen::Springs(displacements.collect()));
     }
 
-    fn leave(
-        &mut self,
-        step: u64,
-        now: f64,
-        mesh: u64,
-        fine: Option<(Vec3, f64)>,
-        make: impl FnOnce(Option<Seen>) -> Seen,
-    ) {
+    /// Leaves a look, with the body that `make` makes from the one in its place.
+    fn leave(&mut self, mut look: Look, now: f64, make: impl FnOnce(Option<Seen>) -> Seen) {
         if now < self.due {
             return;
         }
         self.due = now + self.period;
         let slot = self.writer.slot();
-        let body = Some(make(slot.body.take()));
-        *slot = Look {
-            step,
-            mesh,
-            fine,
-            body,
-        };
+        look.body = Some(make(slot.body.take()));
+        *slot = look;
         self.writer.publish();
     }
 }

@@ -219,6 +219,21 @@ impl PressedBody {
             is_resolved: is_fine && is_split,
         })
     }
+
+    /// A body that was refined before, as the loop in real time does. Its thinning and stand-off
+    /// are not known: those lists are empty.
+    pub(crate) fn refined_before(scene: &Scene, body: LayeredBody, place: Place) -> Self {
+        Self {
+            mesh_size: mesh_size_near(&body, place.at, scene.tool.contact_radius()),
+            body,
+            place,
+            thinning: Vec::new(),
+            stand_off: Vec::new(),
+            patch: None,
+            sizes: Sizes::of(scene),
+            is_resolved: true,
+        }
+    }
 }
 
 /// Moves the vertex nearest to a point of the skin to the point, and the mesh under the tool with

@@ -179,6 +179,24 @@ fn a_choice_says_which_limit_it_met_and_keeps_the_best_mesh() {
 }
 
 #[test]
+fn an_interrupted_choice_keeps_the_best_mesh_so_far() {
+    let scene = Scene::parse(&block().to_string(), Path::new(".")).unwrap();
+    let grown = Arc::new(palpa::build::build(&scene).unwrap());
+    let goal = Goal {
+        accuracy: 0.002,
+        max_time: None,
+    };
+    let choose = |n_rounds: usize| {
+        choose_mesh(&scene, &grown, &goal, |rounds| rounds.len() < n_rounds).unwrap()
+    };
+    let (press, choice) = choose(1).unwrap();
+    assert_eq!((choice.end, choice.rounds.len()), (End::Interrupted, 1));
+    assert_eq!(press.model.n_nodes(), choice.rounds[0].n_nodes);
+    assert!(choice.half_width().unwrap() > goal.accuracy);
+    assert!(choose(0).is_none(), "nothing was computed");
+}
+
+#[test]
 fn a_single_node_has_no_accuracy() {
     let scene = block().set("tool", "shape", "node");
     let scene = Scene::parse(&scene.to_string(), Path::new(".")).unwrap();

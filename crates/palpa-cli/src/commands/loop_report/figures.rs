@@ -4,6 +4,8 @@ use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus, Tick
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
+use super::Run;
+use super::bars::{self, BarFigures};
 use super::guarantees::{MOST_ARRIVAL, MOST_RMS};
 use crate::cli::Context;
 use crate::table::Table;
@@ -32,6 +34,8 @@ pub(super) struct Figures {
     pub(super) lateness_histogram: Vec<(f64, f64, u64)>,
     pub(super) tissue: TissueFigures,
     pub(super) devices: Vec<ForceFigures>,
+    /// Error bars of the force along the way; `None` if none were asked for.
+    pub(super) error_bars: Option<Vec<BarFigures>>,
     /// Number of ticks with each fault.
     faults: Vec<(String, u64)>,
     /// Number of ticks with each limit.
@@ -199,13 +203,13 @@ impl TissueFigures {
 
 impl Figures {
     pub(super) fn new(
-        report: &Report,
-        forces: &[ForceReport],
+        run: &Run,
         log: &Log,
         live: &LiveScene,
         motion_speed: f64,
         seconds: f64,
     ) -> Self {
+        let (report, forces) = (&run.report, &run.forces);
         let ticks = || ticks_until(log, seconds);
         let mut faults = Vec::new();
         let mut limits = Vec::new();
@@ -230,13 +234,14 @@ impl Figures {
             lateness_histogram: report.lateness_histogram.clone(),
             tissue: TissueFigures::new(report, log, live, motion_speed, seconds),
             devices: devices.collect(),
+            error_bars: run.bars.clone(),
             faults,
             limits,
             n_active_max: ticks().map(|t| t.tick.n_active).max().unwrap_or(0),
             lost_ticks: report.lost_records[0],
             lost_steps: report.lost_records[1],
             has_log_failed: report.has_log_failed,
-            threads: report.granted.iter().map(ToString::to_string).collect(),
+            threads: run.threads.clone(),
             memory: match &report.memory_locked {
                 Ok(()) => "locked".to_owned(),
                 Err(why) => format!("not locked ({why})"),
@@ -282,6 +287,9 @@ impl Figures {
         ))?;
         for d in &self.devices {
             context.say(d.table())?;
+        }
+        if let Some(error_bars) = &self.error_bars {
+            bars::say(error_bars, context)?;
         }
         let list = |counts: &[(String, u64)]| {
             let all: Vec<String> = counts

@@ -1,5 +1,6 @@
 //! `palpa loop-report`: runs the whole engine in real time and reports on it.
 
+mod bars;
 mod figures;
 mod guarantees;
 mod picture;
@@ -11,11 +12,12 @@ use anyhow::Context as _;
 use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
 use palpa_scene::Scene;
 
+use self::bars::{BarFigures, Bars, LOOK_PERIOD};
 use self::figures::Figures;
 use self::guarantees::broken;
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{LiveScene, notes_of, open_device, path, servo_params};
+use palpa::live::{LiveScene, Watch, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
 /// The scene that is used if none is given.
@@ -29,7 +31,8 @@ const MOST_SECONDS: f64 = 3600.0;
 ///
 /// A simulated hand holds the haptic device of the scene and moves it as the scene's motion says.
 /// The tissue is computed with finite elements, the force at 1 kHz. Without a SCENE, the hand
-/// strokes a forearm with a lump. Writes the log (log.mcap, for `palpa replay`), the figures
+/// strokes a forearm with a lump. Meanwhile a thread of the lowest priority computes error bars of
+/// the force at up to five places along the way. Writes the log (log.mcap, for `palpa replay`), the figures
 /// (loop.json), histograms of the times of ticks, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -52,6 +55,9 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     spin_us: f64,
+    /// Compute no error bars
+    #[arg(long)]
+    no_error_bars: bool,
     /// Print the scene as a start for your own, and run nothing
     #[arg(long)]
     print_scene: bool,
@@ -99,10 +105,9 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         tissue.live().n_columns()[1],
     ))?;
     let log = out.path().join("log.mcap");
-    let (forces, report) = run_engine(args, context, &scene, &live, tissue, log)?;
+    let run = run_engine(args, context, &scene, &live, tissue, log)?;
     let log = Log::open(out.path().join("log.mcap"))?;
-    let speed = scene.motion.speed;
-    let figures = Figures::new(&report, &forces, &log, &live, speed, args.seconds);
+    let figures = Figures::new(&run, &log, &live, scene.motion.speed, args.seconds);
     let subtitle = format!(
         "{} at up to {:.0} mm/s; {} in a {} hand",
         scene.motion.kind.name(),
@@ -127,8 +132,19 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     })
 }
 
+/// The results of a run.
+struct Run {
+    /// Before the ramp down at the end.
+    forces: Vec<palpa_rt::ForceReport>,
+    report: Report,
+    /// `None` if none were asked for.
+    bars: Option<Vec<BarFigures>>,
+    /// What the system granted to the threads.
+    threads: Vec<String>,
+}
+
 /// Runs for the requested time or until Ctrl-C. The report of the forces is taken before the ramp
-/// down at the end.
+/// down at the end. Error bars that are missing then are computed afterwards.
 fn run_engine(
     args: &Args,
     context: &Context,
@@ -136,7 +152,7 @@ fn run_engine(
     live: &LiveScene,
     tissue: palpa::live::LiveTissue,
     log: PathBuf,
-) -> anyhow::Result<(Vec<palpa_rt::ForceReport>, Report)> {
+) -> anyhow::Result<Run> {
     let way = path(scene, &live.scene_from_device, args.seconds);
     let device = open_device(&scene.device, way)?;
     let params = EngineParams {
@@ -151,15 +167,36 @@ fn run_engine(
     };
     context.begin_recording();
     let bar = context.progress(args.seconds.ceil() as usize, "real time");
-    let engine = Engine::start(tissue, vec![device], &params, &recorder)?;
+    let mut bars = if args.no_error_bars {
+        None
+    } else {
+        Some(Bars::start(scene, live)?)
+    };
+    let (watch, mut looks) = Watch::new(LOOK_PERIOD);
+    let tissue = match &bars {
+        Some(_) => tissue.watched(watch),
+        None => tissue,
+    };
+    let mut engine = Engine::start(tissue, vec![device], &params, &recorder)?;
     while engine.now() < args.seconds && !context.is_interrupted() {
         std::thread::sleep(Duration::from_millis(20));
+        if let Some(bars) = &mut bars {
+            bars.advance(&mut engine, &mut looks);
+        }
         bar.set_position(engine.now() as u64);
     }
     bar.finish_and_clear();
     // Taken before the stop, so that the ramp down does not count.
     let forces = engine.report().forces;
-    Ok((forces, engine.stop()))
+    let report = engine.stop();
+    let mut threads: Vec<String> = report.granted.iter().map(ToString::to_string).collect();
+    threads.extend(bars.as_ref().map(Bars::granted));
+    Ok(Run {
+        forces,
+        report,
+        bars: bars.map(|bars| bars.finish(context)),
+        threads,
+    })
 }
 
 fn write(
@@ -171,7 +208,8 @@ fn write(
 ) -> anyhow::Result<()> {
     out.write_json("loop.json", figures)?;
     picture::times(figures).save(out, "loop_times")?;
-    picture::forces(log, subtitle).save(out, "force_time")?;
-    picture::depth(log, scene.motion.above, subtitle).save(out, "force_depth")?;
+    let bars = figures.error_bars.as_deref().unwrap_or_default();
+    picture::forces(log, bars, subtitle).save(out, "force_time")?;
+    picture::depth(log, bars, scene.motion.above, subtitle).save(out, "force_depth")?;
     Ok(())
 }

@@ -3,8 +3,9 @@
 use palpa_rt::{Log, StepStatus, TickEntry};
 use palpa_servo::Faults;
 
+use super::bars::BarFigures;
 use super::figures::Figures;
-use palpa_plot::{Axis, Band, Chart, Color, Guide, Picture, Series, panels};
+use palpa_plot::{Axis, Band, Chart, Color, Guide, PALETTE, Picture, Series, panels};
 
 /// Largest number of points of a curve: more than there are pixels.
 const MOST_POINTS: usize = 6000;
@@ -66,13 +67,14 @@ fn steps(filled: &[(f64, f64, u64)]) -> Vec<[f64; 2]> {
 }
 
 /// Plots force and height against time. Shaded where the tissue was behind the tool or gave no
-/// force.
-pub(super) fn forces(log: &Log, subtitle: &str) -> Picture {
+/// force. Error bars stand where they were computed.
+pub(super) fn forces(log: &Log, bars: &[BarFigures], subtitle: &str) -> Picture {
     let force = Chart::new(Axis::linear("time [s]"), Axis::linear("force [N]"))
         .title("Force on the hand")
         .subtitle(subtitle)
         .line("along the press", curve(log, |d| d.force[2]))
         .line("across", curve(log, |d| d.force[0].hypot(d.force[1])));
+    let force = with_bars(force, bars, |bar| bar.time_s);
     let force = missing(log).into_iter().fold(force, |chart, [from, to]| {
         chart.band(Band::x(from, to, "", FAINT))
     });
@@ -113,7 +115,7 @@ fn missing(log: &Log) -> Vec<[f64; 2]> {
 }
 
 /// Plots force against depth below the first touch, which is `above` (m) under the device's origin.
-pub(super) fn depth(log: &Log, above: f64, subtitle: &str) -> Picture {
+pub(super) fn depth(log: &Log, bars: &[BarFigures], above: f64, subtitle: &str) -> Picture {
     let point = |t: &TickEntry| {
         let device = &t.devices[0];
         [(-device.position[2] - above) * 1e3, device.force[2]]
@@ -122,15 +124,32 @@ pub(super) fn depth(log: &Log, above: f64, subtitle: &str) -> Picture {
     let is_off = |t: &&TickEntry| t.devices[0].force[2] == 0.0;
     let last = entries.iter().rposition(is_off).unwrap_or(0);
     let points = |of: &[&TickEntry]| of.iter().map(|t| point(t)).collect();
-    Chart::new(
+    let chart = Chart::new(
         Axis::linear("depth below the first touch [mm]"),
         Axis::linear("force along the press [N]"),
     )
     .title("Force against depth")
     .subtitle(subtitle)
     .series(Series::new("on the way", points(&entries[..last])).with_color(FAINT))
-    .line("the last press", points(&entries[last..]))
-    .draw()
+    .line("the last press", points(&entries[last..]));
+    with_bars(chart, bars, |bar| bar.depth_mm).draw()
+}
+
+/// Adds the static forces with their error bars.
+fn with_bars(chart: Chart, bars: &[BarFigures], x: impl Fn(&BarFigures) -> f64) -> Chart {
+    let known = || (bars.iter()).filter_map(|bar| Some((x(bar), bar.static_n?, bar.error_bar_n?)));
+    let forces: Vec<[f64; 2]> = known().map(|(x, force, _)| [x, force]).collect();
+    if forces.is_empty() {
+        return chart;
+    }
+    // A point that is not finite is a gap between two bars.
+    let ends =
+        known().flat_map(|(x, force, half)| [[x, force - half], [x, force + half], [f64::NAN; 2]]);
+    let color = PALETTE[7 % PALETTE.len()];
+    let name = "static force on the same mesh, with its error bar";
+    chart
+        .series(Series::new("", ends.collect()).with_color(color))
+        .series(Series::new(name, forces).only_markers().with_color(color))
 }
 
 fn curve(log: &Log, value: impl Fn(&palpa_rt::DeviceRecord) -> f64) -> Vec<[f64; 2]> {
