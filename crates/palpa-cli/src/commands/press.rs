@@ -53,10 +53,9 @@ pub struct Args {
     /// Stop at the full depth; do not retract
     #[arg(long)]
     no_retract: bool,
-    /// Estimate the force's error bar: press on finer meshes near the tool. Takes about as long
-    /// again as the press
-    #[arg(long)]
-    error_bar: bool,
+    /// Leave out the error bars of the force. They take about half as long again as the press
+    #[arg(long, conflicts_with = "accuracy")]
+    no_error_bar: bool,
     /// Choose the mesh so that the error bar at the deepest is no wider than this share of the
     /// force: "3 %"
     #[arg(long, value_name = "SHARE")]

@@ -116,7 +116,7 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
 }
 
 /// The columns of press.csv before the layers: programs read them by these names.
-const COLUMNS: [&str; 32] = [
+const COLUMNS: [&str; 33] = [
     "run",
     "speed_mm_s",
     "phase",
@@ -149,6 +149,7 @@ const COLUMNS: [&str; 32] = [
     "error_near_n",
     "error_skin_far_n",
     "error_levels_deep_n",
+    "error_load_step_n",
 ];
 
 /// The table has the fields of the samples and their values.
@@ -548,6 +549,38 @@ fn the_shipped_scenes_without_files_can_be_set_up() {
         n += 1;
     }
     assert!(n >= 4, "{n}");
+}
+
+#[test]
+fn every_force_has_an_error_bar_unless_it_is_left_out() {
+    let press = tissue();
+    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
+        .press(2.0)
+        .set("press", "step", "1 mm");
+    let report = press.report(&scene, &["--frames", "0"]);
+    let samples = report["samples"].as_array().unwrap();
+    assert!(samples.len() > 3);
+    for sample in samples {
+        let pressed = number(&sample["depth_mm"]) > 0.0;
+        assert_eq!(number(&sample["error_bar_n"]) > 1e-9, pressed, "{sample}");
+        assert!(number(&sample["extrapolated_n"]).is_finite());
+    }
+    let result = &report["result"];
+    let (bar, at) = (
+        &result["secant_stiffness_error_bar_n_per_mm"],
+        number(&result["at_depth_mm"]),
+    );
+    let deepest = (samples.iter()).find(|s| number(&s["depth_mm"]) > at - 1e-6);
+    let expected = number(&deepest.unwrap()["error_bar_n"]) / at;
+    assert!((number(bar) - expected).abs() < 1e-9 * expected);
+    let without = press.report(&scene, &["--frames", "0", "--no-error-bar"]);
+    assert!(without["error_bars"].is_null());
+    let all = without["samples"].as_array().unwrap();
+    assert_eq!(all.len(), samples.len());
+    for (with, without) in samples.iter().zip(all) {
+        assert!(without["error_bar_n"].is_null());
+        assert_eq!(with["force_n"], without["force_n"]);
+    }
 }
 
 #[test]

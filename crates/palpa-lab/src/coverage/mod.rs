@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use palpa::Prepared;
-use palpa::accuracy::{Deepest, EXTRAPOLATION, SAFETY, Source};
+use palpa::accuracy::{Descent, EXTRAPOLATION, SAFETY, Source};
 use palpa::build::{BuiltBody, build};
 use palpa::press::mesh::Sizes;
 use palpa::press::tissue::Indentation;
@@ -212,17 +212,18 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     let sizes = Sizes::of(&scene).context("a drawn tool has a size")?;
     let press = press_of(&scene, &grown, sizes)?;
     case.n_nodes = press.model.n_nodes();
-    let Some(deepest) = Deepest::from_rest(&press) else {
+    let Some(descent) = Descent::from_rest(&press) else {
         "no equilibrium".clone_into(&mut case.missing);
         return Ok(Some(case));
     };
-    case.force_n = Some(deepest.force_n());
+    case.force_n = Some(descent.force_n());
     case.press_s = begin.elapsed().as_secs_f64();
 
     let begin = Instant::now();
-    let Some(probed) = deepest.probe(&press, |_, _| progress()) else {
+    let Some(bars) = descent.probe(&press, |_, _| progress()) else {
         return Ok(None);
     };
+    let probed = bars.deepest();
     case.probes_s = begin.elapsed().as_secs_f64();
     let part = |source: Source| probed.changes[source as usize].map(|c| c * probed.force_n);
     case.error_near_n = part(Source::Near);
@@ -231,7 +232,7 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     drop(press);
 
     let begin = Instant::now();
-    let mut found = deepest;
+    let mut found = descent.only_deepest();
     for factors in FINER {
         if !progress() {
             return Ok(None);
@@ -266,8 +267,8 @@ fn finer(
     grown: &Arc<BuiltBody>,
     mut sizes: Sizes,
     [near, far]: [f64; 2],
-    from: &Deepest,
-) -> anyhow::Result<(usize, Deepest)> {
+    from: &Descent,
+) -> anyhow::Result<(usize, Descent)> {
     let mut scene = scene.clone();
     let lump = scene.lumps.first();
     scene.mesh.near_lumps = lump.and_then(|lump| scene.mesh.near_lump_of(lump).map(|h| far * h));
@@ -275,9 +276,10 @@ fn finer(
         (graded.near, graded.far) = (near, far);
     }
     let press = press_of(&scene, grown, sizes)?;
-    let deepest =
-        Deepest::near(&press, from).context("no equilibrium was found near that of the press")?;
-    Ok((press.model.n_nodes(), deepest))
+    let found = Descent::near(&press, from)
+        .or_else(|| Descent::from_rest(&press).map(Descent::only_deepest));
+    let found = found.context("no equilibrium was found")?;
+    Ok((press.model.n_nodes(), found))
 }
 
 #[cfg(test)]

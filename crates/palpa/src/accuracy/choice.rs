@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use palpa_scene::Scene;
 use serde::Serialize;
 
-use super::deepest::Deepest;
-use super::{Probed, SAFETY, Source};
+use super::descent::Descent;
+use super::{ErrorBars, Probed, SAFETY, Source};
 use crate::Prepared;
 use crate::build::BuiltBody;
 use crate::note::Note;
@@ -96,17 +96,15 @@ pub struct MeshChoice {
     pub best: usize,
     /// How the choice ended.
     pub end: End,
+    /// The error bars of the best mesh, if it was probed.
+    #[serde(skip)]
+    pub bars: Option<ErrorBars>,
 }
 
 impl MeshChoice {
     /// Half the width of the best bar as a share of the force.
     pub fn half_width(&self) -> Option<f64> {
         self.rounds[self.best].half_width
-    }
-
-    /// The contributions at the deepest on the best mesh, if they were found.
-    pub fn probed(&self) -> Option<&Probed> {
-        self.rounds[self.best].probed.as_ref()
     }
 }
 
@@ -211,8 +209,8 @@ pub fn choose_mesh(
         is_smaller: [false; 2],
     };
     let mut rounds: Vec<Round> = Vec::new();
-    let mut solved: Option<Deepest> = None;
-    let mut best: Option<(usize, Indentation)> = None;
+    let mut solved: Option<Descent> = None;
+    let mut best: Option<(usize, Indentation, Option<ErrorBars>)> = None;
     let end = loop {
         if !progress(&rounds) {
             break End::Interrupted;
@@ -231,17 +229,18 @@ pub fn choose_mesh(
             }
         }
         let press = Indentation::build(Arc::new(prepared))?;
-        let mut probed = None;
-        let near = solved.as_ref().and_then(|last| Deepest::near(&press, last));
-        if let Some(deepest) = near.or_else(|| Deepest::from_rest(&press)) {
-            probed = deepest.probe(&press, |_, _| progress(&rounds));
-            if probed.is_none() {
+        let mut bars = None;
+        let near = solved.as_ref().and_then(|last| Descent::near(&press, last));
+        if let Some(descent) = near.or_else(|| Descent::from_rest(&press)) {
+            bars = descent.probe(&press, |_, _| progress(&rounds));
+            if bars.is_none() {
                 break End::Interrupted;
             }
-            solved = Some(deepest);
+            solved = Some(descent);
         }
+        let probed = bars.as_ref().map(|bars| bars.deepest().clone());
         let half_width = probed.as_ref().and_then(Probed::half_width);
-        let is_best = best.as_ref().is_none_or(|(index, _)| {
+        let is_best = best.as_ref().is_none_or(|(index, ..)| {
             let before = rounds[*index].half_width.unwrap_or(f64::INFINITY);
             half_width.is_some_and(|now| now < before)
         });
@@ -257,7 +256,7 @@ pub fn choose_mesh(
         factors = factors.after(&round, goal.accuracy, is_edged, rounds.is_empty());
         rounds.push(round);
         if is_best {
-            best = Some((rounds.len() - 1, press));
+            best = Some((rounds.len() - 1, press, bars));
         }
         if half_width.is_some_and(|half| half <= goal.accuracy) {
             break End::Reached;
@@ -266,7 +265,7 @@ pub fn choose_mesh(
             break End::NoProgress;
         }
     };
-    let Some((best, press)) = best else {
+    let Some((best, press, bars)) = best else {
         // The first mesh is the best at first.
         return Ok(None);
     };
@@ -275,6 +274,7 @@ pub fn choose_mesh(
         rounds,
         best,
         end,
+        bars,
     };
     Ok(Some((press, choice)))
 }

@@ -14,15 +14,14 @@
 //! bar.
 
 mod choice;
-mod deepest;
+mod descent;
 mod probe;
 
 use serde::Serialize;
 
 pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
-pub use self::deepest::Deepest;
-use self::probe::Base;
-use crate::press::tissue::{Record, Sample};
+pub use self::descent::{Descent, Stops};
+use crate::press::tissue::Sample;
 
 /// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
 /// first order and three quarters of one of second order.
@@ -30,6 +29,9 @@ pub const SAFETY: f64 = 2.0;
 /// Factor between the sum of the signed contributions and the expected error. Halving a size shows
 /// three quarters of an error of second order.
 pub const EXTRAPOLATION: f64 = 4.0 / 3.0;
+/// The same for load steps: their contribution is half of the change from steps twice as long, and in
+/// relaxing tissue the error, of second order, is a third of that change.
+const STEP_EXTRAPOLATION: f64 = 2.0 / 3.0;
 /// Depths that are probed, as shares of the deepest.
 const DEPTHS: [f64; 3] = [1.0, 0.5, 0.25];
 
@@ -66,8 +68,11 @@ pub struct Probed {
     /// Force on the press's own mesh, of the elastic problem that the probes solve, N.
     pub force_n: f64,
     /// Relative change of the force by each probe, in the order of [`Source::ALL`]; `None` if its
-    /// probe found no equilibrium.
+    /// probe found no equilibrium, here and at all smaller depths.
     pub changes: [Option<f64>; N_SOURCES],
+    /// Whether the change is that at the next smaller depth, because the probe found no equilibrium
+    /// here.
+    pub is_stand_in: [bool; N_SOURCES],
 }
 
 impl Probed {
@@ -93,53 +98,34 @@ pub struct ErrorBar {
     pub extrapolated_n: f64,
     /// Signed contributions, N, in the order of [`Source::ALL`].
     pub contributions_n: [f64; N_SOURCES],
+    /// Signed contribution of the load steps, N.
+    pub load_step_n: f64,
 }
 
 /// The error bars of a press.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorBars {
-    /// Contributions at the depths that were probed, the deepest first.
+    /// Contributions at the depths that were probed, the deepest first; at least one.
     pub probed: Vec<Probed>,
+    /// Relative change of the force at the deepest if the load steps of the press were halved: at most
+    /// half of the change from steps twice as long, which is the value. `None` if steps do not matter, as in
+    /// elastic tissue without friction, or if the longer steps found no equilibrium.
+    pub load_step: Option<f64>,
     /// Number of nodes of the largest probe.
     pub n_nodes: usize,
 }
 
 impl ErrorBars {
-    /// Probes the first press down of a record that keeps displacements. `known` are contributions
-    /// at one of its depths, if they have been found before. `progress` is called before each probe with
-    /// its number and the number of all; if it returns false, the probes are given up. `None` if
-    /// they were, or if no sample converged.
-    ///
-    /// # Panics
-    /// If the record is not [`Record::with_displacements`].
-    pub fn estimate(
-        record: &Record<'_>,
-        known: Option<&Probed>,
-        mut progress: impl FnMut(usize, usize) -> bool,
-    ) -> Option<Self> {
-        let press = record.indentation();
-        let mut ws = press.workspace();
-        let mut bars = Self {
-            probed: known.cloned().into_iter().collect(),
-            n_nodes: 0,
-        };
-        let mut bases = Vec::new();
-        for index in probed_samples(record)? {
-            let depth_mm = record.samples[index].depth_mm;
-            let is_same = |probed: &Probed| (probed.depth_mm - depth_mm).abs() < SAME_DEPTH;
-            if !bars.probed.iter().any(is_same) {
-                let depth = depth_mm * 1e-3;
-                let guess = press.deformed(record.displacements(index), depth);
-                bases.extend(Base::find(press, &mut ws, depth, Some(&guess)));
-            }
-        }
-        drop(ws);
-        let (probed, n_nodes) = probe::run(press, &bases, &mut progress)?;
-        bars.probed.extend(probed);
-        bars.probed
-            .sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-        bars.n_nodes = n_nodes;
-        Some(bars)
+    /// Half the width of the bar at a depth that was probed, relative to the force; `None` if a
+    /// probe failed.
+    pub fn half_width(&self, probed: &Probed) -> Option<f64> {
+        let steps = SAFETY * self.load_step.map_or(0.0, f64::abs);
+        probed.half_width().map(|half| half + steps)
+    }
+
+    /// The contributions at the deepest.
+    pub fn deepest(&self) -> &Probed {
+        &self.probed[0]
     }
 
     /// Enters the bars into the samples of a press. Each run has the forces of its own press down.
@@ -155,6 +141,7 @@ impl ErrorBars {
             sample.error_near_n = part(0);
             sample.error_skin_far_n = part(1);
             sample.error_levels_deep_n = part(2);
+            sample.error_load_step_n = bar.map(|bar| bar.load_step_n);
         }
     }
 
@@ -164,10 +151,14 @@ impl ErrorBars {
         let force = force_at(loading, sample.depth_mm)?;
         let changes = self.changes_at(sample.depth_mm)?;
         let contributions_n = changes.map(|change| change * force);
+        let load_step_n = self.load_step.map_or(0.0, |change| change * force);
+        let sum: f64 = contributions_n.iter().sum();
+        let sizes: f64 = contributions_n.iter().map(|c| c.abs()).sum();
         Some(ErrorBar {
-            half_width_n: SAFETY * contributions_n.iter().map(|c| c.abs()).sum::<f64>(),
-            extrapolated_n: sample.force_n + EXTRAPOLATION * contributions_n.iter().sum::<f64>(),
+            half_width_n: SAFETY * (sizes + load_step_n.abs()),
+            extrapolated_n: sample.force_n + EXTRAPOLATION * sum + STEP_EXTRAPOLATION * load_step_n,
             contributions_n,
+            load_step_n,
         })
     }
 
@@ -196,28 +187,6 @@ impl ErrorBars {
             (None, None) => return None,
         })
     }
-}
-
-/// The converged samples of the first press down that are probed, the deepest first.
-fn probed_samples(record: &Record<'_>) -> Option<Vec<usize>> {
-    let loading = loading(&record.samples, 0);
-    let deepest = loading.last()?.depth_mm;
-    let nearest = |share: f64| {
-        let off = |s: &&Sample| (s.depth_mm - share * deepest).abs();
-        let below = loading.iter().filter(|s| s.depth_mm > 0.0);
-        below
-            .min_by(|a, b| off(a).total_cmp(&off(b)))
-            .map(|s| s.depth_mm)
-    };
-    let mut depths: Vec<f64> = DEPTHS.iter().filter_map(|&share| nearest(share)).collect();
-    depths.dedup();
-    let index = |depth: f64| {
-        record
-            .samples
-            .iter()
-            .position(|s| (s.depth_mm - depth).abs() < SAME_DEPTH)
-    };
-    Some(depths.into_iter().filter_map(index).collect())
 }
 
 /// The converged samples of the first press down of a run.

@@ -7,7 +7,7 @@ use palpa_fem::{
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
 
-use super::{N_SOURCES, Probed, Source};
+use super::{ErrorBars, N_SOURCES, Probed, Source};
 use crate::build::nearest;
 use crate::continuum;
 use crate::press::mesh::NEAR;
@@ -24,21 +24,26 @@ const TOLERANCE: f64 = 1e-4;
 #[derive(Debug)]
 pub(super) struct Base {
     /// Depth of the tool, m.
-    depth: f64,
+    pub(super) depth: f64,
     pub(super) force_n: f64,
     pub(super) deformed: Deformed,
 }
 
 impl Base {
-    /// The equilibrium at a depth, m; `None` if there is none, or if the tool does not touch yet:
-    /// then there is no force that a change could be relative to. `guess` is near it.
-    pub(super) fn find(
+    /// The equilibrium at a depth, m, near a guess; `None` if none is found.
+    pub(super) fn near(
         press: &Indentation,
         ws: &mut Workspace,
         depth: f64,
-        guess: Option<&Deformed>,
+        guess: &Deformed,
     ) -> Option<Self> {
         let (force_n, deformed) = press.elastic(ws, depth, guess)?;
+        Self::new(depth, force_n, deformed)
+    }
+
+    /// `None` if the tool does not touch yet: then there is no force that a change could be relative
+    /// to.
+    pub(super) fn new(depth: f64, force_n: f64, deformed: Deformed) -> Option<Self> {
         (force_n != 0.0).then_some(Self {
             depth,
             force_n,
@@ -47,18 +52,19 @@ impl Base {
     }
 }
 
-/// Probes a press in these equilibria: the contributions, and the number of nodes of the largest
-/// probe. `progress` as in [`ErrorBars::estimate`](super::ErrorBars::estimate).
+/// Probes a press in these equilibria, the deepest first. `progress` as in
+/// [`Descent::probe`](super::Descent::probe).
 pub(super) fn run(
     press: &Indentation,
     bases: &[Base],
     progress: &mut dyn FnMut(usize, usize) -> bool,
-) -> Option<(Vec<Probed>, usize)> {
+) -> Option<ErrorBars> {
     let mut probed: Vec<Probed> = (bases.iter())
         .map(|base| Probed {
             depth_mm: base.depth * 1e3,
             force_n: base.force_n,
             changes: [None; N_SOURCES],
+            is_stand_in: [false; N_SOURCES],
         })
         .collect();
     let part = part(press);
@@ -85,7 +91,27 @@ pub(super) fn run(
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
         }
     }
-    Some((probed, n_nodes))
+    stand_in(&mut probed);
+    Some(ErrorBars {
+        probed,
+        load_step: None,
+        n_nodes,
+    })
+}
+
+/// Where a probe found no equilibrium, the change at the next smaller depth stands in: relative
+/// changes fall with the depth, or stay.
+fn stand_in(probed: &mut [Probed]) {
+    for i in 0..N_SOURCES {
+        let mut last = None;
+        for probed in probed.iter_mut().rev() {
+            if probed.changes[i].is_none() {
+                probed.changes[i] = last;
+                probed.is_stand_in[i] = last.is_some();
+            }
+            last = probed.changes[i];
+        }
+    }
 }
 
 /// The part of the body that is probed.
@@ -401,6 +427,27 @@ mod tests {
                 "{tool}: {force} and {expected}"
             );
         }
+    }
+
+    #[test]
+    fn the_next_smaller_depth_stands_in_for_a_probe_without_equilibrium() {
+        let probed = |depth_mm: f64, near: Option<f64>, deep: Option<f64>| Probed {
+            depth_mm,
+            force_n: 1.0,
+            changes: [near, Some(0.0), deep],
+            is_stand_in: [false; N_SOURCES],
+        };
+        let mut all = [
+            probed(4.0, None, Some(0.1)),
+            probed(2.0, None, None),
+            probed(1.0, Some(-0.02), None),
+        ];
+        stand_in(&mut all);
+        assert_eq!(all[0].changes, [Some(-0.02), Some(0.0), Some(0.1)]);
+        assert_eq!(all[0].is_stand_in, [true, false, false]);
+        assert_eq!(all[1].is_stand_in, [true, false, false]);
+        assert_eq!(all[1].changes[2], None);
+        assert_eq!(all[2].is_stand_in, [false; N_SOURCES]);
     }
 
     #[test]

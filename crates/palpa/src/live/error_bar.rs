@@ -16,7 +16,7 @@ use palpa_mesh::Vec3;
 use palpa_scene::{Target, Tool};
 
 use crate::Prepared;
-use crate::accuracy::{Deepest, Probed, Source};
+use crate::accuracy::{Descent, Probed, Source};
 use crate::build::nearest;
 use crate::error::one_paragraph;
 use crate::press::Place;
@@ -142,9 +142,9 @@ pub fn probe(
     if !goes_on() {
         return Err(NoBar::Interrupted);
     }
-    let deepest = Deepest::from_rest(&press).ok_or(NoBar::NoEquilibrium)?;
-    let probed = deepest.probe(&press, |_, _| goes_on());
-    let probed = probed.ok_or(NoBar::Interrupted)?;
+    let descent = Descent::from_rest(&press).ok_or(NoBar::NoEquilibrium)?;
+    let bars = descent.probe(&press, |_, _| goes_on());
+    let probed = bars.ok_or(NoBar::Interrupted)?.deepest().clone();
     let failed = (Source::ALL.into_iter().zip(probed.changes)).find(|(_, change)| change.is_none());
     if let Some((probe, _)) = failed {
         return Err(NoBar::ProbeFailed { probe });

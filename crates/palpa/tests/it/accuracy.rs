@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use palpa::Prepared;
-use palpa::accuracy::{End, ErrorBars, Goal, MeshChoice, SAFETY, choose_mesh, loading};
+use palpa::accuracy::{
+    Descent, End, ErrorBars, Goal, MeshChoice, SAFETY, Stops, choose_mesh, loading,
+};
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa::scene::Scene;
 use palpa_testkit::{Layer, Scene as SceneText, Value};
@@ -32,6 +34,10 @@ fn run(press: &Indentation) -> Record<'_> {
         record.push(&run, sample);
     }
     record
+}
+
+fn bars_of(record: &Record<'_>, progress: impl FnMut(usize, usize) -> bool) -> Option<ErrorBars> {
+    Descent::at(record.indentation(), &Stops::of(record))?.probe(record.indentation(), progress)
 }
 
 fn deepest(record: &Record<'_>) -> Sample {
@@ -62,7 +68,7 @@ fn the_force_of_a_finer_mesh_lies_within_the_bar() {
             Value::raw("0.4"),
         ));
         let mut record = run(&coarse);
-        let bars = ErrorBars::estimate(&record, None, |_, _| true).unwrap();
+        let bars = bars_of(&record, |_, _| true).unwrap();
         bars.enter(&mut record.samples);
         let sample = deepest(&record);
         let bar = sample.error_bar_n.unwrap();
@@ -101,7 +107,7 @@ fn probes_can_be_given_up() {
     let press = set_up(&block());
     let record = run(&press);
     let mut asked = Vec::new();
-    let bars = ErrorBars::estimate(&record, None, |probe, n_probes| {
+    let bars = bars_of(&record, |probe, n_probes| {
         asked.push((probe, n_probes));
         probe < 1
     });
@@ -113,7 +119,7 @@ fn probes_can_be_given_up() {
 fn each_run_has_the_bars_of_its_own_forces() {
     let press = set_up(&block().set("mesh", "near_tool", "4 mm"));
     let mut record = run(&press);
-    let bars = ErrorBars::estimate(&record, None, |_, _| true).unwrap();
+    let bars = bars_of(&record, |_, _| true).unwrap();
     // A run at another speed, with twice the forces.
     let twice: Vec<Sample> = (record.samples.iter())
         .map(|sample| Sample {
@@ -130,6 +136,32 @@ fn each_run_has_the_bars_of_its_own_forces() {
         assert!((two - 2.0 * one).abs() < 1e-12);
     }
     assert!(deepest(&record).error_bar_n.unwrap() > 0.0);
+}
+
+#[test]
+fn halved_load_steps_change_the_force_as_longer_ones_foretell() {
+    let relaxing = r#"name = "gel", young = "20 kPa", poisson = 0.45, prony = { terms = [{ g = 0.6, tau = "0.1 s" }] }"#;
+    let viscous = |step: &str| {
+        set_up(
+            &SceneText::block([40.0, 40.0, 20.0], 10.0)
+                .layer(Layer::of(relaxing).levels(2))
+                .press(2.0)
+                .set("press", "speed", "10 mm/s")
+                .set("press", "step", step),
+        )
+    };
+    let force = |press: &Indentation| deepest(&run(press)).force_n;
+    let (long, short) = (viscous("0.5 mm"), viscous("0.25 mm"));
+    let (at_long, at_short) = (force(&long), force(&short));
+    let expected = at_short / at_long - 1.0;
+    let foretold = long.load_step_change(at_long, || true).unwrap();
+    assert!(expected.abs() > 1e-5, "{expected}");
+    // Here the error is of second order, so that what is foretold is twice the change.
+    let ratio = foretold / expected;
+    assert!((0.9..2.5).contains(&ratio), "{foretold}, halved {expected}");
+    assert_eq!(long.load_step_change(at_long, || false), None);
+    // Elastic tissue without friction has no history.
+    assert_eq!(set_up(&block()).load_step_change(1.0, || true), None);
 }
 
 /// The choice of a mesh for the block under a ball.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 use palpa::Prepared;
-use palpa::accuracy::Deepest;
+use palpa::accuracy::Descent;
 use palpa::fem::realtime::FineBodies;
 use palpa::live::{FineScene, LiveScene, Moment, NoBar, Prober, probe};
 use palpa::mesh::Vec3;
@@ -45,10 +45,11 @@ fn the_bar_of_the_live_mesh_is_that_of_a_press_there_on_the_same_mesh() {
     // The loop's mesh with the same size near the tool is that of a press.
     let press = Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap();
     assert_eq!(bar.n_nodes, press.model.n_nodes());
-    let probed = Deepest::from_rest(&press)
+    let probed = Descent::from_rest(&press)
         .unwrap()
         .probe(&press, |_, _| true)
         .unwrap();
+    let probed = probed.deepest();
     println!("{bar:?}\n{probed:?}");
     assert!((bar.probed.depth_mm - 3.0).abs() < 1e-6, "{bar:?}");
     assert!((bar.probed.force_n / probed.force_n - 1.0).abs() < 1e-6);

@@ -18,8 +18,7 @@ use self::result::result_of;
 use super::Job;
 use super::files::remove_older;
 use crate::commands::Outcome;
-use palpa::accuracy::{ErrorBars, MeshChoice};
-use palpa::press::tissue::{Indentation, Record, SampleOutcome};
+use palpa::press::tissue::{Indentation, SampleOutcome};
 use palpa::{Note, Prepared};
 
 /// Runs the press.
@@ -49,13 +48,18 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     let materials: Vec<_> = materials_of(scene);
     announce(job, &indentation, &materials)?;
 
-    let with_bars = job.args.error_bar || choice.is_some();
-    let mut recorded = record(job, &indentation, with_bars)?;
-    let bars = if with_bars {
-        estimate_bars(job, choice.as_ref(), &mut recorded)?
-    } else {
-        None
-    };
+    let chosen = choice.as_ref().and_then(|choice| choice.bars.clone());
+    let with_bars = chosen.is_none() && !job.args.no_error_bar && has_bars(&indentation);
+    let (mut recorded, probed) = record(job, &indentation, with_bars)?;
+    let bars = chosen.or(probed);
+    if let Some(bars) = &bars {
+        bars.enter(&mut recorded.samples);
+        let mut table = table(job)?;
+        for sample in &recorded.samples {
+            table.push(sample)?;
+        }
+        table.finish()?;
+    }
     let result = result_of(&recorded, &materials, context.is_interrupted());
     let notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
         .map(Note::to_string)
@@ -87,30 +91,9 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Estimates the error bars, enters them into the samples and writes the table again; `None` if it
-/// was interrupted.
-fn estimate_bars(
-    job: &Job<'_>,
-    choice: Option<&MeshChoice>,
-    recorded: &mut Record<'_>,
-) -> anyhow::Result<Option<ErrorBars>> {
-    let context = job.context;
-    let known = choice.and_then(MeshChoice::probed);
-    let progress = context.progress(0, "error bar");
-    let bars = ErrorBars::estimate(recorded, known, |probe, n_probes| {
-        progress.set_message(format!("error bar, probe {} of {n_probes}", probe + 1));
-        !context.is_interrupted()
-    });
-    drop(progress);
-    if let Some(bars) = &bars {
-        bars.enter(&mut recorded.samples);
-        let mut table = table(job)?;
-        for sample in &recorded.samples {
-            table.push(sample)?;
-        }
-        table.finish()?;
-    }
-    Ok(bars)
+/// Whether the force has a limit for ever finer meshes: that of a single node has none.
+fn has_bars(indentation: &Indentation) -> bool {
+    indentation.prepared.scene.tool.contact_radius() > 0.0
 }
 
 /// Materials of the layers, then of the lumps.

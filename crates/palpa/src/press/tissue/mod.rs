@@ -22,7 +22,7 @@ pub use self::run::Run;
 use self::run::{Acting, Earlier};
 pub use self::sample::{Failure, Sample, SampleOutcome};
 use super::mesh::{Patch, PressedBody, footprint};
-use super::{Phase, Place, Waypoint, waypoints};
+use super::{Phase, Place, Waypoint, n_steps, waypoints};
 use crate::note::Note;
 use crate::prepare::{Approach, Prepared};
 
@@ -41,7 +41,11 @@ const TOUCHING: f64 = 1e-6;
 /// Number of iterations after which a start was not near enough to the equilibrium.
 const NEAR_ITERATIONS: usize = 20;
 
-/// Number of steps to a depth from rest.
+/// Tolerance of an elastic equilibrium near a known one.
+const ELASTIC_TOLERANCE: f64 = 1e-5;
+
+/// Number of steps to a depth from rest; those at [`accuracy`](crate::accuracy)'s depths are among
+/// them.
 const FROM_REST: usize = 4;
 
 /// Distance between the points of a footprint if the mesh has no size of its own, m.
@@ -190,6 +194,42 @@ impl Indentation {
         }
     }
 
+    /// Whether the force depends on the steps in which the tool comes down.
+    pub fn has_history(&self) -> bool {
+        let friction = |tool: PosedTool| tool.tool.friction() > 0.0;
+        self.is_viscous || self.dynamics.is_some() || self.tool_at(0.0).is_some_and(friction)
+    }
+
+    /// The relative change of the force at the deepest that is expected if load steps are halved, for
+    /// the run at the first speed: half of the change from steps twice as long; a single step is halved
+    /// itself. `force_n` is the force of the press. `None` if the force does not depend on steps, or
+    /// the other ones find no equilibrium. `goes_on` is asked before each step; if it returns false, there is no
+    /// result.
+    pub fn load_step_change(&self, force_n: f64, goes_on: impl Fn() -> bool) -> Option<f64> {
+        if !self.has_history() || force_n == 0.0 {
+            return None;
+        }
+        let press = &self.prepared.scene.press;
+        let n = n_steps(press);
+        let n_other = if n > 1 { n.div_ceil(2) } else { 2 };
+        let other = palpa_scene::Press {
+            step: press.depth / n_other as f64,
+            ..press.clone()
+        };
+        let mut run = self.start(0);
+        run.path = waypoints(&other, self.speeds[0], &[1.0]);
+        let is_down = |w: &Waypoint| w.phase == Phase::Load && w.cycle == 0;
+        let n_down = run.path.iter().take_while(|w| is_down(w)).count();
+        let mut last = None;
+        for _ in 0..n_down {
+            last = Some(run.advance()?).filter(|s| s.outcome.is_converged() && goes_on());
+            last.as_ref()?;
+        }
+        // If the error falls in proportion to the step; in relaxing tissue it falls faster.
+        let share = n_other as f64 / (2.0 * (n as f64 - n_other as f64));
+        last.map(|other| share * (force_n - other.force_n) / force_n)
+    }
+
     /// Memory for the solver, prepared for touch under the tool.
     pub(crate) fn workspace(&self) -> Workspace {
         let (points, radius) = self.region();
@@ -232,31 +272,61 @@ impl Indentation {
     }
 
     /// The force (N) and the deformed body at a depth (m), without relaxation, inertia or a
-    /// history of friction; `None` if no equilibrium is found. `guess` is near it; without it
-    /// the tool comes from rest.
+    /// history of friction; `None` if no equilibrium is found. `guess` is near it.
     pub(crate) fn elastic(
         &self,
         ws: &mut Workspace,
         depth: f64,
-        guess: Option<&Deformed>,
+        guess: &Deformed,
     ) -> Option<(f64, Deformed)> {
         let mut state = State::new(&self.model);
-        let report = match guess {
-            Some(guess) => self.settle(ws, &mut state, depth, guess),
-            None => self.descend(ws, &mut state, depth),
+        let report = self.settle(ws, &mut state, depth, guess);
+        (report.outcome == Outcome::Converged).then(|| self.reached(ws, &state, &report, depth))
+    }
+
+    /// The same on the way from rest to a depth, m: the depths of the steps in which an equilibrium
+    /// was found, with forces and deformed bodies.
+    pub(crate) fn elastic_from_rest(
+        &self,
+        ws: &mut Workspace,
+        depth: f64,
+    ) -> Vec<(f64, f64, Deformed)> {
+        let mut state = State::new(&self.model);
+        state.displacements.clone_from(&self.rest.displacements);
+        let mut before = self.acting(0.0);
+        let mut found = Vec::new();
+        for step in 1..=FROM_REST {
+            let depth = depth * step as f64 / FROM_REST as f64;
+            let next = self.acting(depth);
+            let loads = [&before, &next].map(|acting| acting.load(0.0, None));
+            let [from, to] = &loads;
+            let report = advance(&self.model, &mut state, ws, from, to, &self.params);
+            if report.outcome != Outcome::Converged {
+                break;
+            }
+            let (force, deformed) = self.reached(ws, &state, &report, depth);
+            found.push((depth, force, deformed));
+            before = next;
+        }
+        found
+    }
+
+    /// The force and the deformed body of an equilibrium.
+    fn reached(
+        &self,
+        ws: &Workspace,
+        state: &State,
+        report: &StepReport,
+        depth: f64,
+    ) -> (f64, Deformed) {
+        let bonded: Vec<usize> = (self.acting(depth).held.iter())
+            .map(|held| held.0)
+            .collect();
+        let deformed = Deformed {
+            is_touching: state.touches.iter().map(|t| t.tool().is_some()).collect(),
+            displacements: state.displacements.clone(),
         };
-        (report.outcome == Outcome::Converged).then(|| {
-            let bonded: Vec<usize> = (self.acting(depth).held.iter())
-                .map(|held| held.0)
-                .collect();
-            let force = self.force_of(&report, &bonded, ws);
-            let is_touching = state.touches.iter().map(|t| t.tool().is_some());
-            let deformed = Deformed {
-                is_touching: is_touching.collect(),
-                displacements: state.displacements,
-            };
-            (force, deformed)
-        })
+        (self.force_of(report, &bonded, ws), deformed)
     }
 
     /// Solves the equilibrium at a depth, m, from a guess near it.
@@ -271,24 +341,11 @@ impl Indentation {
         state.displacements.clone_from(&guess.displacements);
         assume_touches(&self.model, state, &acting.tools, &guess.is_touching);
         let load = acting.load(0.0, None);
-        equilibrate(&self.model, state, ws, &load, &self.near_params())
-    }
-
-    /// Brings the tool from rest to a depth, m, in a few steps.
-    fn descend(&self, ws: &mut Workspace, state: &mut State, depth: f64) -> StepReport {
-        state.displacements.clone_from(&self.rest.displacements);
-        let mut before = self.acting(0.0);
-        let mut step = 0;
-        loop {
-            step += 1;
-            let next = self.acting(depth * step as f64 / FROM_REST as f64);
-            let loads = [&before, &next].map(|acting| acting.load(0.0, None));
-            let report = advance(&self.model, state, ws, &loads[0], &loads[1], &self.params);
-            before = next;
-            if step == FROM_REST || report.outcome != Outcome::Converged {
-                return report;
-            }
-        }
+        let params = SolveParams {
+            tolerance: ELASTIC_TOLERANCE,
+            ..self.near_params()
+        };
+        equilibrate(&self.model, state, ws, &load, &params)
     }
 
     /// The force on the tool against its direction, N. `bonded` are the nodes bonded to it.

@@ -113,7 +113,7 @@ impl<'a> Record<'a> {
     }
 
     /// The press.
-    pub(crate) fn indentation(&self) -> &'a Indentation {
+    pub fn indentation(&self) -> &'a Indentation {
         self.indentation
     }
 

@@ -16,6 +16,8 @@ pub struct RunResult {
     pub at_depth_mm: f64,
     /// Largest force over its depth, N/mm; `None` at depth 0.
     pub secant_stiffness_n_per_mm: Option<f64>,
+    /// Half the width of its error bar, N/mm; `None` without error bars.
+    pub secant_stiffness_error_bar_n_per_mm: Option<f64>,
     /// Share of the loading work that is not returned, for each finished cycle.
     pub hysteresis: Vec<f64>,
     /// Share of the force that is lost during the first hold; `None` if no tissue relaxes, or
@@ -130,6 +132,9 @@ fn run_result(samples: &[&Sample], is_viscous: bool) -> Option<RunResult> {
         max_force_n: peak.force_n,
         at_depth_mm: peak.depth_mm,
         secant_stiffness_n_per_mm: (peak.depth_mm > 0.0).then(|| peak.force_n / peak.depth_mm),
+        secant_stiffness_error_bar_n_per_mm: (peak.error_bar_n)
+            .filter(|_| peak.depth_mm > 0.0)
+            .map(|bar| bar / peak.depth_mm),
         hysteresis: (0..n_cycles)
             .filter_map(|cycle| loss(samples, cycle))
             .collect(),

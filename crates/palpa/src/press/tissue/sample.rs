@@ -77,6 +77,8 @@ pub struct Sample {
     pub error_skin_far_n: Option<f64>,
     /// Change of the force by finer deep intervals, N.
     pub error_levels_deep_n: Option<f64>,
+    /// Change of the force by shorter load steps, N; 0 if they do not matter.
+    pub error_load_step_n: Option<f64>,
     /// Thickness of each layer along the pressed column, mm. `[n_layers]`
     pub layer_thickness_mm: Vec<f64>,
 }

@@ -1,51 +1,119 @@
 //! Runs the script; writes every sample to the table and some of the bodies to the series for
-//! ParaView.
+//! ParaView. Error bars are computed beside the way back.
+
+use indicatif::ProgressBar;
+use palpa::accuracy::{Descent, ErrorBars, Stops};
+use palpa::press::tissue::{Indentation, Record, Run, Sample};
+use palpa_plot::output::{CsvTable, OutDir};
 
 use super::super::Job;
 use super::super::files::Series;
 use super::fields::grid;
-use palpa::press::tissue::{Indentation, Record, Sample};
-use palpa_plot::output::CsvTable;
+use crate::cli::Context;
 
 /// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
-/// run leaves a valid table. `with_bars` says whether error bars are wanted later.
+/// run leaves a valid table. With `with_bars`, the first press down is probed while its rest and the
+/// way back are computed; there are no bars if that was interrupted.
 pub(super) fn record<'a>(
     job: &Job<'_>,
     indentation: &'a Indentation,
     with_bars: bool,
-) -> anyhow::Result<Record<'a>> {
-    let Job {
-        args, context, out, ..
-    } = *job;
-    let mut table = table(job)?;
-    let n_samples = indentation.n_samples();
-    let lump_shares = indentation.prepared.lump_shares();
-    let mut series = Series::new(args.frames, n_samples, indentation.deepest());
-    let mut record = if with_bars {
-        Record::with_displacements(indentation)
-    } else {
-        Record::new(indentation)
-    };
-    let n_runs = indentation.speeds.len();
-    let progress = context.progress(n_samples * n_runs, "pressing");
-    'runs: for index in 0..n_runs {
-        let mut run = indentation.start(index);
-        while let Some(sample) = run.advance() {
-            table.push(&sample)?;
-            // The samples of the first run are the first of the record.
-            if index == 0 && sample.outcome.is_converged() && series.wants(record.samples.len()) {
-                series.push(out, sample.time_s, &grid(indentation, &lump_shares, &run))?;
-            }
-            record.push(&run, sample);
-            progress.inc(1);
-            if context.is_interrupted() {
-                break 'runs;
-            }
-        }
+) -> anyhow::Result<(Record<'a>, Option<ErrorBars>)> {
+    let n_samples = indentation.n_samples() * indentation.speeds.len();
+    let progress = job.context.progress(n_samples, "pressing");
+    let mut recorder = Recorder::new(job, indentation, with_bars, &progress)?;
+    let mut run = indentation.start(0);
+    let n_down = indentation.deepest() + 1;
+    recorder.follow(&mut run, n_down)?;
+    let stops = with_bars.then(|| Stops::of(&recorder.record));
+    let context = job.context;
+    let is_deepest = recorder.record.samples.len() == n_down;
+    let last = (recorder.record.samples.last()).filter(|s| is_deepest && s.outcome.is_converged());
+    let at_deepest = last.filter(|_| with_bars).map(|s| s.force_n);
+    let goes_on = || !context.is_interrupted();
+    let probe = || Descent::at(indentation, &stops?)?.probe(indentation, |_, _| goes_on());
+    let change_steps = || indentation.load_step_change(at_deepest?, goes_on);
+    let (record, (bars, load_step)) = rayon::join(
+        move || recorder.finish(run),
+        || rayon::join(probe, change_steps),
+    );
+    let bars = bars.map(|bars| ErrorBars { load_step, ..bars });
+    let record = record?;
+    drop(progress);
+    Ok((record, bars))
+}
+
+struct Recorder<'a, 'j> {
+    context: &'j Context,
+    out: &'j OutDir,
+    indentation: &'a Indentation,
+    lump_shares: Vec<f64>,
+    table: CsvTable<Sample>,
+    series: Series,
+    record: Record<'a>,
+    progress: &'j ProgressBar,
+}
+
+impl<'a, 'j> Recorder<'a, 'j> {
+    fn new(
+        job: &Job<'j>,
+        indentation: &'a Indentation,
+        with_bars: bool,
+        progress: &'j ProgressBar,
+    ) -> anyhow::Result<Self> {
+        let n_samples = indentation.n_samples();
+        Ok(Self {
+            context: job.context,
+            out: job.out,
+            indentation,
+            lump_shares: indentation.prepared.lump_shares(),
+            table: table(job)?,
+            series: Series::new(job.args.frames, n_samples, indentation.deepest()),
+            record: if with_bars {
+                Record::with_displacements(indentation)
+            } else {
+                Record::new(indentation)
+            },
+            progress,
+        })
     }
-    table.finish()?;
-    series.finish(out, &indentation.prepared.grown.bones)?;
-    Ok(record)
+
+    /// Records the samples of a run, at most `most`.
+    fn follow(&mut self, run: &mut Run<'a>, most: usize) -> anyhow::Result<()> {
+        for _ in 0..most {
+            if self.context.is_interrupted() && !self.record.samples.is_empty() {
+                break;
+            }
+            let Some(sample) = run.advance() else {
+                break;
+            };
+            self.table.push(&sample)?;
+            let n_before = self.record.samples.len();
+            // The samples of the first run are the first of the record.
+            if run.index == 0 && sample.outcome.is_converged() && self.series.wants(n_before) {
+                let grid = grid(self.indentation, &self.lump_shares, run);
+                self.series.push(self.out, sample.time_s, &grid)?;
+            }
+            self.record.push(run, sample);
+            self.progress.inc(1);
+        }
+        Ok(())
+    }
+
+    /// Records the rest of the first run, and the other runs.
+    fn finish(mut self, mut run: Run<'a>) -> anyhow::Result<Record<'a>> {
+        self.follow(&mut run, usize::MAX)?;
+        for index in 1..self.indentation.speeds.len() {
+            if self.context.is_interrupted() {
+                break;
+            }
+            self.follow(&mut self.indentation.start(index), usize::MAX)?;
+        }
+        self.table.finish()?;
+        self.series
+            .finish(self.out, &self.indentation.prepared.grown.bones)?;
+        Ok(self.record)
+    }
 }
 
 /// Opens the table: the fields of [`Sample`], then one column for the thickness of each layer.

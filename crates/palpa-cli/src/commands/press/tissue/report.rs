@@ -14,6 +14,10 @@ use palpa::accuracy::{ErrorBars, MeshChoice};
 use palpa::build::in_mm;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
+/// Half the width of an error bar above which the report says how to get a smaller one, as a share
+/// of the force.
+const WANTED: f64 = 0.03;
+
 /// Content of press.json and of the `--json` output.
 #[derive(Debug, Serialize)]
 pub(super) struct PressReport<'a> {
@@ -196,7 +200,11 @@ fn run_in_words(run: &RunResult) -> String {
         run.max_force_n,
         run.at_depth_mm,
         run.secant_stiffness_n_per_mm
-            .map_or(String::new(), |k| format!(" ({k:.3} N/mm on average)"))
+            .map_or(String::new(), |k| format!(
+                " ({k:.3}{} N/mm on average)",
+                run.secant_stiffness_error_bar_n_per_mm
+                    .map_or(String::new(), |bar| format!(" ± {bar:.3}"))
+            ))
     )];
     parts
         .extend((run.relaxation).map(|share| format!("relaxes by {:.1} % at rest", 100.0 * share)));
@@ -262,33 +270,54 @@ fn force_in_words(sample: &Sample) -> String {
     }
 }
 
-/// Prints the error bar at the deepest depth that was probed, and its contributions.
+/// Prints the error bar at the deepest, and its contributions.
 fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
-    let Some(probed) = report.error_bars.and_then(|bars| bars.probed.first()) else {
+    let Some(bars) = report.error_bars else {
         return Ok(());
     };
+    let probed = bars.deepest();
     let words = [
         "prisms near the tool",
         "triangles around them",
         "deep intervals",
     ];
-    let changes = (words.iter().zip(probed.changes)).map(|(word, change)| match change {
-        Some(change) => format!("{word} {:+.1} %", 100.0 * change),
-        None => format!("{word}: no result"),
-    });
-    let bar = probed.half_width().map_or_else(
+    let mut changes: Vec<String> = Vec::new();
+    for ((word, change), is_stand_in) in words.iter().zip(probed.changes).zip(probed.is_stand_in) {
+        let from = if is_stand_in {
+            " (at a smaller depth; here its probe found no equilibrium)"
+        } else {
+            ""
+        };
+        changes.push(match change {
+            Some(change) => format!("{word} {:+.1} %{from}", 100.0 * change),
+            None => format!("{word}: no result"),
+        });
+    }
+    changes.extend((bars.load_step).map(|step| format!("load steps {:+.1} %", 100.0 * step)));
+    let half_width = bars.half_width(probed);
+    let bar = half_width.map_or_else(
         || "not known, because a probe failed".to_owned(),
         |half| format!("±{:.1} % of the force", 100.0 * half),
     );
     job.context.say(format!(
         "error bar at {:.2} mm: {bar}; halving sizes changes the force by: {}",
         probed.depth_mm,
-        changes.collect::<Vec<_>>().join(", ")
+        changes.join(", ")
     ))?;
-    if let Some(extrapolated) = probed.extrapolated_n() {
-        let share = 100.0 * (extrapolated / probed.force_n - 1.0);
+    let at_deepest = |s: &&Sample| s.run == 0 && s.is_first_loading();
+    let deepest = report.samples.iter().rfind(at_deepest);
+    if let Some((sample, extrapolated)) = deepest.and_then(|s| Some((s, s.extrapolated_n?))) {
+        let share = 100.0 * (extrapolated / sample.force_n - 1.0);
         job.context.say(format!(
-            "extrapolated to an infinitely fine mesh, the force is {extrapolated:.4} N ({share:+.1} %)"
+            "extrapolated to an infinitely fine mesh, the force at {:.2} mm is {extrapolated:.4} N ({share:+.1} %)",
+            sample.depth_mm
+        ))?;
+    }
+    if half_width.is_some_and(|half| half > WANTED) && report.mesh_choice.is_none() {
+        job.context.say(format!(
+            "to have an error bar of at most ±{:.0} %: --accuracy \"{:.0} %\" chooses a mesh for it",
+            100.0 * WANTED,
+            100.0 * WANTED
         ))?;
     }
     Ok(())

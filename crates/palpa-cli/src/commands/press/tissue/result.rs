@@ -17,6 +17,7 @@ pub(super) struct PressResult {
     pub(super) max_force_n: f64,
     pub(super) at_depth_mm: f64,
     pub(super) secant_stiffness_n_per_mm: Option<f64>,
+    pub(super) secant_stiffness_error_bar_n_per_mm: Option<f64>,
     pub(super) force_after_retract_n: Option<f64>,
     /// Result of the run at each speed.
     pub(super) runs: Vec<RunResult>,
@@ -49,6 +50,8 @@ pub(super) fn result_of(
         max_force_n: first.map_or(0.0, |run| run.max_force_n),
         at_depth_mm: first.map_or(0.0, |run| run.at_depth_mm),
         secant_stiffness_n_per_mm: first.and_then(|run| run.secant_stiffness_n_per_mm),
+        secant_stiffness_error_bar_n_per_mm: first
+            .and_then(|run| run.secant_stiffness_error_bar_n_per_mm),
         force_after_retract_n: first.and_then(|run| run.force_after_retract_n),
         gives_most: most.filter(|l| change(l) > 0.0).map(|l| l.name.clone()),
         n_turned_prisms: (record.deepest.turned.as_ref()).map_or(0, |turned| turned.n),
