@@ -263,6 +263,7 @@ mod tests {
                 depth_mm: 5.0,
                 force_n: 2.0,
                 changes: [Some(-0.01), Some(0.006), Some(-0.004)],
+                is_stand_in: [false; 3],
             },
         }
     }

@@ -95,7 +95,14 @@ impl Case {
         let scene = out.join("scene.toml");
         std::fs::write(&scene, self.scene(data)).unwrap();
         let run = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .args(["press", "--json", "--frames", "2", "--out"])
+            .args([
+                "press",
+                "--json",
+                "--frames",
+                "2",
+                "--no-error-bar",
+                "--out",
+            ])
             .arg(&out)
             .arg(&scene)
             .output()
