@@ -22,8 +22,8 @@ fn norm(a: &[Vec3]) -> f64 {
 
 /// Solves `A x = b` (Saad & Schultz 1986). `apply(r, z, y)` sets `z = M⁻¹ r` with an approximation
 /// M of A, and adds `A z` to `y`. Keeping all `z` saves a last `M⁻¹` (Saad 1993). Stops when the
-/// relative residual is `tolerance`, when the basis has `most` vectors, or when it would still be above
-/// `accepted` with these at the present rate.
+/// relative residual is `tolerance`, when the basis has `most` vectors, or when it would still be
+/// above `accepted` with these at the present rate.
 pub(crate) fn gmres(
     b: &[Vec3],
     tolerance: f64,

@@ -17,6 +17,8 @@ mod choice;
 mod descent;
 mod probe;
 
+use std::fmt;
+
 use serde::Serialize;
 
 pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
@@ -58,6 +60,17 @@ pub const N_SOURCES: usize = 3;
 impl Source {
     /// All sources, in the order of every list of contributions.
     pub const ALL: [Self; N_SOURCES] = [Self::Near, Self::SkinFar, Self::LevelsDeep];
+}
+
+/// What becomes finer, in English.
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Near => "prisms near the tool",
+            Self::SkinFar => "triangles around them",
+            Self::LevelsDeep => "deep intervals",
+        })
+    }
 }
 
 /// Contributions to the error at one depth.
@@ -108,8 +121,8 @@ pub struct ErrorBars {
     /// Contributions at the depths that were probed, the deepest first; at least one.
     pub probed: Vec<Probed>,
     /// Relative change of the force at the deepest if the load steps of the press were halved: at most
-    /// half of the change from steps twice as long, which is the value. `None` if steps do not matter, as in
-    /// elastic tissue without friction, or if the longer steps found no equilibrium.
+    /// half of the change from steps twice as long, which is the value. `None` if steps do not
+    /// matter, as in elastic tissue without friction, or if the longer steps found no equilibrium.
     pub load_step: Option<f64>,
     /// Number of nodes of the largest probe.
     pub n_nodes: usize,

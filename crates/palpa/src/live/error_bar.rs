@@ -99,11 +99,6 @@ impl fmt::Display for NoBar {
                 f.write_str("no static equilibrium was found at this place and depth")
             }
             Self::ProbeFailed { probe } => {
-                let probe = match probe {
-                    Source::Near => "prisms near the tool",
-                    Source::SkinFar => "triangles around them",
-                    Source::LevelsDeep => "deep intervals",
-                };
                 write!(f, "the probe with finer {probe} found no equilibrium")
             }
             Self::Interrupted => f.write_str("interrupted"),

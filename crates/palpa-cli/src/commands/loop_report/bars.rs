@@ -5,6 +5,7 @@
 //! ```
 //! The way has five parts: along the motion across the skin, or, if it stays at one place, by depth.
 
+use palpa::accuracy::Source;
 use palpa::live::{LiveBar, LiveScene, Look, Moment, NoBar, Prober, Seen, across};
 use palpa_rt::{Engine, Reader};
 use palpa_scene::Scene;
@@ -296,15 +297,10 @@ impl BarFigures {
 
     /// The largest contribution.
     fn largest(&self) -> Option<String> {
-        let all = [
-            ("prisms near the tool", self.near?),
-            ("triangles around them", self.skin_far?),
-            ("deep intervals", self.levels_deep?),
-        ];
-        let (name, change) = all
-            .into_iter()
+        let changes = [self.near?, self.skin_far?, self.levels_deep?];
+        let (source, change) = (Source::ALL.into_iter().zip(changes))
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        Some(format!("{name} {:+.1} %", 100.0 * change))
+        Some(format!("{source} {:+.1} %", 100.0 * change))
     }
 }
 

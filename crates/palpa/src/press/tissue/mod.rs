@@ -203,8 +203,8 @@ impl Indentation {
     /// The relative change of the force at the deepest that is expected if load steps are halved, for
     /// the run at the first speed: half of the change from steps twice as long; a single step is halved
     /// itself. `force_n` is the force of the press. `None` if the force does not depend on steps, or
-    /// the other ones find no equilibrium. `goes_on` is asked before each step; if it returns false, there is no
-    /// result.
+    /// the other ones find no equilibrium. `goes_on` is asked after each step; if it returns false,
+    /// there is no result.
     pub fn load_step_change(&self, force_n: f64, goes_on: impl Fn() -> bool) -> Option<f64> {
         if !self.has_history() || force_n == 0.0 {
             return None;

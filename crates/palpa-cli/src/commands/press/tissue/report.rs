@@ -10,7 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
-use palpa::accuracy::{ErrorBars, MeshChoice};
+use palpa::accuracy::{ErrorBars, MeshChoice, Source};
 use palpa::build::in_mm;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
@@ -276,21 +276,17 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
         return Ok(());
     };
     let probed = bars.deepest();
-    let words = [
-        "prisms near the tool",
-        "triangles around them",
-        "deep intervals",
-    ];
     let mut changes: Vec<String> = Vec::new();
-    for ((word, change), is_stand_in) in words.iter().zip(probed.changes).zip(probed.is_stand_in) {
+    let of_sources = Source::ALL.into_iter().zip(probed.changes);
+    for ((source, change), is_stand_in) in of_sources.zip(probed.is_stand_in) {
         let from = if is_stand_in {
             " (at a smaller depth; here its probe found no equilibrium)"
         } else {
             ""
         };
         changes.push(match change {
-            Some(change) => format!("{word} {:+.1} %{from}", 100.0 * change),
-            None => format!("{word}: no result"),
+            Some(change) => format!("{source} {:+.1} %{from}", 100.0 * change),
+            None => format!("{source}: no result"),
         });
     }
     changes.extend((bars.load_step).map(|step| format!("load steps {:+.1} %", 100.0 * step)));
