@@ -220,7 +220,7 @@ pub(crate) struct PressTable {
     /// `retract`. Default: 1.
     pub(crate) cycles: u32,
     /// Increase of the depth from one result to the next: no more than the depth and no less than a
-    /// 5000th of it. Default: a 32nd of the depth.
+    /// 5000th of it. Default: a 16th of the depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) step: Option<Length>,
 }
@@ -307,8 +307,8 @@ pub(crate) struct MeshTable {
     /// Default: true.
     pub(crate) refine: bool,
     /// Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a
-    /// quarter of the contact radius, at most a third of the edge radius, limited to 0.5 mm to
-    /// 10 mm; in real time 4/3 of that. A node has no default.
+    /// quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8
+    /// times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
     /// Wanted length of edges and height of levels in and around lumps, 0.1 mm to 100 mm. Default:

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lump::Lump;
-use crate::tool::Tool;
+use crate::shape::ContactShape;
+use crate::tool::{ContactTool, Tool};
 
 /// The model of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,13 +114,24 @@ impl Mesh {
     }
 
     /// Wanted length near `tool` in metres, as given or by default. Default: a quarter of the
-    /// [contact radius](Tool::contact_radius), at most a third of the radius of the rounded edge,
-    /// 0.5 mm to 10 mm. `None` for a node, which has no size.
+    /// [contact radius](Tool::contact_radius), under a box, whose contact is a strip, 0.3 times it; see
+    /// [`near_tool_at`](Self::near_tool_at).
     pub fn near_tool_of(&self, tool: &Tool) -> Option<f64> {
-        let radius = tool.contact_radius();
-        let edge = tool.contact().and_then(|tool| tool.shape.edge_radius());
-        let wanted = edge.map_or(radius / 4.0, |edge| (radius / 4.0).min(edge / 3.0));
-        let automatic = (radius > 0.0).then(|| wanted.clamp(Self::FINEST, Self::COARSEST));
+        let is_box = |tool: &ContactTool| matches!(tool.shape, ContactShape::Box { .. });
+        let share = if tool.contact().is_some_and(is_box) {
+            0.3
+        } else {
+            0.25
+        };
+        self.near_tool_at(tool, share)
+    }
+
+    /// Wanted length near `tool` in metres, as given or by default: this share of the contact radius,
+    /// at most 0.8 times the radius of a rounded edge, 0.5 mm to 10 mm. `None` for a node, which has
+    /// no size.
+    pub fn near_tool_at(&self, tool: &Tool, share: f64) -> Option<f64> {
+        let wanted = tool.edge_length(share);
+        let automatic = (wanted > 0.0).then(|| wanted.clamp(Self::FINEST, Self::COARSEST));
         self.near_tool.or(automatic)
     }
 

@@ -22,7 +22,7 @@ use crate::units::{Kind, Length, Quantity, Velocity};
 use crate::{SceneError, Thickness};
 
 /// Default number of steps down.
-const DEFAULT_STEPS: f64 = 32.0;
+const DEFAULT_STEPS: f64 = 16.0;
 /// Default speed of the tool, m/s.
 const DEFAULT_SPEED: f64 = 10e-3;
 

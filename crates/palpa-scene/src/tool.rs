@@ -57,6 +57,24 @@ impl Tool {
             Self::Contact(tool) => tool.shape.contact_radius(),
         }
     }
+
+    /// Whether the tool has a flat face with a rounded edge.
+    pub fn is_flat(&self) -> bool {
+        self.rounded_edge().is_some()
+    }
+
+    /// Length of the skin's edges near the tool, m: a share of the contact radius, at most 0.8 times
+    /// the radius of the rounded edge, so that vertices lie on it. 0 for a node.
+    pub fn edge_length(&self, share: f64) -> f64 {
+        let wanted = share * self.contact_radius();
+        self.rounded_edge()
+            .map_or(wanted, |edge| wanted.min(0.8 * edge))
+    }
+
+    /// Radius of the rounded edge of a flat tool, m.
+    pub fn rounded_edge(&self) -> Option<f64> {
+        self.contact().and_then(|tool| tool.shape.edge_radius())
+    }
 }
 
 impl ContactTool {

@@ -162,7 +162,7 @@ fn shown(press: &Press, bar: &LiveBar) -> ErrorBar {
     ErrorBar::Known {
         half_width: bar.half_width,
         force: bar.probed.force_n,
-        extrapolated: bar.probed.extrapolated_n().unwrap_or(bar.probed.force_n),
+        extrapolated: bar.probed.extrapolated_n(),
         depth: press.depth(),
         point: press.over.0.into(),
         near: change(Source::Near),
@@ -264,6 +264,7 @@ mod tests {
                 force_n: 2.0,
                 changes: [Some(-0.01), Some(0.006), Some(-0.004)],
                 is_stand_in: [false; 3],
+                n_touching: None,
             },
         }
     }

@@ -465,8 +465,8 @@ impl fmt::Display for Note {
             ),
             Self::CoarseAtEdge { edge, edge_radius } => write!(
                 f,
-                "skin edges near the tool are {:.1} mm long, more than a third of its edge's radius of {:.1} mm: vertices find \
-                 the rounded edge or miss it, so there can be several equilibria and the force depends on the steps; make the \
+                "skin edges near the tool are {:.1} mm long, more than its edge's radius of {:.1} mm: vertices find the \
+                 rounded edge or miss it, so there can be several equilibria and the force depends on the steps; make the \
                  edge rounder, or refine the mesh with [mesh] near_tool",
                 mm(edge),
                 mm(edge_radius)

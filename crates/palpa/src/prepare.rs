@@ -143,6 +143,29 @@ impl Prepared {
         }
     }
 
+    /// The same body on the same mesh, with the tissues of the layers in place of the lumps.
+    pub(crate) fn without_lumps(&self) -> Self {
+        let scene = Scene {
+            lumps: Vec::new(),
+            ..self.scene.clone()
+        };
+        Self {
+            grown: Arc::clone(&self.grown),
+            materials: Arc::new(Materials {
+                materials: self.materials.materials.clone(),
+                layers: self.materials.layers.clone(),
+                lumps: Vec::new(),
+                stiffness: None,
+            }),
+            mesh: self.mesh.clone(),
+            supports: self.supports.clone(),
+            notes: Vec::new(),
+            drawn: Vec::new(),
+            model: OnceLock::new(),
+            scene,
+        }
+    }
+
     /// The place that the scene presses.
     pub fn place(&self) -> &Place {
         &self.mesh.place

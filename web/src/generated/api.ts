@@ -855,9 +855,10 @@ export interface components {
             depth: number;
             /**
              * Format: double
-             * @description That force, extrapolated to an infinitely fine mesh.
+             * @description That force, extrapolated to an infinitely fine mesh; `None` if few vertices touch or the bar
+             *     is wide.
              */
-            extrapolated: number;
+            extrapolated?: number | null;
             /**
              * Format: double
              * @description Force of the static press at that place and depth on the same mesh.

@@ -377,7 +377,7 @@ export interface components {
              */
             near_lumps?: string;
             /**
-             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the contact radius, at most a third of the edge radius, limited to 0.5 mm to 10 mm; in real time 4/3 of that. A node has no default.
+             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
              * @example 1.5 mm
              */
             near_tool?: string;
@@ -533,7 +533,7 @@ export interface components {
             /** @description Speeds to compare, instead of `speed`: the whole press is run at each; 16 at most, each 0.01 mm/s to 1 m/s. Default: none. */
             speeds?: string[];
             /**
-             * @description Increase of the depth from one result to the next: no more than the depth and no less than a 5000th of it. Default: a 32nd of the depth.
+             * @description Increase of the depth from one result to the next: no more than the depth and no less than a 5000th of it. Default: a 16th of the depth.
              * @example 1.5 mm
              */
             step?: string;

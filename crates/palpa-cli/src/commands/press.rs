@@ -63,6 +63,10 @@ pub struct Args {
     /// Longest time for the choice of the mesh, with a unit: "60 s"
     #[arg(long, value_name = "TIME")]
     max_time: Option<Time>,
+    /// Also press the same mesh without its lumps, and give the change of the force by them, with an
+    /// error bar of its own
+    #[arg(long, conflicts_with = "no_error_bar")]
+    lump_change: bool,
     /// Number of deformed bodies in the ParaView series, including rest and the deepest; 0 for none
     #[arg(long, default_value_t = 9, value_name = "N")]
     frames: usize,

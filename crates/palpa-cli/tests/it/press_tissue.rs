@@ -116,7 +116,7 @@ fn an_elastic_block_comes_back_and_every_file_is_there() {
 }
 
 /// The columns of press.csv before the layers: programs read them by these names.
-const COLUMNS: [&str; 33] = [
+const COLUMNS: [&str; 34] = [
     "run",
     "speed_mm_s",
     "phase",
@@ -149,6 +149,7 @@ const COLUMNS: [&str; 33] = [
     "error_near_n",
     "error_skin_far_n",
     "error_levels_deep_n",
+    "error_contact_n",
     "error_load_step_n",
 ];
 
@@ -191,29 +192,32 @@ fn check_table(table: &str, report: &Value) {
     assert_eq!(n, samples.len());
 }
 
-/// Names and numbers of the arrays in the deepest frame of a series.
-fn check_series(folder: &std::path::Path) {
-    assert_eq!(fs::read_dir(folder).unwrap().count(), 3);
-    let vtk = Vtk::import(folder.join("body_001.vtu")).unwrap();
-    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
+/// The point and cell arrays of a file for ParaView.
+fn arrays(path: &std::path::Path) -> [Vec<Attribute>; 2] {
+    let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(path).unwrap().data else {
         panic!("no unstructured grid");
     };
     let Some(Piece::Inline(piece)) = pieces.into_iter().next() else {
         panic!("no piece");
     };
-    let array = |attributes: &[Attribute], name: &str| -> Vec<f64> {
-        let found = attributes.iter().find_map(|a| match a {
-            Attribute::DataArray(array) if array.name == name => Some(array),
-            _ => None,
-        });
-        found
-            .unwrap_or_else(|| panic!("no {name}"))
-            .data
-            .cast_into()
-            .unwrap()
-    };
-    let cells = |name: &str| array(&piece.data.cell, name);
-    let points = |name: &str| array(&piece.data.point, name);
+    [piece.data.point, piece.data.cell]
+}
+
+fn array(attributes: &[Attribute], name: &str) -> Vec<f64> {
+    let found = attributes.iter().find_map(|a| match a {
+        Attribute::DataArray(array) if array.name == name => Some(array),
+        _ => None,
+    });
+    let data = &found.unwrap_or_else(|| panic!("no {name}")).data;
+    data.clone().cast_into().unwrap()
+}
+
+/// Names and numbers of the arrays in the deepest frame of a series.
+fn check_series(folder: &std::path::Path) {
+    assert_eq!(fs::read_dir(folder).unwrap().count(), 3);
+    let [point, cell] = arrays(&folder.join("body_001.vtu"));
+    let cells = |name: &str| array(&cell, name);
+    let points = |name: &str| array(&point, name);
     let von_mises = cells("von_mises");
     let cauchy = cells("cauchy");
     assert_eq!(cauchy.len(), 9 * von_mises.len());
@@ -581,6 +585,45 @@ fn every_force_has_an_error_bar_unless_it_is_left_out() {
         assert!(without["error_bar_n"].is_null());
         assert_eq!(with["force_n"], without["force_n"]);
     }
+}
+
+#[test]
+fn the_change_by_a_lump_has_an_error_bar_and_errors_their_place() {
+    let press = tissue();
+    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
+        .lump(Lump::sphere(4.0, "hard", "200 kPa").below(9.0))
+        .press(2.0)
+        .set("press", "step", "1 mm")
+        .set("press", "hold", "0 s");
+    let report = press.report(&scene, &["--frames", "0", "--lump-change"]);
+    let change = &report["lump_change"];
+    let forces = column(&report, "force_n");
+    let with = forces.iter().copied().fold(0.0, f64::max);
+    // The tissue is elastic, so that the press itself is the elastic one.
+    let sum = number(&change["without_n"]) + number(&change["change_n"]);
+    assert!((sum - with).abs() < 1e-4 * with, "{sum} N, {with} N");
+    let bar = number(&change["error_bar_n"]);
+    assert!(
+        number(&change["change_n"]) > 2.0 * bar && bar > 0.0,
+        "{change}"
+    );
+
+    let [point, _] = arrays(&press.bench.path("out/press/error_bars.vtu"));
+    let bars = array(&point, "displacement_error_bar");
+    assert_eq!(
+        bars.len() as u64,
+        report["press"]["n_nodes"].as_u64().unwrap()
+    );
+    let names = ["moved_near", "moved_skin_far", "moved_levels_deep"];
+    let moves = names.map(|name| array(&point, name));
+    for (i, bar) in bars.iter().enumerate() {
+        let sum: f64 = moves.iter().map(|of| of[i]).sum();
+        assert!((2.0 * sum - bar).abs() <= 1e-5 * bar);
+    }
+    // Errors are far smaller than the depth, and not everywhere.
+    let largest = bars.iter().copied().fold(0.0, f64::max);
+    assert!((1e-6..1e-3).contains(&largest), "{largest} m");
+    assert!(bars.iter().any(|&bar| bar < 1e-2 * largest));
 }
 
 #[test]

@@ -159,7 +159,7 @@ fn draw_tool(rng: &mut Rng) -> (&'static str, String, f64, f64) {
             let (r, edge) = (even(rng, 5.0, 10.0), even(rng, 0.25, 0.5));
             let edge = edge * r;
             let sizes = format!("radius = \"{r:.1} mm\"\nedge_radius = \"{edge:.1} mm\"\n");
-            ("flat-punch", r, (r / 4.0).min(edge / 3.0), sizes)
+            ("flat-punch", r, (r / 4.0).min(0.8 * edge), sizes)
         }
         8 => {
             let (r, length) = (even(rng, 4.0, 8.0), even(rng, 8.0, 20.0));

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use palpa::Prepared;
-use palpa::accuracy::{Descent, EXTRAPOLATION, SAFETY, Source};
+use palpa::accuracy::{Descent, SAFETY, Source};
 use palpa::build::{BuiltBody, build};
 use palpa::press::mesh::Sizes;
 use palpa::press::tissue::Indentation;
@@ -53,6 +53,10 @@ pub struct Case {
     pub error_skin_far_n: Option<f64>,
     /// Contribution of deep levels, N.
     pub error_levels_deep_n: Option<f64>,
+    /// Contribution of the edge of the contact, N.
+    pub error_contact_n: Option<f64>,
+    /// The force extrapolated to an infinitely fine mesh, N; `None` if it cannot be.
+    pub extrapolated_n: Option<f64>,
     /// Number of nodes of the reference.
     pub reference_nodes: Option<usize>,
     /// Force of the reference, N; `None` without equilibrium, or if its mesh is too large.
@@ -93,13 +97,8 @@ impl Case {
     /// Half the width of the error bar, N; `None` if a probe failed.
     pub fn error_bar_n(&self) -> Option<f64> {
         let sizes = self.contributions_n()?.map(f64::abs);
-        Some(SAFETY * sizes.iter().sum::<f64>())
-    }
-
-    /// The force extrapolated to an infinitely fine mesh, N.
-    pub fn extrapolated_n(&self) -> Option<f64> {
-        let sum: f64 = self.contributions_n()?.iter().sum();
-        Some(self.force_n? + EXTRAPOLATION * sum)
+        let contact = self.error_contact_n.unwrap_or(0.0).abs();
+        Some(SAFETY * (sizes.iter().sum::<f64>() + contact))
     }
 
     /// Width of the bar in true errors; `None` without bar or reference.
@@ -121,8 +120,10 @@ pub struct Summary {
     pub median_width: f64,
     /// Median size of the true error as a share of the force.
     pub median_error: f64,
+    /// Number of judged cases with an extrapolated force.
+    pub n_extrapolated: usize,
     /// Median distance of the extrapolated force from the truth, as a share of the force.
-    pub median_extrapolated_error: f64,
+    pub median_extrapolated_error: Option<f64>,
     /// Median of half the bar's width as a share of the force.
     pub median_bar: f64,
     /// Median time of the probes by the time of the press.
@@ -150,10 +151,13 @@ impl Summary {
             coverage: 1.0 - outside.len() as f64 / judged.len() as f64,
             median_width: median(&Case::width)?,
             median_error: median(&|case| Some(case.error_n()?.abs() / case.force_n?))?,
+            n_extrapolated: (judged.iter())
+                .filter(|case| case.extrapolated_n.is_some())
+                .count(),
             median_extrapolated_error: median(&|case| {
-                let left = case.force_n? + case.error_n()? - case.extrapolated_n()?;
+                let left = case.force_n? + case.error_n()? - case.extrapolated_n?;
                 Some(left.abs() / case.force_n?)
-            })?,
+            }),
             median_bar: median(&|case| Some(case.error_bar_n()? / case.force_n?))?,
             median_cost: median(&|case| Some(case.probes_s / case.press_s))?,
             outside,
@@ -229,6 +233,8 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     case.error_near_n = part(Source::Near);
     case.error_skin_far_n = part(Source::SkinFar);
     case.error_levels_deep_n = part(Source::LevelsDeep);
+    case.error_contact_n = probed.contact().map(|c| c * probed.force_n);
+    case.extrapolated_n = probed.extrapolated_n();
     drop(press);
 
     let begin = Instant::now();

@@ -52,7 +52,7 @@ fn a_surface_and_one_layer_are_enough() {
             speed: 0.01,
             hold: 0.5,
             retract: true,
-            step: 0.00025,
+            step: 0.0005,
             speeds: vec![],
             cycles: 1,
         }

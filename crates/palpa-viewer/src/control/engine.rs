@@ -70,8 +70,9 @@ pub enum ErrorBar {
         half_width: f64,
         /// Force of the static press at that place and depth on the same mesh.
         force: f64,
-        /// That force, extrapolated to an infinitely fine mesh.
-        extrapolated: f64,
+        /// That force, extrapolated to an infinitely fine mesh; `None` if few vertices touch or the bar
+        /// is wide.
+        extrapolated: Option<f64>,
         /// Depth at which the bar was computed.
         depth: f64,
         /// The place of the skin, at rest, at which it was computed.

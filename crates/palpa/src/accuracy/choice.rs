@@ -120,7 +120,7 @@ struct Factors {
 
 impl Factors {
     fn sizes(self, scene: &Scene) -> Sizes {
-        let h = (FIRST * scene.tool.contact_radius()).clamp(LIMITS.0, LIMITS.1);
+        let h = scene.tool.edge_length(FIRST).clamp(LIMITS.0, LIMITS.1);
         let mut sizes = Sizes::even(scene, h, scene.mesh.growth);
         for graded in [&mut sizes.skin, &mut sizes.levels] {
             (graded.near, graded.far) = (self.near, self.far);
@@ -141,8 +141,10 @@ impl Factors {
             let size = |source: &Source| probed?.changes[*source as usize].map(f64::abs);
             sources.iter().map(size).sum()
         };
+        // More vertices touch where edges are shorter.
+        let contact = probed.and_then(Probed::contact).unwrap_or(0.0);
         let sums = [
-            size(&[Source::Near]),
+            size(&[Source::Near]).map(|near| near + contact),
             size(&[Source::SkinFar, Source::LevelsDeep]),
         ];
         // Each part may have its share of the bar, and what the other part leaves of its own.

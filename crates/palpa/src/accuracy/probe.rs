@@ -7,7 +7,7 @@ use palpa_fem::{
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
 
-use super::{ErrorBars, N_SOURCES, Probed, Source};
+use super::{ErrorBars, N_SOURCES, Probed, STAND_IN, Source};
 use crate::build::nearest;
 use crate::continuum;
 use crate::press::mesh::NEAR;
@@ -18,7 +18,7 @@ use crate::press::tissue::{Deformed, Indentation};
 const PART_DEPTHS: f64 = 1.0;
 const PART_REACHES: f64 = 2.0;
 /// Tolerance of the force balance: far below the errors that are looked for.
-const TOLERANCE: f64 = 1e-4;
+pub(super) const TOLERANCE: f64 = 1e-4;
 
 /// An equilibrium of a press.
 #[derive(Debug)]
@@ -65,10 +65,13 @@ pub(super) fn run(
             force_n: base.force_n,
             changes: [None; N_SOURCES],
             is_stand_in: [false; N_SOURCES],
+            n_touching: press.is_round().then(|| base.deformed.n_touching()),
         })
         .collect();
     let part = part(press);
     let mut n_nodes = 0;
+    let mut moves: [Vec<f64>; N_SOURCES] =
+        std::array::from_fn(|_| vec![0.0; press.model.n_nodes()]);
     for (i, source) in Source::ALL.into_iter().enumerate() {
         if !progress(i, Source::ALL.len()) {
             return None;
@@ -89,6 +92,9 @@ pub(super) fn run(
         for (probed, base) in probed.iter_mut().zip(bases).rev() {
             let found = probe.force(press, base.depth, &part, &base.deformed);
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
+            if found.is_some() && base.depth >= bases[0].depth {
+                probe.mark_moves(press, &part, &mut moves[i]);
+            }
         }
     }
     stand_in(&mut probed);
@@ -96,17 +102,17 @@ pub(super) fn run(
         probed,
         load_step: None,
         n_nodes,
+        moves,
     })
 }
 
-/// Where a probe found no equilibrium, the change at the next smaller depth stands in: relative
-/// changes fall with the depth, or stay.
+/// Where a probe found no equilibrium, twice the change at the next smaller depth stands in.
 fn stand_in(probed: &mut [Probed]) {
     for i in 0..N_SOURCES {
         let mut last = None;
         for probed in probed.iter_mut().rev() {
             if probed.changes[i].is_none() {
-                probed.changes[i] = last;
+                probed.changes[i] = last.map(|change: f64| STAND_IN * change);
                 probed.is_stand_in[i] = last.is_some();
             }
             last = probed.changes[i];
@@ -254,6 +260,29 @@ impl Probe {
             }
         }
         None
+    }
+
+    /// Marks how far the nodes of the press move in the last correction, m.
+    fn mark_moves(&self, press: &Indentation, part: &Part, moves: &mut [f64]) {
+        let Some(last) = self.corrections.last() else {
+            return;
+        };
+        let (old, new) = (&part.body, self.model.body());
+        let (n_levels, n_vertices) = (old.n_levels, old.n_vertices());
+        // The first vertices are those of the part. A level of the part is carried to a whole number.
+        let levels: Vec<Vec3> = (0..n_vertices)
+            .flat_map(|_| (0..n_levels).map(|l| Vec3::repeat(l as f64)))
+            .collect();
+        let levels = (self.carry)(&levels);
+        for (v, &whole) in part.vertices.iter().enumerate() {
+            for node in (0..new.n_levels).map(|l| new.node(v, l)) {
+                let level = levels[node].x;
+                if level.fract() == 0.0 {
+                    let at = press.mesh().body.node(whole as usize, level as usize);
+                    moves[at] = last.displacements[node].norm();
+                }
+            }
+        }
     }
 
     /// The difference to the press that is expected at a depth, m, from the two depths before;
@@ -430,12 +459,13 @@ mod tests {
     }
 
     #[test]
-    fn the_next_smaller_depth_stands_in_for_a_probe_without_equilibrium() {
+    fn twice_the_change_at_the_next_smaller_depth_stands_in_for_a_probe_without_equilibrium() {
         let probed = |depth_mm: f64, near: Option<f64>, deep: Option<f64>| Probed {
             depth_mm,
             force_n: 1.0,
             changes: [near, Some(0.0), deep],
             is_stand_in: [false; N_SOURCES],
+            n_touching: None,
         };
         let mut all = [
             probed(4.0, None, Some(0.1)),
@@ -443,7 +473,7 @@ mod tests {
             probed(1.0, Some(-0.02), None),
         ];
         stand_in(&mut all);
-        assert_eq!(all[0].changes, [Some(-0.02), Some(0.0), Some(0.1)]);
+        assert_eq!(all[0].changes, [Some(-0.08), Some(0.0), Some(0.1)]);
         assert_eq!(all[0].is_stand_in, [true, false, false]);
         assert_eq!(all[1].is_stand_in, [true, false, false]);
         assert_eq!(all[1].changes[2], None);

@@ -200,12 +200,11 @@ impl LiveScene {
 }
 
 /// The scene with a coarser mesh, if it gives no edge length near the tool: a third of the contact
-/// radius. A scripted press, which may take its time, uses a quarter.
+/// radius. A scripted press, which may take its time, uses a quarter under most tools.
 fn coarser(scene: &Scene) -> Scene {
-    const COARSER: f64 = 4.0 / 3.0;
+    const SHARE: f64 = 1.0 / 3.0;
     let mut scene = scene.clone();
-    let usual = scene.mesh.near_tool_of(&scene.tool);
-    scene.mesh.near_tool = scene.mesh.near_tool.or(usual.map(|h| COARSER * h));
+    scene.mesh.near_tool = scene.mesh.near_tool_at(&scene.tool, SHARE);
     // One vertex more than allowed, so that a mesh that is too fine is refused rather than silently
     // coarsened.
     let n_levels = 1 + scene.layers.iter().map(|l| l.levels).sum::<usize>();

@@ -86,6 +86,10 @@ impl Graded {
     }
 }
 
+/// Growth of the heights of intervals under a flat tool with a rounded edge, relative to that of the
+/// skin's edges: errors near such a tool are small, those of the intervals below it are not.
+const FLAT_GROWTH: f64 = 0.5;
+
 /// Sizes of the mesh near the tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
@@ -106,6 +110,11 @@ impl Sizes {
     pub fn even(scene: &Scene, h: f64, growth: f64) -> Self {
         let graded = Graded::even(h, growth);
         let (_, radius) = reach(scene);
+        let below = if scene.tool.is_flat() {
+            FLAT_GROWTH
+        } else {
+            1.0
+        };
         Self {
             skin: Graded {
                 border: (NEAR - 1.0) * radius,
@@ -113,6 +122,7 @@ impl Sizes {
             },
             levels: Graded {
                 border: NEAR * scene.tool.contact_radius(),
+                growth: below * growth,
                 ..graded
             },
         }
@@ -120,7 +130,7 @@ impl Sizes {
 }
 
 /// A body that is refined for a press.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct PressedBody {
     /// The refined body. Its first vertices are those of the body before refinement.
     pub body: LayeredBody,

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use palpa::Prepared;
 use palpa::accuracy::{
-    Descent, End, ErrorBars, Goal, MeshChoice, SAFETY, Stops, choose_mesh, loading,
+    Descent, End, ErrorBars, Goal, MeshChoice, SAFETY, Stops, change_by_lumps, choose_mesh, loading,
 };
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa::scene::Scene;
-use palpa_testkit::{Layer, Scene as SceneText, Value};
+use palpa_testkit::{Layer, Lump, Scene as SceneText, Value};
 
 /// A soft layer under a stiff one.
 fn block() -> SceneText {
@@ -89,6 +89,7 @@ fn the_force_of_a_finer_mesh_lies_within_the_bar() {
             sample.error_near_n,
             sample.error_skin_far_n,
             sample.error_levels_deep_n,
+            sample.error_contact_n,
         ];
         let sum: f64 = parts.iter().map(|part| part.unwrap().abs()).sum();
         assert!((SAFETY * sum - bar).abs() < 1e-12 * bar, "{name}");
@@ -162,6 +163,30 @@ fn halved_load_steps_change_the_force_as_longer_ones_foretell() {
     assert_eq!(long.load_step_change(at_long, || false), None);
     // Elastic tissue without friction has no history.
     assert_eq!(set_up(&block()).load_step_change(1.0, || true), None);
+}
+
+#[test]
+fn the_change_by_a_lump_on_a_finer_mesh_lies_within_its_bar() {
+    let lump = Lump::sphere(4.0, "hard", "200 kPa").below(9.0);
+    let scene = block().lump(lump).set("tool", "radius", "6 mm");
+    let change_on = |edge: &str| {
+        let press = set_up(&scene.clone().set("mesh", "near_tool", edge));
+        let descent = Descent::from_rest(&press).unwrap();
+        let bars = descent.probe(&press, |_, _| true).unwrap();
+        assert_eq!(bars.moves[0].len(), press.model.n_nodes());
+        let change = change_by_lumps(&press, &descent, &bars, || true).unwrap();
+        assert_eq!(
+            change_by_lumps(&press, &descent, &bars, || false).unwrap(),
+            None
+        );
+        change.unwrap()
+    };
+    let (coarse, fine) = (change_on("2.5 mm"), change_on("1.6 mm"));
+    let bar = coarse.error_bar_n.unwrap();
+    let error = (coarse.change_n - fine.change_n).abs();
+    println!("{} ± {bar} N, fine {} N", coarse.change_n, fine.change_n);
+    assert!(error < bar, "{error} N");
+    assert!(bar < 0.2 * coarse.change_n);
 }
 
 /// The choice of a mesh for the block under a ball.

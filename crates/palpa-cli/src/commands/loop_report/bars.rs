@@ -49,6 +49,8 @@ pub(super) struct BarFigures {
     skin_far: Option<f64>,
     /// The same for deep intervals.
     levels_deep: Option<f64>,
+    /// What finer meshes of the same few vertices in contact do not show, as a share of the force.
+    contact: Option<f64>,
     /// Why there is no bar.
     problem: Option<String>,
 }
@@ -291,6 +293,7 @@ impl BarFigures {
             near: change(0),
             skin_far: change(1),
             levels_deep: change(2),
+            contact: bar.and_then(|bar| bar.probed.contact()),
             problem,
         }
     }
@@ -300,6 +303,9 @@ impl BarFigures {
         let changes = [self.near?, self.skin_far?, self.levels_deep?];
         let (source, change) = (Source::ALL.into_iter().zip(changes))
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        if let Some(contact) = self.contact.filter(|&contact| contact > change.abs()) {
+            return Some(format!("few vertices in contact {:.1} %", 100.0 * contact));
+        }
         Some(format!("{source} {:+.1} %", 100.0 * change))
     }
 }

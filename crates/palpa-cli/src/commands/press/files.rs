@@ -8,6 +8,9 @@ use palpa_mesh::{LayeredBody, Surface};
 use palpa_plot::output::OutDir;
 use palpa_plot::vtu::{Grid, write_series};
 
+/// Where in the body errors of the mesh arise.
+pub(super) const ERROR_BARS: &str = "error_bars.vtu";
+
 /// Removes the files of an earlier run from the folder, because this run might not replace all of
 /// them.
 pub(super) fn remove_older(folder: &Path) -> anyhow::Result<()> {
@@ -19,9 +22,14 @@ pub(super) fn remove_older(folder: &Path) -> anyhow::Result<()> {
         "section",
         "stress",
     ];
-    let mut older: Vec<PathBuf> = ["press.csv", "press.json", "press.pvd", "mesh_choice.json"]
-        .map(|name| folder.join(name))
-        .into();
+    let files = [
+        "press.csv",
+        "press.json",
+        "press.pvd",
+        "mesh_choice.json",
+        ERROR_BARS,
+    ];
+    let mut older: Vec<PathBuf> = files.map(|name| folder.join(name)).into();
     older.extend(
         pictures
             .iter()

@@ -11,12 +11,13 @@ use std::sync::Arc;
 
 use palpa_scene::Scene;
 
+use self::fields::error_grid;
 use self::pictures::draw_pictures;
 use self::record::{record, table};
 use self::report::{PressReport, announce, conclude, facts};
 use self::result::result_of;
 use super::Job;
-use super::files::remove_older;
+use super::files::{ERROR_BARS, remove_older};
 use crate::commands::Outcome;
 use palpa::press::tissue::{Indentation, SampleOutcome};
 use palpa::{Note, Prepared};
@@ -29,6 +30,11 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         scene,
         ..
     } = *job;
+    if job.args.lump_change && scene.lumps.is_empty() {
+        anyhow::bail!(
+            "--lump-change needs a scene with lumps; add a [[lump]], or leave the option out"
+        );
+    }
     let spinner = context.progress(0, "growing the body");
     let (indentation, choice) = match scene.mesh.accuracy {
         None => {
@@ -49,11 +55,14 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     announce(job, &indentation, &materials)?;
 
     let chosen = choice.as_ref().and_then(|choice| choice.bars.clone());
-    let with_bars = chosen.is_none() && !job.args.no_error_bar && has_bars(&indentation);
+    let is_probed_again = chosen.is_none() || job.args.lump_change;
+    let with_bars = is_probed_again && !job.args.no_error_bar && has_bars(&indentation);
     let (mut recorded, probed) = record(job, &indentation, with_bars)?;
-    let bars = chosen.or(probed);
+    let (probed, lump_change) = probed.map(|found| (found.bars, found.lumps)).unzip();
+    let bars = probed.or(chosen);
     if let Some(bars) = &bars {
         bars.enter(&mut recorded.samples);
+        out.write_with(ERROR_BARS, |w| error_grid(&indentation, bars).write(w))?;
         let mut table = table(job)?;
         for sample in &recorded.samples {
             table.push(sample)?;
@@ -74,6 +83,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         notes: &notes,
         mesh_choice: choice.as_ref(),
         error_bars: bars.as_ref(),
+        lump_change: lump_change.flatten(),
         samples: &recorded.samples,
     };
     out.write_json("press.json", &report)?;

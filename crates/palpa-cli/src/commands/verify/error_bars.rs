@@ -112,7 +112,8 @@ fn say(context: &Context, out: &OutDir, cases: &[Case], summary: &Summary) -> an
             of.n_judged.to_string(),
             format!("{:.1} %", 100.0 * of.coverage),
             format!("{:.2} %", 100.0 * of.median_error),
-            format!("{:.2} %", 100.0 * of.median_extrapolated_error),
+            of.median_extrapolated_error
+                .map_or_else(|| "–".to_owned(), |error| format!("{:.2} %", 100.0 * error)),
             format!("±{:.2} %", 100.0 * of.median_bar),
         ]);
     }

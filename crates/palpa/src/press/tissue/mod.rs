@@ -82,6 +82,13 @@ pub(crate) struct Deformed {
     pub is_touching: Vec<bool>,
 }
 
+impl Deformed {
+    /// Number of skin vertices that touch the tool.
+    pub(crate) fn n_touching(&self) -> usize {
+        self.is_touching.iter().filter(|&&is| is).count()
+    }
+}
+
 /// The contact between tool and skin.
 #[derive(Debug)]
 enum Grip {
@@ -162,6 +169,12 @@ impl Indentation {
     /// Whether the skin is bonded to the tool.
     pub fn is_bonded(&self) -> bool {
         matches!(self.grip, Grip::Bond { .. })
+    }
+
+    /// Whether the tool is in contact with the skin over an area that grows from nothing.
+    pub(crate) fn is_round(&self) -> bool {
+        let tool = &self.prepared.scene.tool;
+        tool.contact().is_some() && !tool.is_flat()
     }
 
     /// Number of samples of the run at one speed.

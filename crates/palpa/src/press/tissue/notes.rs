@@ -35,11 +35,8 @@ pub(crate) fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes:
             radius,
         });
     }
-    let edge = scene
-        .tool
-        .contact()
-        .and_then(|tool| tool.shape.edge_radius());
-    if let Some(edge) = edge.filter(|&edge| edge < FEWEST_EDGES * mesh.mesh_size) {
+    let edge = scene.tool.rounded_edge();
+    if let Some(edge) = edge.filter(|&edge| edge < mesh.mesh_size) {
         notes.push(Note::CoarseAtEdge {
             edge: mesh.mesh_size,
             edge_radius: edge,

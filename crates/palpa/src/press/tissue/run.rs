@@ -239,6 +239,7 @@ impl Run<'_> {
             error_near_n: None,
             error_skin_far_n: None,
             error_levels_deep_n: None,
+            error_contact_n: None,
             error_load_step_n: None,
             layer_thickness_mm: (indentation.thicknesses(&self.state).iter())
                 .map(|t| t * 1e3)

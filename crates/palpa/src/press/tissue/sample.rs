@@ -69,7 +69,8 @@ pub struct Sample {
     /// Half the width of the force's error bar, N; `None` if it was not estimated. See
     /// [`crate::accuracy`].
     pub error_bar_n: Option<f64>,
-    /// The force extrapolated to an infinitely fine mesh, N.
+    /// The force extrapolated to an infinitely fine mesh, N; `None` without error bar, or if no order
+    /// of convergence can be seen.
     pub extrapolated_n: Option<f64>,
     /// Change of the force by finer prisms near the tool, N.
     pub error_near_n: Option<f64>,
@@ -77,6 +78,8 @@ pub struct Sample {
     pub error_skin_far_n: Option<f64>,
     /// Change of the force by finer deep intervals, N.
     pub error_levels_deep_n: Option<f64>,
+    /// What finer meshes of the same few vertices in contact with a round tool do not show, N.
+    pub error_contact_n: Option<f64>,
     /// Change of the force by shorter load steps, N; 0 if they do not matter.
     pub error_load_step_n: Option<f64>,
     /// Thickness of each layer along the pressed column, mm. `[n_layers]`

@@ -3,6 +3,7 @@
 use palpa_fem::PrismField;
 
 use super::super::files::with_making;
+use palpa::accuracy::{ErrorBars, Source};
 use palpa::press::tissue::{Indentation, Run};
 use palpa_plot::vtu::Grid;
 
@@ -35,4 +36,22 @@ pub(super) fn grid(indentation: &Indentation, lump_shares: &[f64], run: &Run<'_>
         grid = grid.with_cell_scalars("lump", lump_shares.to_vec());
     }
     with_making(grid, body, &mesh.thinning, &mesh.stand_off)
+}
+
+/// Where errors of the mesh arise, on the body at rest. Point arrays (m): `displacement_error_bar`, how
+/// far the node may be from its place on an infinitely fine mesh at the deepest, and for each source
+/// how far its probe moves the node.
+pub(super) fn error_grid(indentation: &Indentation, bars: &ErrorBars) -> Grid {
+    let body = &indentation.mesh().body;
+    let mut grid = Grid::of_body(body, &body.positions)
+        .with_point_scalars("displacement_error_bar", bars.displacement_bars());
+    for (source, moves) in Source::ALL.into_iter().zip(&bars.moves) {
+        let name = match source {
+            Source::Near => "moved_near",
+            Source::SkinFar => "moved_skin_far",
+            Source::LevelsDeep => "moved_levels_deep",
+        };
+        grid = grid.with_point_scalars(name, moves.clone());
+    }
+    grid
 }

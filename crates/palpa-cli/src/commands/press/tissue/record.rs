@@ -2,7 +2,7 @@
 //! ParaView. Error bars are computed beside the way back.
 
 use indicatif::ProgressBar;
-use palpa::accuracy::{Descent, ErrorBars, Stops};
+use palpa::accuracy::{Descent, ErrorBars, LumpChange, Stops, change_by_lumps};
 use palpa::press::tissue::{Indentation, Record, Run, Sample};
 use palpa_plot::output::{CsvTable, OutDir};
 
@@ -11,14 +11,23 @@ use super::super::files::Series;
 use super::fields::grid;
 use crate::cli::Context;
 
+/// What probes found.
+pub(super) struct Bars {
+    /// The error bars of the force.
+    pub(super) bars: ErrorBars,
+    /// The change by the lumps, if it was asked for and found.
+    pub(super) lumps: Option<LumpChange>,
+}
+
 /// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
 /// run leaves a valid table. With `with_bars`, the first press down is probed while its rest and the
-/// way back are computed; there are no bars if that was interrupted.
+/// way back are computed, without its lumps too if their change is asked for; there are no bars if that
+/// was interrupted.
 pub(super) fn record<'a>(
     job: &Job<'_>,
     indentation: &'a Indentation,
     with_bars: bool,
-) -> anyhow::Result<(Record<'a>, Option<ErrorBars>)> {
+) -> anyhow::Result<(Record<'a>, Option<Bars>)> {
     let n_samples = indentation.n_samples() * indentation.speeds.len();
     let progress = job.context.progress(n_samples, "pressing");
     let mut recorder = Recorder::new(job, indentation, with_bars, &progress)?;
@@ -31,14 +40,33 @@ pub(super) fn record<'a>(
     let last = (recorder.record.samples.last()).filter(|s| is_deepest && s.outcome.is_converged());
     let at_deepest = last.filter(|_| with_bars).map(|s| s.force_n);
     let goes_on = || !context.is_interrupted();
-    let probe = || Descent::at(indentation, &stops?)?.probe(indentation, |_, _| goes_on());
+    let probe = || {
+        let Some(descent) = stops.and_then(|stops| Descent::at(indentation, &stops)) else {
+            return Ok(None);
+        };
+        let Some(bars) = descent.probe(indentation, |_, _| goes_on()) else {
+            return Ok(None);
+        };
+        let lumps = if job.args.lump_change {
+            change_by_lumps(indentation, &descent, &bars, goes_on)?
+        } else {
+            None
+        };
+        anyhow::Ok(Some(Bars { bars, lumps }))
+    };
     let change_steps = || indentation.load_step_change(at_deepest?, goes_on);
     let (record, (bars, load_step)) = rayon::join(
         move || recorder.finish(run),
         || rayon::join(probe, change_steps),
     );
-    let bars = bars.map(|bars| ErrorBars { load_step, ..bars });
     let record = record?;
+    let bars = bars?.map(|found| Bars {
+        bars: ErrorBars {
+            load_step,
+            ..found.bars
+        },
+        ..found
+    });
     drop(progress);
     Ok((record, bars))
 }

@@ -10,7 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
-use palpa::accuracy::{ErrorBars, MeshChoice, Source};
+use palpa::accuracy::{ErrorBars, LumpChange, MeshChoice, Source};
 use palpa::build::in_mm;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
@@ -34,6 +34,8 @@ pub(super) struct PressReport<'a> {
     pub(super) mesh_choice: Option<&'a MeshChoice>,
     /// Contributions to the force's error at the depths that were probed; `None` if they were not.
     pub(super) error_bars: Option<&'a ErrorBars>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) lump_change: Option<LumpChange>,
     pub(super) samples: &'a [Sample],
 }
 
@@ -280,7 +282,7 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
     let of_sources = Source::ALL.into_iter().zip(probed.changes);
     for ((source, change), is_stand_in) in of_sources.zip(probed.is_stand_in) {
         let from = if is_stand_in {
-            " (at a smaller depth; here its probe found no equilibrium)"
+            " (twice that at a smaller depth; here its probe found no equilibrium)"
         } else {
             ""
         };
@@ -290,6 +292,9 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
         });
     }
     changes.extend((bars.load_step).map(|step| format!("load steps {:+.1} %", 100.0 * step)));
+    let contact = probed.contact().filter(|&contact| contact > 0.0);
+    changes
+        .extend(contact.map(|contact| format!("few vertices in contact {:.1} %", 100.0 * contact)));
     let half_width = bars.half_width(probed);
     let bar = half_width.map_or_else(
         || "not known, because a probe failed".to_owned(),
@@ -307,6 +312,20 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
         job.context.say(format!(
             "extrapolated to an infinitely fine mesh, the force at {:.2} mm is {extrapolated:.4} N ({share:+.1} %)",
             sample.depth_mm
+        ))?;
+    }
+    if let Some(change) = &report.lump_change {
+        let force = probed.force_n;
+        let bar = change.error_bar_n.map_or_else(
+            || "not known, because a probe failed".to_owned(),
+            |bar| format!("±{bar:.4} N (±{:.1} %)", 100.0 * bar / force.abs()),
+        );
+        job.context.say(format!(
+            "lumps change the force at {:.2} mm by {:+.4} N ({:+.1} % of it), error bar of the change: {bar}; both without \
+             relaxation",
+            change.depth_mm,
+            change.change_n,
+            100.0 * change.change_n / force
         ))?;
     }
     if half_width.is_some_and(|half| half > WANTED) && report.mesh_choice.is_none() {
