@@ -306,9 +306,9 @@ pub(crate) struct MeshTable {
     /// Whether the mesh is refined near the tool and lumps; if false, it stays as it was grown.
     /// Default: true.
     pub(crate) refine: bool,
-    /// Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a
-    /// quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8
-    /// times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
+    /// Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to
+    /// 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real
+    /// time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
     /// Wanted length of edges and height of levels in and around lumps, 0.1 mm to 100 mm. Default:

@@ -265,6 +265,7 @@ mod tests {
                 changes: [Some(-0.01), Some(0.006), Some(-0.004)],
                 is_stand_in: [false; 3],
                 n_touching: None,
+                is_bonded: false,
             },
         }
     }

@@ -377,7 +377,7 @@ export interface components {
              */
             near_lumps?: string;
             /**
-             * @description Wanted length of edges and height of levels under the tool, 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
+             * @description Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
              * @example 1.5 mm
              */
             near_tool?: string;

@@ -7,6 +7,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod awkward;
+mod bars;
 mod bench;
 mod ccx;
 mod manifest;

@@ -95,14 +95,7 @@ impl Case {
         let scene = out.join("scene.toml");
         std::fs::write(&scene, self.scene(data)).unwrap();
         let run = Command::new(env!("CARGO_BIN_EXE_palpa"))
-            .args([
-                "press",
-                "--json",
-                "--frames",
-                "2",
-                "--no-error-bar",
-                "--out",
-            ])
+            .args(["press", "--json", "--frames", "2", "--out"])
             .arg(&out)
             .arg(&scene)
             .output()
@@ -152,6 +145,11 @@ impl Case {
             "{samples:?}"
         );
         assert_eq!(report["result"]["n_turned_prisms"], 0);
+        for (sample, force) in samples.iter().zip(&forces).skip(1) {
+            let share = sample["error_bar_n"].as_f64().unwrap() / force;
+            println!("{}: {force:.4} N ± {:.1} %", self.name, 100.0 * share);
+            assert!((1e-3..0.25).contains(&share), "{sample}");
+        }
         for file in [
             "press.csv",
             "press.pvd",

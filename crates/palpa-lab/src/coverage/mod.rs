@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use palpa::Prepared;
-use palpa::accuracy::{Descent, SAFETY, Source};
+use palpa::accuracy::{Descent, SAFETY, Source, wide};
 use palpa::build::{BuiltBody, build};
 use palpa::press::mesh::Sizes;
 use palpa::press::tissue::Indentation;
@@ -96,9 +96,8 @@ impl Case {
 
     /// Half the width of the error bar, N; `None` if a probe failed.
     pub fn error_bar_n(&self) -> Option<f64> {
-        let sizes = self.contributions_n()?.map(f64::abs);
         let contact = self.error_contact_n.unwrap_or(0.0).abs();
-        Some(SAFETY * (sizes.iter().sum::<f64>() + contact))
+        Some(wide(self.contributions_n()?, self.tool == draw::DISC) + SAFETY * contact)
     }
 
     /// Width of the bar in true errors; `None` without bar or reference.

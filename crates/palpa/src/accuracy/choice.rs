@@ -7,7 +7,7 @@ use palpa_scene::Scene;
 use serde::Serialize;
 
 use super::descent::Descent;
-use super::{ErrorBars, Probed, SAFETY, Source};
+use super::{EDGE_SAFETY, ErrorBars, Probed, SAFETY, Source};
 use crate::Prepared;
 use crate::build::BuiltBody;
 use crate::note::Note;
@@ -141,10 +141,11 @@ impl Factors {
             let size = |source: &Source| probed?.changes[*source as usize].map(f64::abs);
             sources.iter().map(size).sum()
         };
+        let edge = if is_edged { EDGE_SAFETY / SAFETY } else { 1.0 };
         // More vertices touch where edges are shorter.
         let contact = probed.and_then(Probed::contact).unwrap_or(0.0);
         let sums = [
-            size(&[Source::Near]).map(|near| near + contact),
+            size(&[Source::Near]).map(|near| edge * near + contact),
             size(&[Source::SkinFar, Source::LevelsDeep]),
         ];
         // Each part may have its share of the bar, and what the other part leaves of its own.

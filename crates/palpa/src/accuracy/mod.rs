@@ -27,9 +27,12 @@ pub use self::descent::{Descent, Stops};
 pub use self::lumps::{LumpChange, change_by_lumps};
 use crate::press::tissue::Sample;
 
-/// Factor between the sum of the contributions and the bar. Halving a size shows half of an error of
-/// first order and three quarters of one of second order.
+/// Factor between a contribution and its share of the bar. Halving a size shows two thirds of an error
+/// of order 1.5 and three quarters of one of second order.
 pub const SAFETY: f64 = 2.0;
+/// The same for the contribution near a bonded disc: at its sharp edge the error is of first order, so
+/// that halving shows half of it; a quarter is for safety.
+pub const EDGE_SAFETY: f64 = 2.5;
 /// Factor between the sum of the signed contributions and the expected error. Halving a size shows
 /// three quarters of an error of second order.
 pub const EXTRAPOLATION: f64 = 4.0 / 3.0;
@@ -102,6 +105,8 @@ pub struct Probed {
     pub is_stand_in: [bool; N_SOURCES],
     /// Number of skin vertices in contact with a round tool; `None` for other tools.
     pub n_touching: Option<usize>,
+    /// Whether the tool is bonded to the skin, so that [`EDGE_SAFETY`] applies near it.
+    pub is_bonded: bool,
 }
 
 impl Probed {
@@ -129,7 +134,10 @@ impl Probed {
             *into = change?;
         }
         let is_stand_in = self.is_stand_in.contains(&true);
-        Some(Relative::new(changes, is_stand_in, self.n_touching))
+        Some(Relative {
+            is_stand_in,
+            ..Relative::new(changes, self.n_touching, self.is_bonded)
+        })
     }
 }
 
@@ -141,22 +149,23 @@ struct Relative {
     /// Of the edge of the contact.
     contact: f64,
     is_stand_in: bool,
+    is_bonded: bool,
 }
 
 impl Relative {
-    fn new(changes: [f64; N_SOURCES], is_stand_in: bool, n_touching: Option<usize>) -> Self {
+    fn new(changes: [f64; N_SOURCES], n_touching: Option<usize>, is_bonded: bool) -> Self {
         // The probe near the tool shows a part of it.
         let least = n_touching.map_or(0.0, |n| CONTACT / n.max(1) as f64);
         Self {
             changes,
             contact: (least - changes[Source::Near as usize].abs()).max(0.0),
-            is_stand_in,
+            is_stand_in: false,
+            is_bonded,
         }
     }
 
     fn half_width(&self, load_step: f64) -> f64 {
-        let sizes: f64 = self.changes.iter().map(|c| c.abs()).sum();
-        SAFETY * (sizes + self.contact + load_step.abs())
+        wide(self.changes, self.is_bonded) + SAFETY * (self.contact + load_step.abs())
     }
 
     fn sum(&self) -> f64 {
@@ -168,6 +177,19 @@ impl Relative {
         let is_seen = self.contact <= MOST_CONTACT && !self.is_stand_in;
         is_seen && self.half_width(load_step) <= MOST_EXTRAPOLATED
     }
+}
+
+/// Half the width of the bar of contributions in the order of [`Source::ALL`].
+pub fn wide(contributions: [f64; N_SOURCES], is_bonded: bool) -> f64 {
+    let factor = |source: Source| {
+        if is_bonded && source == Source::Near {
+            EDGE_SAFETY
+        } else {
+            SAFETY
+        }
+    };
+    let parts = Source::ALL.into_iter().zip(contributions);
+    parts.map(|(source, c)| factor(source) * c.abs()).sum()
 }
 
 /// The error bar of a force.
@@ -278,7 +300,11 @@ impl ErrorBars {
             (Some((_, at)), None) | (None, Some((_, at))) => (at.changes, at.is_stand_in),
             (None, None) => return None,
         };
-        Some(Relative::new(changes, is_stand_in, n_touching))
+        let is_bonded = self.deepest().is_bonded;
+        Some(Relative {
+            is_stand_in,
+            ..Relative::new(changes, n_touching, is_bonded)
+        })
     }
 }
 

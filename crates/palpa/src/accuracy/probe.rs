@@ -66,6 +66,7 @@ pub(super) fn run(
             changes: [None; N_SOURCES],
             is_stand_in: [false; N_SOURCES],
             n_touching: press.is_round().then(|| base.deformed.n_touching()),
+            is_bonded: press.is_bonded(),
         })
         .collect();
     let part = part(press);
@@ -419,6 +420,8 @@ mod tests {
             levels = 3
             [tool]
             {tool}
+            [mesh]
+            near_tool = "1.5 mm"
             [press]
             at = ["3 mm", "2 mm", "0 mm"]
             depth = "2 mm"
@@ -466,6 +469,7 @@ mod tests {
             changes: [near, Some(0.0), deep],
             is_stand_in: [false; N_SOURCES],
             n_touching: None,
+            is_bonded: true,
         };
         let mut all = [
             probed(4.0, None, Some(0.1)),

@@ -264,6 +264,9 @@ fn bring_vertex(scene: &Scene, refined: &mut Refined, at: Vec3) {
     }
 }
 
+/// A length, m, for a triangle of the skin: its index and corners.
+type TriangleSize = Box<dyn Fn(u32, &[Vec3; 3]) -> f64>;
+
 /// A region of the skin that should be fine: `size` is the length of edges by the distance beyond
 /// `radius` (m) of the points.
 #[derive(Debug, Clone)]
@@ -271,6 +274,33 @@ struct Fine {
     points: Vec<Vec3>,
     radius: f64,
     size: Graded,
+    /// Whether only the rim of the radius is the region: under a bonded disc, stresses are largest
+    /// there.
+    is_rim: bool,
+}
+
+impl Fine {
+    /// Distance of a triangle from the region, m.
+    fn distance(&self) -> TriangleSize {
+        let (radius, border) = (self.radius, self.size.border);
+        let points = self.points.clone();
+        if !self.is_rim {
+            return Box::new(near_points(&points, radius, 0.0, 1.0));
+        }
+        Box::new(move |_, corners| {
+            let centre = corners.iter().sum::<Vec3>() / 3.0;
+            let far = |to: &Vec3| corners.iter().map(|p| (p - to).norm()).fold(0.0, f64::max);
+            let middle = points[0];
+            let beyond = (centre - middle).norm() - radius;
+            let distance = (beyond.abs() - far(&centre)).max(0.0);
+            // The middle of the disc is near the tool too.
+            if beyond < 0.0 {
+                distance.min(0.999 * border)
+            } else {
+                distance
+            }
+        })
+    }
 }
 
 /// Adds columns near the tool and above lumps.
@@ -295,6 +325,7 @@ fn refine_near(
             points.extend(index.closest(over).map(|closest| closest.point));
         }
         fine.push(Fine {
+            is_rim: scene.tool.is_bonded() && points.len() == 1,
             points,
             radius,
             size: sizes.skin,
@@ -311,7 +342,7 @@ fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
         ..RefineParams::default()
     };
     let wish = |fine: &Fine| {
-        let beyond = near_points(&fine.points, fine.radius, 0.0, 1.0);
+        let beyond = fine.distance();
         let size = fine.size.looser(SLACK);
         move |t: u32, corners: &[Vec3; 3]| size.at(beyond(t, corners))
     };
@@ -352,6 +383,7 @@ fn over_lumps(
                 points: vec![shadow.on_skin],
                 radius: radius * wide,
                 size: Graded::even(h * wide, scene.mesh.growth),
+                is_rim: false,
             });
         }
     }
@@ -396,6 +428,7 @@ impl CoarseBody {
             points: vec![point],
             radius,
             size: sizes.skin,
+            is_rim: false,
         }));
         refined(scene, &self.body, &fine).body
     }
