@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::descent::Descent;
 use super::probe::TOLERANCE;
-use super::{ErrorBars, N_SOURCES, Probed, SAFETY, wide};
+use super::{ErrorBars, N_SOURCES, Probed, SAFETY, all_known, wide};
 use crate::press::tissue::Indentation;
 
 /// The change of the force at the deepest by the lumps: the force of the press minus that of the same
@@ -32,20 +32,13 @@ impl LumpChange {
     fn new(with: &Probed, without: &Probed) -> Self {
         let part = |probed: &Probed, i: usize| Some(probed.changes[i]? * probed.force_n);
         let contributions_n = std::array::from_fn(|i| Some(part(with, i)? - part(without, i)?));
-        let all = || -> Option<[f64; N_SOURCES]> {
-            let mut all = [0.0; N_SOURCES];
-            for (into, contribution) in all.iter_mut().zip(contributions_n) {
-                *into = contribution?;
-            }
-            Some(all)
-        };
         // Nor is the change known better than the probes are solved.
         let least = SAFETY * TOLERANCE * with.force_n.abs();
         Self {
             depth_mm: with.depth_mm,
             without_n: without.force_n,
             change_n: with.force_n - without.force_n,
-            error_bar_n: all().map(|all| wide(all, with.is_bonded) + least),
+            error_bar_n: all_known(contributions_n).map(|all| wide(all, with.is_bonded) + least),
             contributions_n,
         }
     }

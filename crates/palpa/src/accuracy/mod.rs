@@ -129,16 +129,33 @@ impl Probed {
     }
 
     fn relative(&self) -> Option<Relative> {
-        let mut changes = [0.0; N_SOURCES];
-        for (into, change) in changes.iter_mut().zip(self.changes) {
-            *into = change?;
-        }
         let is_stand_in = self.is_stand_in.contains(&true);
-        Some(Relative {
-            is_stand_in,
-            ..Relative::new(changes, self.n_touching, self.is_bonded)
-        })
+        let changes = all_known(self.changes)?;
+        Some(self.with_changes(changes, is_stand_in, self.n_touching))
     }
+
+    /// Contributions under the same tool, with other changes.
+    fn with_changes(
+        &self,
+        changes: [f64; N_SOURCES],
+        is_stand_in: bool,
+        n_touching: Option<usize>,
+    ) -> Relative {
+        // The probe near the tool shows a part of it.
+        let least = n_touching.map_or(0.0, |n| CONTACT / n.max(1) as f64);
+        Relative {
+            changes,
+            contact: (least - changes[Source::Near as usize].abs()).max(0.0),
+            is_stand_in,
+            is_bonded: self.is_bonded,
+        }
+    }
+}
+
+/// The contributions, if there are all of them.
+fn all_known(contributions: [Option<f64>; N_SOURCES]) -> Option<[f64; N_SOURCES]> {
+    let [near, skin_far, levels_deep] = contributions;
+    Some([near?, skin_far?, levels_deep?])
 }
 
 /// Contributions as shares of the force.
@@ -153,17 +170,6 @@ struct Relative {
 }
 
 impl Relative {
-    fn new(changes: [f64; N_SOURCES], n_touching: Option<usize>, is_bonded: bool) -> Self {
-        // The probe near the tool shows a part of it.
-        let least = n_touching.map_or(0.0, |n| CONTACT / n.max(1) as f64);
-        Self {
-            changes,
-            contact: (least - changes[Source::Near as usize].abs()).max(0.0),
-            is_stand_in: false,
-            is_bonded,
-        }
-    }
-
     fn half_width(&self, load_step: f64) -> f64 {
         wide(self.changes, self.is_bonded) + SAFETY * (self.contact + load_step.abs())
     }
@@ -300,11 +306,8 @@ impl ErrorBars {
             (Some((_, at)), None) | (None, Some((_, at))) => (at.changes, at.is_stand_in),
             (None, None) => return None,
         };
-        let is_bonded = self.deepest().is_bonded;
-        Some(Relative {
-            is_stand_in,
-            ..Relative::new(changes, n_touching, is_bonded)
-        })
+        let at = self.deepest();
+        Some(at.with_changes(changes, is_stand_in, n_touching))
     }
 }
 
