@@ -58,6 +58,11 @@ impl Tool {
         }
     }
 
+    /// Whether the tool touches more than a node: only then has its force a limit for ever finer meshes.
+    pub fn has_size(&self) -> bool {
+        self.contact_radius() > 0.0
+    }
+
     /// Whether the tool has a flat face with a rounded edge.
     pub fn is_flat(&self) -> bool {
         self.rounded_edge().is_some()

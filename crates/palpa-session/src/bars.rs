@@ -168,6 +168,7 @@ fn shown(press: &Press, bar: &LiveBar) -> ErrorBar {
         near: change(Source::Near),
         skin_far: change(Source::SkinFar),
         levels_deep: change(Source::LevelsDeep),
+        contact: bar.probed.contact().unwrap_or(0.0),
     }
 }
 

@@ -850,6 +850,12 @@ export interface components {
         } | {
             /**
              * Format: double
+             * @description What finer meshes of the same few vertices in contact with a round tool do not show, as a
+             *     share of the force.
+             */
+            contact: number;
+            /**
+             * Format: double
              * @description Depth at which the bar was computed.
              */
             depth: number;

@@ -76,13 +76,14 @@ function ErrorBarWords() {
   );
 }
 
-function barTitle(bar: { half_width: number; depth: number; near: number; skin_far: number; levels_deep: number }): string {
+function barTitle(bar: { half_width: number; depth: number; near: number; skin_far: number; levels_deep: number; contact: number }): string {
   return t('readout.bar_title', {
     half: percent(bar.half_width),
     depth: inMillimetres(bar.depth),
     near: signed(bar.near),
     skin: signed(bar.skin_far),
     deep: signed(bar.levels_deep),
+    contact: percent(bar.contact),
   });
 }
 

@@ -83,6 +83,9 @@ pub enum ErrorBar {
         skin_far: f64,
         /// The same for deep intervals between levels.
         levels_deep: f64,
+        /// What finer meshes of the same few vertices in contact with a round tool do not show, as a
+        /// share of the force.
+        contact: f64,
     },
     /// There is no error bar at this place and depth.
     Failed {

@@ -199,7 +199,7 @@ pub fn choose_mesh(
     goal: &Goal,
     mut progress: impl FnMut(&[Round]) -> bool,
 ) -> anyhow::Result<Option<(Indentation, MeshChoice)>> {
-    if scene.tool.contact_radius() <= 0.0 {
+    if !scene.tool.has_size() {
         anyhow::bail!(
             "a tool of a single node has a force that grows without limit as the mesh gets finer, so that no accuracy \
              can be reached; press with a disc or another shape"

@@ -44,6 +44,8 @@ const STEP_EXTRAPOLATION: f64 = 2.0 / 3.0;
 /// meshes of the same few vertices do not show. Against spheres on layers whose forces are known
 /// exactly (5 to 40 vertices), errors are 0.6 in the median, and 2.4 where a ring has just touched.
 const CONTACT: f64 = 0.7;
+/// Name of that contribution, in English.
+pub const FEW_VERTICES: &str = "few vertices in contact";
 /// Factor on a change that stands in for that at twice the depth: changes grow to at most 1.6 times
 /// where both are known (a bonded disc pressed by more than its radius).
 const STAND_IN: f64 = 2.0;

@@ -5,7 +5,7 @@
 //! ```
 //! The way has five parts: along the motion across the skin, or, if it stays at one place, by depth.
 
-use palpa::accuracy::Source;
+use palpa::accuracy::{FEW_VERTICES, Source};
 use palpa::live::{LiveBar, LiveScene, Look, Moment, NoBar, Prober, Seen, across};
 use palpa_rt::{Engine, Reader};
 use palpa_scene::Scene;
@@ -304,7 +304,7 @@ impl BarFigures {
         let (source, change) = (Source::ALL.into_iter().zip(changes))
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
         if let Some(contact) = self.contact.filter(|&contact| contact > change.abs()) {
-            return Some(format!("few vertices in contact {:.1} %", 100.0 * contact));
+            return Some(format!("{FEW_VERTICES} {:.1} %", 100.0 * contact));
         }
         Some(format!("{source} {:+.1} %", 100.0 * change))
     }

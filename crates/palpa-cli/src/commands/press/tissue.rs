@@ -56,7 +56,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
 
     let chosen = choice.as_ref().and_then(|choice| choice.bars.clone());
     let is_probed_again = chosen.is_none() || job.args.lump_change;
-    let with_bars = is_probed_again && !job.args.no_error_bar && has_bars(&indentation);
+    let with_bars = is_probed_again && !job.args.no_error_bar && scene.tool.has_size();
     let (mut recorded, probed) = record(job, &indentation, with_bars)?;
     let (probed, lump_change) = probed.map(|found| (found.bars, found.lumps)).unzip();
     let bars = probed.or(chosen);
@@ -99,11 +99,6 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         (_, SampleOutcome::Converged) => Outcome::Done,
         _ => Outcome::NotGood,
     })
-}
-
-/// Whether the force has a limit for ever finer meshes: that of a single node has none.
-fn has_bars(indentation: &Indentation) -> bool {
-    indentation.prepared.scene.tool.contact_radius() > 0.0
 }
 
 /// Materials of the layers, then of the lumps.

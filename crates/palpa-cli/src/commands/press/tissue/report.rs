@@ -10,7 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
-use palpa::accuracy::{ErrorBars, LumpChange, MeshChoice, Source};
+use palpa::accuracy::{ErrorBars, FEW_VERTICES, LumpChange, MeshChoice, Source};
 use palpa::build::in_mm;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
@@ -293,8 +293,7 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
     }
     changes.extend((bars.load_step).map(|step| format!("load steps {:+.1} %", 100.0 * step)));
     let contact = probed.contact().filter(|&contact| contact > 0.0);
-    changes
-        .extend(contact.map(|contact| format!("few vertices in contact {:.1} %", 100.0 * contact)));
+    changes.extend(contact.map(|contact| format!("{FEW_VERTICES} {:.1} %", 100.0 * contact)));
     let half_width = bars.half_width(probed);
     let bar = half_width.map_or_else(
         || "not known, because a probe failed".to_owned(),
