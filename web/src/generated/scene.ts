@@ -47,7 +47,7 @@ export interface components {
              *       "alpha": 0.8,
              *       "dynamics": "quasi-static",
              *       "kind": "tissue",
-             *       "tolerance": 0.000001
+             *       "tolerance": 0.00001
              *     }
              */
             model?: components["schemas"]["ModelTable"];
@@ -411,8 +411,8 @@ export interface components {
             kind?: components["schemas"]["ModelKind"];
             /**
              * Format: double
-             * @description Tolerance of the force balance: the largest unbalanced force at a free node, relative to the forces in the body, 0.000000000001 to 0.001. Default: 0.000001.
-             * @default 0.000001
+             * @description Tolerance of the force balance: the largest unbalanced force at a free node, relative to the forces in the body, 0.000000000001 to 0.001. The force on the tool is usually closer than that. Default: 0.00001.
+             * @default 0.00001
              */
             tolerance?: number;
         };

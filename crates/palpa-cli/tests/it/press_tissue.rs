@@ -647,6 +647,16 @@ fn a_mesh_is_chosen_for_an_accuracy_or_refused() {
         .unwrap();
     let bar = number(&deepest["error_bar_n"]) / number(&deepest["force_n"]);
     assert!(half_width <= 0.4 && (bar - half_width).abs() < 0.01 * bar);
+    // In relaxing tissue, load steps are part of the bar here too.
+    let relaxing = r#"name = "gel", young = "20 kPa", poisson = 0.45, prony = { terms = [{ g = 0.6, tau = "0.1 s" }] }"#;
+    let relaxing = SceneText::block(SIZE, 8.0)
+        .layer(Layer::of(relaxing).levels(2))
+        .disc(10.0)
+        .press(2.0)
+        .set("press", "step", "1 mm");
+    let report = press.report(&relaxing, &["--frames", "0", "--accuracy", "40 %"]);
+    let load_step = number(&report["error_bars"]["load_step"]);
+    assert!(load_step.abs() > 1e-6, "{load_step}");
     let scene = scene.set("mesh", "max_vertices", Toml::raw("100"));
     let press = tissue();
     let file = press.bench.file("few", scene);

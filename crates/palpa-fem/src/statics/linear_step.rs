@@ -12,10 +12,15 @@ use crate::system::Hold;
 const GMRES_TOLERANCE: f64 = 1e-6;
 /// Largest basis for such a system.
 const GMRES_VECTORS: usize = 40;
-/// Tolerance and largest basis with the factor of an earlier iteration. A smaller residual would
+/// Least tolerance and largest basis with the factor of an earlier iteration. A smaller residual would
 /// save no iteration, and with a larger basis a new factor is cheaper.
 const STALE_TOLERANCE: f64 = 1e-3;
 const STALE_VECTORS: usize = 16;
+/// In the last iteration, a linear system need not be solved better than the forces are to balance:
+/// the residual of the forces after it, as a share of their tolerance, and the largest tolerance of
+/// the linear system.
+const LAST: f64 = 0.3;
+const LOOSEST: f64 = 0.1;
 /// Near an equilibrium: the residual at which a system counts as solved, and the one up to which the
 /// step is taken all the same. The first factor is kept as long as this works, since a factor is the
 /// dearest part of a solve of few iterations.
@@ -60,7 +65,8 @@ impl Newton<'_> {
             let ([tolerance, accepted], most) = if self.params.is_near {
                 (NEAR_TOLERANCES, NEAR_VECTORS)
             } else if is_stale || sliding.is_empty() {
-                ([STALE_TOLERANCE; 2], STALE_VECTORS)
+                let last = LAST * self.params.tolerance / self.residual;
+                ([last.clamp(STALE_TOLERANCE, LOOSEST); 2], STALE_VECTORS)
             } else {
                 ([GMRES_TOLERANCE; 2], GMRES_VECTORS)
             };

@@ -25,6 +25,7 @@ use serde::Serialize;
 pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
 pub use self::descent::{Descent, Stops};
 pub use self::lumps::{LumpChange, change_by_lumps};
+use crate::press::Phase;
 use crate::press::tissue::Sample;
 
 /// Factor between a contribution and its share of the bar. Halving a size shows two thirds of an error
@@ -56,6 +57,9 @@ const MOST_CONTACT: f64 = 0.02;
 /// Depths that are probed, as shares of the deepest.
 const DEPTHS: [f64; 3] = [1.0, 0.5, 0.25];
 
+/// On the way back, the force is extrapolated only if it differs from that of the press down by no more
+/// than this share.
+const SAME_FORCE: f64 = 0.01;
 /// Depths closer than this are the same, mm.
 const SAME_DEPTH: f64 = 1e-9;
 
@@ -280,14 +284,28 @@ impl ErrorBars {
         let relative = self.relative_at(sample.depth_mm, n_touching)?;
         let load_step = self.load_step.unwrap_or(0.0);
         let correction = EXTRAPOLATION * relative.sum() + STEP_EXTRAPOLATION * load_step;
-        let has_order = relative.has_order(load_step);
+        let is_as_before = (sample.force_n - force).abs() <= SAME_FORCE * force.abs();
+        let has_order =
+            relative.has_order(load_step) && (sample.phase != Phase::Retract || is_as_before);
+        let of = Self::size(sample, force);
         Some(ErrorBar {
-            half_width_n: relative.half_width(load_step) * force.abs(),
-            extrapolated_n: has_order.then_some(sample.force_n + correction * force),
-            contributions_n: relative.changes.map(|change| change * force),
-            contact_n: relative.contact * force,
-            load_step_n: load_step * force,
+            half_width_n: relative.half_width(load_step) * of.abs(),
+            extrapolated_n: has_order.then_some(sample.force_n + correction * of),
+            contributions_n: relative.changes.map(|change| change * of),
+            contact_n: relative.contact * of,
+            load_step_n: load_step * of,
         })
+    }
+
+    /// The force of which relative contributions are shares: while a tool rests, relaxing tissue keeps
+    /// its relative error; on the way back, no less than the force of the press down at that depth.
+    fn size(sample: &Sample, pressed_down: f64) -> f64 {
+        let is_larger = sample.force_n.abs() > pressed_down.abs();
+        match sample.phase {
+            Phase::Load => pressed_down,
+            Phase::Retract if !is_larger => pressed_down,
+            Phase::Hold | Phase::Retract => sample.force_n,
+        }
     }
 
     /// Contributions at a depth. `n_touching` as in [`Probed`].

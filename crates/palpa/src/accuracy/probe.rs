@@ -91,6 +91,9 @@ pub(super) fn run(
         n_nodes = n_nodes.max(probe.model.n_nodes());
         // From the least depth on, so that each probe starts with the correction of the one before.
         for (probed, base) in probed.iter_mut().zip(bases).rev() {
+            if !progress(i, Source::ALL.len()) {
+                return None;
+            }
             let found = probe.force(press, base.depth, &part, &base.deformed);
             probed.changes[i] = found.map(|found| (found - base.force_n) / base.force_n);
             if found.is_some() && base.depth >= bases[0].depth {

@@ -9,6 +9,7 @@ use palpa::accuracy::{
     Descent, End, ErrorBars, Goal, MeshChoice, SAFETY, Stops, change_by_lumps, choose_mesh,
     loading, wide,
 };
+use palpa::press::Phase;
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa::scene::Scene;
 use palpa_testkit::{Layer, Lump, Scene as SceneText, Value};
@@ -114,6 +115,8 @@ fn probes_can_be_given_up() {
         probe < 1
     });
     assert_eq!(bars, None);
+    // Before each depth too.
+    asked.dedup();
     assert_eq!(asked, [(0, 3), (1, 3)]);
 }
 
@@ -164,6 +167,36 @@ fn halved_load_steps_change_the_force_as_longer_ones_foretell() {
     assert_eq!(long.load_step_change(at_long, || false), None);
     // Elastic tissue without friction has no history.
     assert_eq!(set_up(&block()).load_step_change(1.0, || true), None);
+}
+
+#[test]
+fn the_bars_of_relaxed_tissue_fit_its_own_force() {
+    let relaxing = r#"name = "gel", young = "20 kPa", poisson = 0.45, prony = { terms = [{ g = 0.6, tau = "0.1 s" }] }"#;
+    let press = set_up(
+        &SceneText::block([40.0, 40.0, 20.0], 10.0)
+            .layer(Layer::of(relaxing).levels(2))
+            .disc(8.0)
+            .press(2.0)
+            .set("press", "speed", "10 mm/s")
+            .set("press", "hold", "0.5 s")
+            .set("press", "step", "0.5 mm"),
+    );
+    let mut record = run(&press);
+    let bars = bars_of(&record, |_, _| true).unwrap();
+    bars.enter(&mut record.samples);
+    let share = |s: &Sample| s.error_bar_n.unwrap() / s.force_n.abs();
+    let extrapolated = |s: &Sample| s.extrapolated_n.unwrap() / s.force_n;
+    let deepest = deepest(&record);
+    let of = |phase: Phase| record.samples.iter().filter(move |s| s.phase == phase);
+    let held = of(Phase::Hold).last().unwrap();
+    assert!(held.force_n < 0.9 * deepest.force_n);
+    assert!((share(held) - share(&deepest)).abs() < 1e-9);
+    assert!((extrapolated(held) - extrapolated(&deepest)).abs() < 1e-9);
+    // The tissue has not come back: the disc pulls.
+    let last = of(Phase::Retract).last().unwrap();
+    assert!(last.force_n < -0.05, "{}", last.force_n);
+    assert!(share(last) > 0.01, "{}", share(last));
+    assert!(of(Phase::Retract).all(|s| s.extrapolated_n.is_none()));
 }
 
 #[test]

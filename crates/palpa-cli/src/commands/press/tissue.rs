@@ -13,12 +13,13 @@ use palpa_scene::Scene;
 
 use self::fields::error_grid;
 use self::pictures::draw_pictures;
-use self::record::{record, table};
+use self::record::{Probing, Recorded, record, table};
 use self::report::{PressReport, announce, conclude, facts};
 use self::result::result_of;
 use super::Job;
 use super::files::{ERROR_BARS, remove_older};
 use crate::commands::Outcome;
+use palpa::accuracy::ErrorBars;
 use palpa::press::tissue::{Indentation, SampleOutcome};
 use palpa::{Note, Prepared};
 
@@ -55,11 +56,22 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     announce(job, &indentation, &materials)?;
 
     let chosen = choice.as_ref().and_then(|choice| choice.bars.clone());
-    let is_probed_again = chosen.is_none() || job.args.lump_change;
-    let with_bars = is_probed_again && !job.args.no_error_bar && scene.tool.has_size();
-    let (mut recorded, probed) = record(job, &indentation, with_bars)?;
+    let probing = if job.args.no_error_bar || !scene.tool.has_size() {
+        Probing::Nothing
+    } else if chosen.is_none() || job.args.lump_change {
+        Probing::Everything
+    } else {
+        Probing::LoadSteps
+    };
+    let Recorded {
+        record: mut recorded,
+        bars: probed,
+        load_step,
+    } = record(job, &indentation, probing)?;
     let (probed, lump_change) = probed.map(|found| (found.bars, found.lumps)).unzip();
-    let bars = probed.or(chosen);
+    let bars = probed
+        .or(chosen)
+        .map(|bars| ErrorBars { load_step, ..bars });
     if let Some(bars) = &bars {
         bars.enter(&mut recorded.samples);
         out.write_with(ERROR_BARS, |w| error_grid(&indentation, bars).write(w))?;

@@ -19,15 +19,33 @@ pub(super) struct Bars {
     pub(super) lumps: Option<LumpChange>,
 }
 
+/// What is computed for the error bars beside the press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Probing {
+    Nothing,
+    /// The contribution of the load steps only: the others are known.
+    LoadSteps,
+    Everything,
+}
+
+/// What was recorded.
+pub(super) struct Recorded<'a> {
+    pub(super) record: Record<'a>,
+    /// `None` without [`Probing::Everything`], or if it was interrupted.
+    pub(super) bars: Option<Bars>,
+    /// The contribution of the load steps, as in [`ErrorBars::load_step`].
+    pub(super) load_step: Option<f64>,
+}
+
 /// Runs the script at every speed. Every sample goes to the table at once, so that an interrupted
-/// run leaves a valid table. With `with_bars`, the first press down is probed while its rest and the
-/// way back are computed, without its lumps too if their change is asked for; there are no bars if that
-/// was interrupted.
+/// run leaves a valid table. The first press down is probed while its rest and the way back are
+/// computed, without its lumps too if their change is asked for.
 pub(super) fn record<'a>(
     job: &Job<'_>,
     indentation: &'a Indentation,
-    with_bars: bool,
-) -> anyhow::Result<(Record<'a>, Option<Bars>)> {
+    probing: Probing,
+) -> anyhow::Result<Recorded<'a>> {
+    let with_bars = probing == Probing::Everything;
     let n_samples = indentation.n_samples() * indentation.speeds.len();
     let progress = job.context.progress(n_samples, "pressing");
     let mut recorder = Recorder::new(job, indentation, with_bars, &progress)?;
@@ -38,7 +56,9 @@ pub(super) fn record<'a>(
     let context = job.context;
     let is_deepest = recorder.record.samples.len() == n_down;
     let last = (recorder.record.samples.last()).filter(|s| is_deepest && s.outcome.is_converged());
-    let at_deepest = last.filter(|_| with_bars).map(|s| s.force_n);
+    let at_deepest = last
+        .filter(|_| probing != Probing::Nothing)
+        .map(|s| s.force_n);
     let goes_on = || !context.is_interrupted();
     let probe = || {
         let Some(descent) = stops.and_then(|stops| Descent::at(indentation, &stops)) else {
@@ -59,16 +79,12 @@ pub(super) fn record<'a>(
         move || recorder.finish(run),
         || rayon::join(probe, change_steps),
     );
-    let record = record?;
-    let bars = bars?.map(|found| Bars {
-        bars: ErrorBars {
-            load_step,
-            ..found.bars
-        },
-        ..found
-    });
     drop(progress);
-    Ok((record, bars))
+    Ok(Recorded {
+        record: record?,
+        bars: bars?,
+        load_step,
+    })
 }
 
 struct Recorder<'a, 'j> {

@@ -10,7 +10,7 @@ use super::super::Job;
 use super::super::words::{say_layers, status_word};
 use super::result::PressResult;
 use crate::table::Table;
-use palpa::accuracy::{ErrorBars, FEW_VERTICES, LumpChange, MeshChoice, Source};
+use palpa::accuracy::{ErrorBars, FEW_VERTICES, LumpChange, MeshChoice, SAFETY, Source};
 use palpa::build::in_mm;
 use palpa::press::tissue::{Indentation, RunResult, Sample};
 
@@ -327,7 +327,15 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
             100.0 * change.change_n / force
         ))?;
     }
-    if half_width.is_some_and(|half| half > WANTED) && report.mesh_choice.is_none() {
+    let steps = 2.0 * SAFETY * bars.load_step.map_or(0.0, f64::abs);
+    let asked = report.mesh_choice.map_or(WANTED, |choice| choice.accuracy);
+    let is_too_wide = half_width.is_some_and(|half| half > asked);
+    if is_too_wide && (report.mesh_choice.is_some() || half_width.is_some_and(|half| steps > half))
+    {
+        job.context.say(
+            "smaller load steps make the error bar narrower: --step with less than the step of this press",
+        )?;
+    } else if is_too_wide {
         job.context.say(format!(
             "to have an error bar of at most ±{:.0} %: --accuracy \"{:.0} %\" chooses a mesh for it",
             100.0 * WANTED,
