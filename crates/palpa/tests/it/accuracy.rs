@@ -101,7 +101,8 @@ fn the_force_of_a_finer_mesh_lies_within_the_bar() {
             .iter()
             .filter(|s| s.depth_mm > 0.0 && s.depth_mm < 2.0))
         .partition(|s| s.phase == palpa::press::Phase::Load);
-        assert!((down[0].error_bar_n.unwrap() - back[0].error_bar_n.unwrap()).abs() < 1e-9);
+        let [down, back] = [down, back].map(|samples| samples[0].error_bar_n.unwrap());
+        assert!((down - back).abs() < 1e-4 * down, "{name}: {down}, {back}");
     }
 }
 
