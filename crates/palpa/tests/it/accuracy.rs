@@ -189,12 +189,12 @@ fn the_bars_of_relaxed_tissue_fit_its_own_force() {
     let extrapolated = |s: &Sample| s.extrapolated_n.unwrap() / s.force_n;
     let deepest = deepest(&record);
     let of = |phase: Phase| record.samples.iter().filter(move |s| s.phase == phase);
-    let held = of(Phase::Hold).last().unwrap();
+    let held = of(Phase::Hold).next_back().unwrap();
     assert!(held.force_n < 0.9 * deepest.force_n);
     assert!((share(held) - share(&deepest)).abs() < 1e-9);
     assert!((extrapolated(held) - extrapolated(&deepest)).abs() < 1e-9);
     // The tissue has not come back: the disc pulls.
-    let last = of(Phase::Retract).last().unwrap();
+    let last = of(Phase::Retract).next_back().unwrap();
     assert!(last.force_n < -0.05, "{}", last.force_n);
     assert!(share(last) > 0.01, "{}", share(last));
     assert!(of(Phase::Retract).all(|s| s.extrapolated_n.is_none()));
