@@ -7,7 +7,7 @@ use crate::columns::Structure;
 use crate::element::{GroupGeometry, Phase};
 use crate::error::FemError;
 use crate::materials::{Materials, assign};
-use crate::pairing::pair_triangles;
+use crate::pairing::{Pairing, pair_triangles_like};
 use crate::system::Hold;
 
 /// Nodes whose movement is always restricted.
@@ -62,7 +62,7 @@ pub struct Model {
     /// Area of skin that each skin vertex stands for, m².
     pub(crate) skin_areas: Vec<f64>,
     pub(crate) params: ModelParams,
-    n_singles: usize,
+    pairing: Pairing,
     /// Whether any material relaxes or has tension at rest.
     pub(crate) has_memory: bool,
 }
@@ -80,6 +80,23 @@ impl Model {
         supports: &Supports,
         params: ModelParams,
     ) -> Result<Self, FemError> {
+        Self::build_like(body, materials, supports, params, &[])
+    }
+
+    /// The same with triangles paired as in another model, as far as they are the same: for a part of
+    /// its body, or a finer mesh of it. `pairs` are the corners of its pairs, as in
+    /// [`pair_triangles_like`]. Without them, the forces of two models with the same triangles may
+    /// differ by 1 %.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_like(
+        body: &LayeredBody,
+        materials: &Materials,
+        supports: &Supports,
+        params: ModelParams,
+        pairs: &[[u32; 4]],
+    ) -> Result<Self, FemError> {
         if !(0.0..1.0).contains(&params.alpha) {
             return Err(FemError::Alpha {
                 alpha: params.alpha,
@@ -95,7 +112,7 @@ impl Model {
         }
         let base_is_fixed = (0..body.n_nodes()).all(|n| !body.is_base(n) || holds[n].n == 3);
         let n_free_levels = body.n_levels - usize::from(base_is_fixed);
-        let pairing = pair_triangles(&body.skin);
+        let pairing = pair_triangles_like(&body.skin, pairs);
         let structure = Structure::build(&body.skin, &pairing, body.n_levels, n_free_levels)?;
         let geometries = geometries(body, &structure)?;
         let (phases, first_phase) = assign(body, &structure, &geometries, materials);
@@ -112,7 +129,7 @@ impl Model {
                 .any(|m| m.prony.is_some() || m.prestress != 0.0),
             body: body.clone(),
             materials: materials.materials.clone(),
-            n_singles: pairing.singles.len(),
+            pairing,
             structure,
             geometries,
             phases,
@@ -147,7 +164,12 @@ impl Model {
     /// Number of skin triangles without a partner. Prisms under them are too stiff if the tissue is
     /// nearly incompressible.
     pub fn n_single_triangles(&self) -> usize {
-        self.n_singles
+        self.pairing.singles.len()
+    }
+
+    /// How the triangles of the skin are paired.
+    pub fn pairing(&self) -> &Pairing {
+        &self.pairing
     }
 
     /// Area of skin that each skin vertex stands for at rest, m². `[n_vertices]`

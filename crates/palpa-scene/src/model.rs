@@ -82,15 +82,19 @@ pub struct Mesh {
 impl Mesh {
     /// Least automatic edge length, m.
     const FINEST: f64 = 0.5e-3;
+    /// Why no accuracy can be reached with a tool of a single node.
+    pub(crate) const NO_LIMIT: &str = "an accuracy cannot be reached with a tool of a single node, because its force has \
+                                       no limit on ever finer meshes; choose a tool with a size";
     /// Largest automatic edge length near a tool, m.
     const COARSEST: f64 = 10e-3;
 
-    /// Checks accuracy and time limit against the ranges of the scene file, for a program that has
-    /// set its own values.
+    /// Checks accuracy and time limit against the ranges of the scene file, and against `tool`, for a
+    /// program that has set its own values.
     ///
     /// # Errors
-    /// The value that is out of range, and the range; or that the mesh may not be refined.
-    pub fn check(&self) -> Result<(), String> {
+    /// The value that is out of range, and the range; that the mesh may not be refined; or that the
+    /// tool has no size.
+    pub fn check(&self, tool: &Tool) -> Result<(), String> {
         use crate::limits::{ACCURACY, SEARCH_TIME};
         use crate::units::{Share, Time};
         let accuracy = self.accuracy.map(Share::from_si);
@@ -109,6 +113,9 @@ impl Mesh {
             return Err(
                 "an accuracy needs a mesh that may be refined; remove refine = false".to_owned(),
             );
+        }
+        if accuracy.is_some() && !tool.has_size() {
+            return Err(Self::NO_LIMIT.to_owned());
         }
         Ok(())
     }

@@ -64,17 +64,18 @@ pub(crate) fn parse(text: &str, base_dir: &Path, file: Option<&Path>) -> Result<
     let reader = Reader { document, base_dir };
     let press = reader.press(&written.press)?;
     let layers = reader.layers(written.layer)?;
+    let tool = reader.tool(&written.tool)?;
     let scene = Scene {
         base_dir: base_dir.to_owned(),
         body: reader.body(written.body, press.target)?,
         layers,
         lumps: reader.lumps(written.lump, press.target)?,
-        tool: reader.tool(&written.tool)?,
         device: motion::device(&written.device),
         motion: reader.motion(&written.motion, &press)?,
         press,
         model: reader.model(&written.model)?,
-        mesh: reader.mesh(&written.mesh)?,
+        mesh: reader.mesh(&written.mesh, &tool)?,
+        tool,
         reference: reader.reference(&written.reference)?,
     };
     reader.depths(&scene)?;

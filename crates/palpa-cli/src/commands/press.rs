@@ -9,7 +9,7 @@ mod words;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow, bail};
+use anyhow::{Context as _, Error, bail};
 use palpa_scene::units::{Length, Share, Time, Velocity};
 use palpa_scene::{Generator, ModelKind, Scene, Skin, Target};
 
@@ -39,16 +39,16 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with = "at")]
     vertex: Option<u32>,
     /// Depth of the press, with a unit: "8 mm". Steps scale with it unless --step is given
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     depth: Option<Length>,
     /// Speed of the press, with a unit: "10 mm/s"
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     speed: Option<Velocity>,
     /// Time to hold at the full depth, with a unit: "0.5 s"
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     hold: Option<Time>,
     /// Depth from one result to the next, with a unit: "0.5 mm"
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     step: Option<Length>,
     /// Stop at the full depth; do not retract
     #[arg(long)]
@@ -58,10 +58,10 @@ pub struct Args {
     no_error_bar: bool,
     /// Choose the mesh so that the error bar at the deepest is no wider than this share of the
     /// force: "3 %"
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
     accuracy: Option<Share>,
     /// Longest time for the choice of the mesh, with a unit: "60 s"
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     max_time: Option<Time>,
     /// Also press the same mesh without its lumps, and give the change of the force by them, with an
     /// error bar of its own
@@ -86,7 +86,10 @@ enum Model {
 /// # Errors
 /// If the scene or body is bad, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let scene = adjusted_scene(args)?;
+    let Adjusted {
+        scene,
+        is_near_tool_replaced,
+    } = adjusted_scene(args)?;
     let out = context.out_dir()?;
     let scene_name = args
         .scene
@@ -98,6 +101,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         out,
         scene: &scene,
         scene_name: &scene_name,
+        is_near_tool_replaced,
     };
     match scene.model.kind {
         ModelKind::Tissue => tissue::run(&job),
@@ -113,10 +117,18 @@ struct Job<'a> {
     out: &'a OutDir,
     scene: &'a Scene,
     scene_name: &'a str,
+    /// As in [`Adjusted`].
+    is_near_tool_replaced: bool,
 }
 
 /// The scene with the changes of the command line.
-fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
+struct Adjusted {
+    scene: Scene,
+    /// Whether the accuracy of the command line replaces the scene's edge length near the tool.
+    is_near_tool_replaced: bool,
+}
+
+fn adjusted_scene(args: &Args) -> anyhow::Result<Adjusted> {
     let mut scene = match &args.scene {
         Some(path) if is_surface(path) => bail!(
             "\"{}\" is a surface, not a scene; look at it with `palpa check`, or name it as `surface` in a scene (see \
@@ -158,12 +170,16 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
         press.hold = hold.si();
     }
     press.retract &= !args.no_retract;
+    let is_near_tool_replaced = args.accuracy.is_some() && scene.mesh.near_tool.is_some();
     set_accuracy(&mut scene, args)?;
     let press = &scene.press;
     if let Err(problem) = press.check() {
         bail!("{problem}; see --depth, --step, --speed and --hold");
     }
-    Ok(scene)
+    Ok(Adjusted {
+        scene,
+        is_near_tool_replaced,
+    })
 }
 
 /// Sets accuracy and time limit from the command line.
@@ -175,10 +191,21 @@ fn set_accuracy(scene: &mut Scene, args: &Args) -> anyhow::Result<()> {
         mesh.near_tool = None;
     }
     if let Some(time) = args.max_time {
+        if mesh.accuracy.is_none() {
+            bail!(
+                "--max-time limits the choice of a mesh, and there is none without an accuracy; add --accuracy, or leave it out"
+            );
+        }
         mesh.max_time = Some(time.si());
     }
-    mesh.check()
-        .map_err(|problem| anyhow!("{problem}; see --accuracy and --max-time"))?;
+    mesh.check(&scene.tool).map_err(Error::msg)?;
+    if let Some(accuracy) = mesh.accuracy.filter(|_| args.no_error_bar) {
+        bail!(
+            "the scene asks for an accuracy of {}, and the mesh for it is chosen by its error bar; leave out --no-error-bar, \
+             or remove `accuracy` from [mesh]",
+            Share::from_si(accuracy)
+        );
+    }
     if mesh.accuracy.is_some() && scene.model.kind == ModelKind::Reference {
         bail!(
             "--accuracy needs the model `tissue`; the method of 2009 has the mesh of its surface"

@@ -5,6 +5,7 @@
 mod bench;
 mod check;
 mod cli;
+mod error_bars;
 mod export;
 mod live;
 mod mesh_moves;

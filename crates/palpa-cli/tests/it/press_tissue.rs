@@ -14,7 +14,7 @@ use vtkio::model::{Attribute, DataSet, Piece};
 
 use crate::press::Press;
 
-const SIZE: [f64; 3] = [60.0, 60.0, 24.0];
+pub(crate) const SIZE: [f64; 3] = [60.0, 60.0, 24.0];
 
 /// A small block, a fraction of a second a step.
 fn block() -> SceneText {
@@ -31,7 +31,7 @@ fn tense() -> SceneText {
     block().with_layer(0, |soft| soft.set("prestress", "3 kPa"))
 }
 
-fn tissue() -> Press {
+pub(crate) fn tissue() -> Press {
     Press::with("tissue")
 }
 
@@ -39,13 +39,13 @@ fn report(press: &Press, scene: &SceneText) -> Value {
     press.report(scene, &["--frames", "0"])
 }
 
-fn number(value: &Value) -> f64 {
+pub(crate) fn number(value: &Value) -> f64 {
     value
         .as_f64()
         .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-fn column(report: &Value, name: &str) -> Vec<f64> {
+pub(crate) fn column(report: &Value, name: &str) -> Vec<f64> {
     let samples = report["samples"].as_array().unwrap();
     samples.iter().map(|s| number(&s[name])).collect()
 }
@@ -193,7 +193,7 @@ fn check_table(table: &str, report: &Value) {
 }
 
 /// The point and cell arrays of a file for ParaView.
-fn arrays(path: &std::path::Path) -> [Vec<Attribute>; 2] {
+pub(crate) fn arrays(path: &std::path::Path) -> [Vec<Attribute>; 2] {
     let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(path).unwrap().data else {
         panic!("no unstructured grid");
     };
@@ -203,7 +203,7 @@ fn arrays(path: &std::path::Path) -> [Vec<Attribute>; 2] {
     [piece.data.point, piece.data.cell]
 }
 
-fn array(attributes: &[Attribute], name: &str) -> Vec<f64> {
+pub(crate) fn array(attributes: &[Attribute], name: &str) -> Vec<f64> {
     let found = attributes.iter().find_map(|a| match a {
         Attribute::DataArray(array) if array.name == name => Some(array),
         _ => None,
@@ -553,124 +553,4 @@ fn the_shipped_scenes_without_files_can_be_set_up() {
         n += 1;
     }
     assert!(n >= 4, "{n}");
-}
-
-#[test]
-fn every_force_has_an_error_bar_unless_it_is_left_out() {
-    let press = tissue();
-    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
-        .press(2.0)
-        .set("press", "step", "1 mm");
-    let report = press.report(&scene, &["--frames", "0"]);
-    let samples = report["samples"].as_array().unwrap();
-    assert!(samples.len() > 3);
-    for sample in samples {
-        let pressed = number(&sample["depth_mm"]) > 0.0;
-        assert_eq!(number(&sample["error_bar_n"]) > 1e-9, pressed, "{sample}");
-        assert!(number(&sample["extrapolated_n"]).is_finite());
-    }
-    let result = &report["result"];
-    let (bar, at) = (
-        &result["secant_stiffness_error_bar_n_per_mm"],
-        number(&result["at_depth_mm"]),
-    );
-    let deepest = (samples.iter()).find(|s| number(&s["depth_mm"]) > at - 1e-6);
-    let expected = number(&deepest.unwrap()["error_bar_n"]) / at;
-    assert!((number(bar) - expected).abs() < 1e-9 * expected);
-    let without = press.report(&scene, &["--frames", "0", "--no-error-bar"]);
-    assert!(without["error_bars"].is_null());
-    let all = without["samples"].as_array().unwrap();
-    assert_eq!(all.len(), samples.len());
-    for (with, without) in samples.iter().zip(all) {
-        assert!(without["error_bar_n"].is_null());
-        assert_eq!(with["force_n"], without["force_n"]);
-    }
-}
-
-#[test]
-fn the_change_by_a_lump_has_an_error_bar_and_errors_their_place() {
-    let press = tissue();
-    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
-        .lump(Lump::sphere(4.0, "hard", "200 kPa").below(9.0))
-        .press(2.0)
-        .set("press", "step", "1 mm")
-        .set("press", "hold", "0 s");
-    let report = press.report(&scene, &["--frames", "0", "--lump-change"]);
-    let change = &report["lump_change"];
-    let forces = column(&report, "force_n");
-    let with = forces.iter().copied().fold(0.0, f64::max);
-    // The tissue is elastic, so that the press itself is the elastic one.
-    let sum = number(&change["without_n"]) + number(&change["change_n"]);
-    assert!((sum - with).abs() < 1e-4 * with, "{sum} N, {with} N");
-    let bar = number(&change["error_bar_n"]);
-    assert!(
-        number(&change["change_n"]) > 2.0 * bar && bar > 0.0,
-        "{change}"
-    );
-
-    let [point, _] = arrays(&press.bench.path("out/press/error_bars.vtu"));
-    let bars = array(&point, "displacement_error_bar");
-    assert_eq!(
-        bars.len() as u64,
-        report["press"]["n_nodes"].as_u64().unwrap()
-    );
-    let names = ["moved_near", "moved_skin_far", "moved_levels_deep"];
-    let moves = names.map(|name| array(&point, name));
-    for (i, bar) in bars.iter().enumerate() {
-        let sum: f64 = moves.iter().map(|of| of[i]).sum();
-        assert!((2.0 * sum - bar).abs() <= 1e-5 * bar);
-    }
-    // Errors are far smaller than the depth, and not everywhere.
-    let largest = bars.iter().copied().fold(0.0, f64::max);
-    assert!((1e-6..1e-3).contains(&largest), "{largest} m");
-    assert!(bars.iter().any(|&bar| bar < 1e-2 * largest));
-}
-
-#[test]
-fn a_mesh_is_chosen_for_an_accuracy_or_refused() {
-    let press = tissue();
-    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
-        .press(2.0)
-        .set("press", "step", "1 mm")
-        .set("press", "hold", "0 s");
-    let report = press.report(&scene, &["--frames", "0", "--accuracy", "40 %"]);
-    let choice = &report["mesh_choice"];
-    assert_eq!(choice["end"]["kind"], "reached");
-    let best = choice["best"].as_u64().unwrap() as usize;
-    assert_eq!(
-        choice["rounds"][best]["n_nodes"],
-        report["press"]["n_nodes"]
-    );
-    let half_width = number(&choice["rounds"][best]["half_width"]);
-    let deepest = (report["samples"].as_array().unwrap().iter())
-        .find(|s| number(&s["depth_mm"]) > 1.99)
-        .unwrap();
-    let bar = number(&deepest["error_bar_n"]) / number(&deepest["force_n"]);
-    assert!(half_width <= 0.4 && (bar - half_width).abs() < 0.01 * bar);
-    // In relaxing tissue, load steps are part of the bar here too.
-    let relaxing = r#"name = "gel", young = "20 kPa", poisson = 0.45, prony = { terms = [{ g = 0.6, tau = "0.1 s" }] }"#;
-    let relaxing = SceneText::block(SIZE, 8.0)
-        .layer(Layer::of(relaxing).levels(2))
-        .disc(10.0)
-        .press(2.0)
-        .set("press", "step", "1 mm");
-    let report = press.report(&relaxing, &["--frames", "0", "--accuracy", "40 %"]);
-    let load_step = number(&report["error_bars"]["load_step"]);
-    assert!(load_step.abs() > 1e-6, "{load_step}");
-    let scene = scene.set("mesh", "max_vertices", Toml::raw("100"));
-    let press = tissue();
-    let file = press.bench.file("few", scene);
-    let (code, tried, said) = press.run(&[file, "--accuracy", "0.2 %"]);
-    assert_eq!(code, 2, "{said}");
-    assert!(tried.contains("error bar of ±0.2 %"), "{tried}");
-    assert!(
-        said.contains("an accuracy of 0.2 % was not reached"),
-        "{said}"
-    );
-    assert!(said.contains("raise max_vertices"), "{said}");
-    let said = press.refusal(&[file, "--accuracy", "0 %"]);
-    assert!(
-        said.contains("outside the allowed range 0.2 % to 50 %"),
-        "{said}"
-    );
 }

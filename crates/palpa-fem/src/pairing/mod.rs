@@ -24,6 +24,8 @@
 mod matching;
 mod swaps;
 
+use std::collections::HashSet;
+
 use matching::Edge;
 use palpa_mesh::{Surface, Vec3};
 
@@ -56,7 +58,20 @@ pub struct Pairing {
 /// No pairs are made across edges that more than two triangles share, or across edges whose two
 /// triangles disagree on the outside.
 pub fn pair_triangles(skin: &Surface) -> Pairing {
-    let candidates = candidates(skin);
+    pair_triangles_like(skin, &[])
+}
+
+/// The same, but pairs with these corners are preferred, as in [`Pair::corners`]: where a part of the
+/// skin, or a finer one, has both triangles of a pair, most stay together. The number of pairs still
+/// comes first.
+pub fn pair_triangles_like(skin: &Surface, preferred: &[[u32; 4]]) -> Pairing {
+    let preferred: HashSet<[u32; 4]> = preferred.iter().map(|&corners| sorted(corners)).collect();
+    let mut candidates = candidates(skin);
+    for (pair, cost) in &mut candidates {
+        if preferred.contains(&sorted(pair.corners)) {
+            *cost = 0.0;
+        }
+    }
     let edges: Vec<Edge> = candidates
         .iter()
         .map(|&(pair, cost)| Edge {
@@ -75,6 +90,11 @@ pub fn pair_triangles(skin: &Surface) -> Pairing {
             .filter(|&t| mate[t as usize].is_none())
             .collect(),
     }
+}
+
+/// The corners in an order that does not depend on the order of the triangles.
+fn sorted([a, i, j, b]: [u32; 4]) -> [u32; 4] {
+    [a.min(b), i.min(j), i.max(j), a.max(b)]
 }
 
 /// How far the worst corner of a pair is from 90°, measured along the skin. rad

@@ -21,10 +21,11 @@ const STALE_VECTORS: usize = 16;
 /// the linear system.
 const LAST: f64 = 0.3;
 const LOOSEST: f64 = 0.1;
-/// Near an equilibrium: the residual at which a system counts as solved, and the one up to which the
-/// step is taken all the same. The first factor is kept as long as this works, since a factor is the
-/// dearest part of a solve of few iterations.
-const NEAR_TOLERANCES: [f64; 2] = [1e-2, 0.1];
+/// Near an equilibrium, the tolerance is [`LOOSEST`] until the last iteration, or the one before it, can
+/// be reached with no less than this: what the system is solved better, the next iteration does not
+/// keep. The first factor is kept as long as this works, since a factor is the dearest part of a solve
+/// of few iterations.
+const NEAR_TIGHTEST: f64 = 1e-2;
 const NEAR_VECTORS: usize = 30;
 
 impl Newton<'_> {
@@ -63,7 +64,13 @@ impl Newton<'_> {
             system.solve(structure, &carried, delta);
         } else {
             let ([tolerance, accepted], most) = if self.params.is_near {
-                (NEAR_TOLERANCES, NEAR_VECTORS)
+                let last = LAST * self.params.tolerance / self.residual;
+                let tolerance = if last < NEAR_TIGHTEST {
+                    LOOSEST
+                } else {
+                    last.min(LOOSEST)
+                };
+                ([tolerance, LOOSEST], NEAR_VECTORS)
             } else if is_stale || sliding.is_empty() {
                 let last = LAST * self.params.tolerance / self.residual;
                 ([last.clamp(STALE_TOLERANCE, LOOSEST); 2], STALE_VECTORS)

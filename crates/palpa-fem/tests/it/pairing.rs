@@ -1,6 +1,6 @@
 //! Pairing of triangles: as many as can be, near to rectangles, the same each time.
 
-use palpa_fem::pairing::{Pair, Pairing, pair_triangles, worst_corner};
+use palpa_fem::pairing::{Pair, Pairing, pair_triangles, pair_triangles_like, worst_corner};
 use palpa_mesh::generate::patch::patch;
 use palpa_mesh::generate::{
     GradedBlock, LevelStack, Outline, block_skin, cylinder, forearm, graded_block,
@@ -68,6 +68,58 @@ fn limbs_are_paired_to_the_last_triangle() {
         assert!(mean < 35.0 && max < 60.0);
         assert_eq!(pair_triangles(&skin), pairing, "the same each time");
     }
+}
+
+#[test]
+fn a_part_of_a_skin_keeps_the_pairs_of_the_whole() {
+    let block = GradedBlock {
+        outline: Outline::Square,
+        half_width: 50e-3,
+        centre: [0.0, 0.0],
+        ring_radius: None,
+        spacing: 4e-3,
+        inner_growth: 0.0,
+        growth: 0.0,
+        jitter: Some(1),
+    };
+    let levels = LevelStack {
+        depths: vec![0.0, 0.04],
+        interval_layer: vec![0],
+    };
+    let whole = graded_block(&block, &levels).skin;
+    let pairing = pair_triangles(&whole);
+    // Half of the skin, through some pairs.
+    let is_left: Vec<bool> = (0..whole.triangles.len())
+        .map(|t| whole.corners(t).iter().map(|p| p.x).sum::<f64>() < 0.0)
+        .collect();
+    let of_part = whole.triangles.iter().zip(&is_left);
+    let part = Surface {
+        points: whole.points.clone(),
+        triangles: of_part
+            .filter(|(_, left)| **left)
+            .map(|(t, _)| *t)
+            .collect(),
+    };
+    let corners = |pairs: &[Pair]| -> Vec<[u32; 4]> { pairs.iter().map(|p| p.corners).collect() };
+    let all = corners(&pairing.pairs);
+    let is_whole = |pair: &&Pair| pair.triangles.iter().all(|&t| is_left[t as usize]);
+    let n_whole = pairing.pairs.iter().filter(is_whole).count();
+    let n_same = |pairing: &Pairing| {
+        let same = corners(&pairing.pairs);
+        same.iter().filter(|corners| all.contains(corners)).count()
+    };
+    let (like, anew) = (pair_triangles_like(&part, &all), pair_triangles(&part));
+    for pairing in [&like, &anew] {
+        assert_sound(&part, pairing);
+        assert_eq!(pairing.singles.len(), part.triangles.len() % 2);
+    }
+    println!(
+        "{n_whole} pairs, {} kept, {} without preference",
+        n_same(&like),
+        n_same(&anew)
+    );
+    assert!(n_same(&like) as f64 > 0.9 * n_whole as f64);
+    assert!(n_same(&like) > n_same(&anew));
 }
 
 #[test]

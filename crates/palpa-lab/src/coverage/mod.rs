@@ -215,7 +215,11 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     let sizes = Sizes::of(&scene).context("a drawn tool has a size")?;
     let press = press_of(&scene, &grown, sizes)?;
     case.n_nodes = press.model.n_nodes();
-    let Some(descent) = Descent::from_rest(&press) else {
+    let descent = Descent::from_rest(&press, &mut progress);
+    if !progress() {
+        return Ok(None);
+    }
+    let Some(descent) = descent else {
         "no equilibrium".clone_into(&mut case.missing);
         return Ok(Some(case));
     };
@@ -239,10 +243,11 @@ pub fn run(seed: u64, mut progress: impl FnMut() -> bool) -> anyhow::Result<Opti
     let begin = Instant::now();
     let mut found = descent.only_deepest();
     for factors in FINER {
+        let next = finer(&scene, &grown, sizes, factors, &found, &mut progress);
         if !progress() {
             return Ok(None);
         }
-        match finer(&scene, &grown, sizes, factors, &found) {
+        match next {
             Ok((n_nodes, next)) => {
                 case.reference_nodes = Some(n_nodes);
                 case.reference_change_n = Some(next.force_n() - found.force_n());
@@ -273,6 +278,7 @@ fn finer(
     mut sizes: Sizes,
     [near, far]: [f64; 2],
     from: &Descent,
+    mut goes_on: impl FnMut() -> bool,
 ) -> anyhow::Result<(usize, Descent)> {
     let mut scene = scene.clone();
     let lump = scene.lumps.first();
@@ -281,8 +287,8 @@ fn finer(
         (graded.near, graded.far) = (near, far);
     }
     let press = press_of(&scene, grown, sizes)?;
-    let found = Descent::near(&press, from)
-        .or_else(|| Descent::from_rest(&press).map(Descent::only_deepest));
+    let found = Descent::near(&press, from, &mut goes_on)
+        .or_else(|| Descent::from_rest(&press, goes_on).map(Descent::only_deepest));
     let found = found.context("no equilibrium was found")?;
     Ok((press.model.n_nodes(), found))
 }

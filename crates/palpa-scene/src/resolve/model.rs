@@ -6,6 +6,7 @@ use crate::file::{DynamicsName, MeshTable, ModelTable, ReferenceTable};
 use crate::limits;
 use crate::model::{Damping, Dynamics, Mesh, Model};
 use crate::scene::Reference;
+use crate::tool::Tool;
 use crate::units::Length;
 
 impl Reader<'_> {
@@ -41,7 +42,7 @@ impl Reader<'_> {
         })
     }
 
-    pub(super) fn mesh(&self, mesh: &MeshTable) -> Result<Mesh, SceneError> {
+    pub(super) fn mesh(&self, mesh: &MeshTable, tool: &Tool) -> Result<Mesh, SceneError> {
         let at = self.site("mesh");
         let edge = |key, length: Option<Length>| match length {
             None => Ok(None),
@@ -56,6 +57,9 @@ impl Reader<'_> {
             return Err(at.key("refine").invalid(
                 "false beside `accuracy`, which needs a mesh that may be refined; remove one of the two",
             ));
+        }
+        if mesh.accuracy.is_some() && !tool.has_size() {
+            return Err(at.key("accuracy").invalid(Mesh::NO_LIMIT));
         }
         Ok(Mesh {
             refine: mesh.refine,

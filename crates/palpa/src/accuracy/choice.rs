@@ -192,7 +192,8 @@ impl Factors {
 /// contributes to the bar; the sizes of the next mesh follow from that.
 ///
 /// # Errors
-/// When place, depth, tissues or lumps do not fit the body, or the tool has no size.
+/// When place, depth, tissues or lumps do not fit the body, the tool has no size, or the body has more
+/// skin vertices than are allowed.
 pub fn choose_mesh(
     scene: &Scene,
     grown: &Arc<BuiltBody>,
@@ -203,6 +204,13 @@ pub fn choose_mesh(
         anyhow::bail!(
             "a tool of a single node has a force that grows without limit as the mesh gets finer, so that no accuracy \
              can be reached; press with a disc or another shape"
+        );
+    }
+    let (n_vertices, max_vertices) = (grown.growth.body.n_vertices(), scene.mesh.max_vertices);
+    if n_vertices > max_vertices {
+        anyhow::bail!(
+            "no mesh can be chosen: the skin has {n_vertices} vertices before it is refined, and max_vertices in [mesh] is \
+             {max_vertices}; raise it, or take a coarser surface"
         );
     }
     let start = Instant::now();
@@ -233,8 +241,13 @@ pub fn choose_mesh(
         }
         let press = Indentation::build(Arc::new(prepared))?;
         let mut bars = None;
-        let near = solved.as_ref().and_then(|last| Descent::near(&press, last));
-        if let Some(descent) = near.or_else(|| Descent::from_rest(&press)) {
+        let mut goes_on = || progress(&rounds);
+        let near = (solved.as_ref()).and_then(|last| Descent::near(&press, last, &mut goes_on));
+        let found = near.or_else(|| Descent::from_rest(&press, &mut goes_on));
+        if !goes_on() {
+            break End::Interrupted;
+        }
+        if let Some(descent) = found {
             bars = descent.probe(&press, |_, _| progress(&rounds));
             if bars.is_none() {
                 break End::Interrupted;

@@ -18,15 +18,15 @@ pub struct Descent {
     /// The mesh.
     body: LayeredBody,
     /// The equilibria, the deepest first; at least one.
-    bases: Vec<Base>,
+    pub(super) bases: Vec<Base>,
 }
 
 impl Descent {
-    /// Finds the equilibria from rest; `None` if there is none at the deepest, or if the tool does
-    /// not touch there.
-    pub fn from_rest(press: &Indentation) -> Option<Self> {
+    /// Finds the equilibria from rest; `None` if there is none at the deepest, if the tool does not
+    /// touch there, or if `goes_on`, which is asked before each step, returns false.
+    pub fn from_rest(press: &Indentation, goes_on: impl FnMut() -> bool) -> Option<Self> {
         let deepest = press.prepared.scene.press.depth;
-        let found = press.elastic_from_rest(&mut press.workspace(), deepest);
+        let found = press.elastic_from_rest(&mut press.workspace(), deepest, goes_on);
         let at = |depth: &f64| {
             DEPTHS
                 .iter()
@@ -38,11 +38,19 @@ impl Descent {
     }
 
     /// Finds the equilibria near those on another mesh of the same body; `None` if none is found at
-    /// the deepest.
-    pub fn near(press: &Indentation, other: &Self) -> Option<Self> {
+    /// the deepest, or if `goes_on`, which is asked at each depth, returns false there.
+    pub fn near(
+        press: &Indentation,
+        other: &Self,
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Option<Self> {
         let mut ws = press.workspace();
+        let skin = Skin::new(&other.body.skin);
         let mut near = |base: &Base| {
-            let guess = carried(&other.body, &base.deformed, &press.mesh().body);
+            if !goes_on() {
+                return None;
+            }
+            let guess = carried(&other.body, &skin, &base.deformed, &press.mesh().body);
             Base::near(press, &mut ws, base.depth, &guess)
         };
         let (deepest, rest) = other.bases.split_first()?;
@@ -51,7 +59,14 @@ impl Descent {
         Self::new(press, bases)
     }
 
-    /// Finds the equilibria near the stops of a press down; `None` if none is found.
+    /// Finds the equilibria near the stops of a press down, with nothing moved outside the part that is
+    /// probed, as in the probes; `None` if none is found. Nothing is gained for tissue without a
+    /// history, where the stops are equilibria already.
+    pub fn in_part(press: &Indentation, stops: &Stops) -> Option<Self> {
+        Self::new(press, probe::settle_part(press, &stops.0))
+    }
+
+    /// Finds the equilibria of the whole body near the stops of a press down; `None` if none is found.
     pub fn at(press: &Indentation, stops: &Stops) -> Option<Self> {
         let mut ws = press.workspace();
         let mut near = |(depth, guess): &(f64, Deformed)| Base::near(press, &mut ws, *depth, guess);
@@ -123,9 +138,8 @@ impl Stops {
     }
 }
 
-/// The deformed body of a mesh, carried to another mesh of the same body.
-fn carried(from: &LayeredBody, deformed: &Deformed, to: &LayeredBody) -> Deformed {
-    let skin = Skin::new(&from.skin);
+/// The deformed body of a mesh with this skin, carried to another mesh of the same body.
+fn carried(from: &LayeredBody, skin: &Skin, deformed: &Deformed, to: &LayeredBody) -> Deformed {
     let mut displacements = Vec::with_capacity(to.n_nodes());
     let mut is_touching = vec![false; to.n_vertices()];
     for (v, p) in to.skin.points.iter().enumerate() {

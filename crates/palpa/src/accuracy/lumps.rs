@@ -56,7 +56,8 @@ pub fn change_by_lumps(
     goes_on: impl Fn() -> bool,
 ) -> anyhow::Result<Option<LumpChange>> {
     let plain = Indentation::build(Arc::new(press.prepared.without_lumps()))?;
-    let found = Descent::near(&plain, with).or_else(|| Descent::from_rest(&plain));
+    let found =
+        Descent::near(&plain, with, &goes_on).or_else(|| Descent::from_rest(&plain, &goes_on));
     let probed = found.and_then(|found| found.probe(&plain, |_, _| goes_on()));
     let change = |without: ErrorBars| LumpChange::new(bars.deepest(), without.deepest());
     Ok(probed.map(change))

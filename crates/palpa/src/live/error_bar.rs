@@ -137,7 +137,15 @@ pub fn probe(
     if !goes_on() {
         return Err(NoBar::Interrupted);
     }
-    let descent = Descent::from_rest(&press).ok_or(NoBar::NoEquilibrium)?;
+    let mut is_given_up = false;
+    let descent = Descent::from_rest(&press, || {
+        is_given_up = !goes_on();
+        !is_given_up
+    });
+    if is_given_up {
+        return Err(NoBar::Interrupted);
+    }
+    let descent = descent.ok_or(NoBar::NoEquilibrium)?;
     let bars = descent.probe(&press, |_, _| goes_on());
     let probed = bars.ok_or(NoBar::Interrupted)?.deepest().clone();
     let failed = (Source::ALL.into_iter().zip(probed.changes)).find(|(_, change)| change.is_none());

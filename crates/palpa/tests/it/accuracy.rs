@@ -206,7 +206,7 @@ fn the_change_by_a_lump_on_a_finer_mesh_lies_within_its_bar() {
     let scene = block().lump(lump).set("tool", "radius", "6 mm");
     let change_on = |edge: &str| {
         let press = set_up(&scene.clone().set("mesh", "near_tool", edge));
-        let descent = Descent::from_rest(&press).unwrap();
+        let descent = Descent::from_rest(&press, || true).unwrap();
         let bars = descent.probe(&press, |_, _| true).unwrap();
         assert_eq!(bars.moves[0].len(), press.model.n_nodes());
         let change = change_by_lumps(&press, &descent, &bars, || true).unwrap();

@@ -45,7 +45,7 @@ fn the_bar_of_the_live_mesh_is_that_of_a_press_there_on_the_same_mesh() {
     // The loop's mesh with the same size near the tool is that of a press.
     let press = Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap();
     assert_eq!(bar.n_nodes, press.model.n_nodes());
-    let probed = Descent::from_rest(&press)
+    let probed = Descent::from_rest(&press, || true)
         .unwrap()
         .probe(&press, |_, _| true)
         .unwrap();

@@ -23,6 +23,17 @@ use palpa::accuracy::ErrorBars;
 use palpa::press::tissue::{Indentation, SampleOutcome};
 use palpa::{Note, Prepared};
 
+/// Notes on a press without error bars.
+const NO_SIZE: &str = "there are no error bars, because the force of a single node has no limit on ever finer meshes; \
+                       press with a tool that has a size";
+const CUT_SHORT: &str =
+    "there are no error bars, because the press was interrupted before they were computed";
+const NOTHING_TO_PROBE: &str =
+    "there are no error bars, because no depth has both a force and an elastic equilibrium";
+/// Note on a length of the scene that is not used.
+const NEAR_TOOL_REPLACED: &str =
+    "`near_tool` of the scene is not used, because --accuracy chooses the lengths near the tool";
+
 /// Runs the press.
 pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     let Job {
@@ -41,16 +52,18 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         None => {
             let prepared = Arc::new(Prepared::build(scene)?);
             spinner.set_message("setting up the model");
-            let indentation = Indentation::build(prepared)?;
-            context.begin_recording();
-            remove_older(out.path())?;
-            (indentation, None)
+            (Indentation::build(prepared)?, None)
         }
         Some(accuracy) => match mesh_choice::choose(job, accuracy, &spinner)? {
             Some((indentation, choice)) => (indentation, Some(choice)),
             None => return Ok(Outcome::Interrupted),
         },
     };
+    context.begin_recording();
+    remove_older(out.path())?;
+    if let Some(choice) = &choice {
+        out.write_json("mesh_choice.json", choice)?;
+    }
     drop(spinner);
     let materials: Vec<_> = materials_of(scene);
     announce(job, &indentation, &materials)?;
@@ -68,6 +81,13 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         bars: probed,
         load_step,
     } = record(job, &indentation, probing)?;
+    let why_no_bars = match probing {
+        _ if job.args.no_error_bar => None,
+        Probing::Nothing => Some(NO_SIZE),
+        Probing::Everything if probed.is_none() && context.is_interrupted() => Some(CUT_SHORT),
+        Probing::Everything if probed.is_none() => Some(NOTHING_TO_PROBE),
+        _ => None,
+    };
     let (probed, lump_change) = probed.map(|found| (found.bars, found.lumps)).unzip();
     let bars = probed
         .or(chosen)
@@ -82,9 +102,13 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         table.finish()?;
     }
     let result = result_of(&recorded, &materials, context.is_interrupted());
-    let notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
+    let mut notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
         .map(Note::to_string)
         .collect();
+    if job.is_near_tool_replaced {
+        notes.push(NEAR_TOOL_REPLACED.to_owned());
+    }
+    notes.extend(why_no_bars.map(str::to_owned));
     let report = PressReport {
         model: "tissue",
         scene: job.scene_name,

@@ -303,6 +303,7 @@ impl Indentation {
         &self,
         ws: &mut Workspace,
         depth: f64,
+        mut goes_on: impl FnMut() -> bool,
     ) -> Vec<(f64, f64, Deformed)> {
         let mut state = State::new(&self.model);
         state.displacements.clone_from(&self.rest.displacements);
@@ -313,6 +314,9 @@ impl Indentation {
             let next = self.acting(depth);
             let loads = [&before, &next].map(|acting| acting.load(0.0, None));
             let [from, to] = &loads;
+            if !goes_on() {
+                break;
+            }
             let report = advance(&self.model, &mut state, ws, from, to, &self.params);
             if report.outcome != Outcome::Converged {
                 break;

@@ -7,10 +7,10 @@ use indicatif::ProgressBar;
 use palpa::accuracy::{End, Goal, MeshChoice, Round, choose_mesh};
 use palpa::build::build;
 use palpa::press::tissue::Indentation;
+use palpa_scene::Mesh;
 use palpa_scene::units::Share;
 
 use super::super::Job;
-use super::super::files::remove_older;
 use crate::table::Table;
 
 /// The press on a mesh with this accuracy, a share, and how the mesh was chosen; `None` if it was
@@ -22,13 +22,15 @@ pub(super) fn choose(
 ) -> anyhow::Result<Option<(Indentation, MeshChoice)>> {
     let (context, scene) = (job.context, job.scene);
     let grown = build(scene)?.into();
-    context.begin_recording();
-    remove_older(job.out.path())?;
     let goal = Goal {
         accuracy,
         max_time: scene.mesh.max_time.map(Duration::from_secs_f64),
     };
     let chosen = choose_mesh(scene, &grown, &goal, |rounds| {
+        if !rounds.is_empty() {
+            // Before, there is nothing to keep.
+            context.begin_recording();
+        }
         progress.set_message(match rounds.last() {
             None => "choosing the mesh".to_owned(),
             Some(last) => format!(
@@ -48,7 +50,7 @@ pub(super) fn choose(
     match choice.end {
         End::Reached => Ok(Some((indentation, choice))),
         End::Interrupted => Ok(None),
-        _ => bail!("{}", refusal(&choice)),
+        _ => bail!("{}", refusal(job, &choice)),
     }
 }
 
@@ -89,7 +91,7 @@ fn bar(round: &Round) -> String {
 }
 
 /// The reason why an accuracy was not reached, and what to do.
-fn refusal(choice: &MeshChoice) -> String {
+fn refusal(job: &Job<'_>, choice: &MeshChoice) -> String {
     let asked = Share::from_si(choice.accuracy);
     let (why, advice) = match choice.end {
         End::MaxVertices { max_vertices } => (
@@ -110,13 +112,24 @@ fn refusal(choice: &MeshChoice) -> String {
         ),
     };
     match choice.half_width() {
-        Some(half) => format!(
-            "an accuracy of {asked} was not reached: {why}. The best mesh has an error bar of ±{:.1} % with {} nodes; ask for \
-             --accuracy {:.1}%, or {advice}",
-            100.0 * half,
-            choice.rounds[choice.best].n_nodes,
-            (1000.0 * half).ceil() / 10.0,
-        ),
+        Some(half) => {
+            let reached = Mesh {
+                accuracy: Some((1000.0 * half).ceil() / 1000.0),
+                ..job.scene.mesh
+            };
+            let can_be_asked = reached.check(&job.scene.tool).is_ok();
+            let ask = if let Some(wider) = reached.accuracy.filter(|_| can_be_asked) {
+                format!("ask for --accuracy \"{}\", or ", Share::from_si(wider))
+            } else {
+                String::new()
+            };
+            format!(
+                "an accuracy of {asked} was not reached: {why}. The best mesh has an error bar of ±{:.1} % with {} nodes; \
+                 {ask}{advice}",
+                100.0 * half,
+                choice.rounds[choice.best].n_nodes,
+            )
+        }
         None => format!(
             "an accuracy of {asked} was not reached: no error bar was found, because the press or a probe has no equilibrium; {advice}"
         ),

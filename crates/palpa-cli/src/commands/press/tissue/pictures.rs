@@ -14,6 +14,8 @@ use palpa::press::Phase;
 use palpa::press::lump::Embedded;
 use palpa::press::tissue::{Indentation, Record, Sample};
 use palpa_plot::section::{Panel, Plane, Shades, ToolOutline, cut_body, draw};
+use rayon::prelude::*;
+
 use palpa_plot::{Axis, Chart, PALETTE, Picture, Series};
 
 pub(super) fn draw_pictures(
@@ -30,25 +32,29 @@ pub(super) fn draw_pictures(
         indentation.mesh().mesh_size * 1e3,
         result.material_status
     );
-    let mut paths = Vec::new();
-    let depth = force_depth(&samples, indentation)
-        .subtitle(&subtitle)
-        .draw();
-    // The order is reversed to put the PNG first, because the command prints its path at the end.
-    paths.extend(depth.save(out, "force_depth")?.into_iter().rev());
-    let time = force_time(&samples, indentation).subtitle(&subtitle).draw();
-    paths.extend(time.save(out, "force_time")?);
-    let layers = layers(&samples, indentation).subtitle(&subtitle).draw();
-    paths.extend(layers.save(out, "layers")?);
+    let mut charts = vec![
+        ("force_depth", force_depth(&samples, indentation)),
+        ("force_time", force_time(&samples, indentation)),
+        ("layers", layers(&samples, indentation)),
+    ];
     if indentation.is_viscous && samples.iter().any(|s| s.phase == Phase::Hold) {
-        let relaxation = relaxation(&samples, indentation).subtitle(&subtitle).draw();
-        paths.extend(relaxation.save(out, "relaxation")?);
+        charts.push(("relaxation", relaxation(&samples, indentation)));
     }
+    let mut pictures: Vec<(&str, Picture)> = (charts.into_iter())
+        .map(|(stem, chart)| (stem, chart.subtitle(&subtitle).draw()))
+        .collect();
     if let Some([section, stress]) = sections(job, indentation, recorded) {
-        paths.extend(section.save(out, "section")?);
-        paths.extend(stress.save(out, "stress")?);
+        pictures.extend([("section", section), ("stress", stress)]);
     }
-    Ok(paths)
+    let save = |(stem, picture): &(&str, Picture)| picture.save(out, stem);
+    let saved: Vec<[PathBuf; 2]> = pictures
+        .par_iter()
+        .map(save)
+        .collect::<anyhow::Result<_>>()?;
+    // The PNG comes first, because the command prints the first path at the end.
+    Ok((saved.into_iter())
+        .flat_map(|[svg, png]| [png, svg])
+        .collect())
 }
 
 /// The body cut through the press point, at rest and at the deepest sample: its layers and lumps,
@@ -164,6 +170,12 @@ fn speed_name(indentation: &Indentation, index: usize) -> String {
     format!("{} mm/s", indentation.speeds[index] * 1e3)
 }
 
+/// The error bar of a sample, at this place of the x axis.
+fn bar_at(x: f64, s: &Sample) -> Option<[f64; 3]> {
+    let bar = s.error_bar_n?;
+    Some([x, s.force_n - bar, s.force_n + bar])
+}
+
 /// Loops of force against depth, one colour for each speed; the retraction is dashed.
 fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
     let mut chart = Chart::new(
@@ -172,6 +184,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
     )
     .title("Force against depth");
     let n_runs = indentation.speeds.len();
+    let has_bars = samples.iter().any(|s| s.error_bar_n.is_some());
     for index in 0..n_runs {
         let of_run: Vec<&Sample> = samples.iter().copied().filter(|s| s.run == index).collect();
         let last_cycle = of_run.iter().map(|s| s.cycle).max().unwrap_or(0);
@@ -184,6 +197,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
             };
             let color = PALETTE[if n_runs > 1 { index } else { 0 } % PALETTE.len()];
             let name = match (cycle, n_runs) {
+                (0, 1) if has_bars => "loading, with its error bar".to_owned(),
                 (0, 1) => "loading".to_owned(),
                 (0, _) => speed_name(indentation, index),
                 _ => String::new(),
@@ -196,10 +210,7 @@ fn force_depth(samples: &[&Sample], indentation: &Indentation) -> Chart {
             }
             let mut back = points(&[Phase::Retract]);
             let first = || (of_run.iter()).filter(|s| cycle == 0 && s.is_first_loading());
-            let bars = first().filter_map(|s| {
-                let bar = s.error_bar_n?;
-                Some([s.depth_mm, s.force_n - bar, s.force_n + bar])
-            });
+            let bars = first().filter_map(|s| bar_at(s.depth_mm, s));
             let series = Series::new(name, down.clone()).with_color(color);
             chart = chart.series(series.with_spread(bars.collect()));
             let extrapolated: Vec<[f64; 2]> = first()
@@ -235,13 +246,15 @@ fn force_time(samples: &[&Sample], indentation: &Indentation) -> Chart {
     )
     .title("Force against time");
     for index in 0..indentation.speeds.len() {
-        let of_run = samples.iter().filter(|s| s.run == index);
-        let points = of_run.map(|s| [s.time_s, s.force_n]).collect();
+        let of_run = || samples.iter().filter(move |s| s.run == index);
+        let points = of_run().map(|s| [s.time_s, s.force_n]).collect();
+        let bars: Vec<[f64; 3]> = of_run().filter_map(|s| bar_at(s.time_s, s)).collect();
         let name = match indentation.speeds.len() {
-            1 => "force".to_owned(),
+            1 if bars.is_empty() => "force".to_owned(),
+            1 => "force, with its error bar".to_owned(),
             _ => speed_name(indentation, index),
         };
-        chart = chart.line(name, points);
+        chart = chart.series(Series::new(name, points).with_spread(bars));
     }
     chart
 }

@@ -61,7 +61,13 @@ pub(super) fn record<'a>(
         .map(|s| s.force_n);
     let goes_on = || !context.is_interrupted();
     let probe = || {
-        let Some(descent) = stops.and_then(|stops| Descent::at(indentation, &stops)) else {
+        // Without its lumps, the body moves outside the part that is probed too.
+        let settle = if job.args.lump_change || !indentation.has_history() {
+            Descent::at
+        } else {
+            Descent::in_part
+        };
+        let Some(descent) = stops.and_then(|stops| settle(indentation, &stops)) else {
             return Ok(None);
         };
         let Some(bars) = descent.probe(indentation, |_, _| goes_on()) else {

@@ -272,6 +272,16 @@ fn force_in_words(sample: &Sample) -> String {
     }
 }
 
+/// A share with its sign, to a tenth of a per cent; "0.0 %" has none.
+fn signed_percent(share: f64) -> String {
+    let tenths = (1000.0 * share).round();
+    if tenths == 0.0 {
+        "0.0 %".to_owned()
+    } else {
+        format!("{:+.1} %", tenths / 10.0)
+    }
+}
+
 /// Prints the error bar at the deepest, and its contributions.
 fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
     let Some(bars) = report.error_bars else {
@@ -287,11 +297,11 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
             ""
         };
         changes.push(match change {
-            Some(change) => format!("{source} {:+.1} %{from}", 100.0 * change),
+            Some(change) => format!("{source} {}{from}", signed_percent(change)),
             None => format!("{source}: no result"),
         });
     }
-    changes.extend((bars.load_step).map(|step| format!("load steps {:+.1} %", 100.0 * step)));
+    changes.extend((bars.load_step).map(|step| format!("load steps {}", signed_percent(step))));
     let contact = probed.contact().filter(|&contact| contact > 0.0);
     changes.extend(contact.map(|contact| format!("{FEW_VERTICES} {:.1} %", 100.0 * contact)));
     let half_width = bars.half_width(probed);
@@ -307,9 +317,9 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
     let at_deepest = |s: &&Sample| s.run == 0 && s.is_first_loading();
     let deepest = report.samples.iter().rfind(at_deepest);
     if let Some((sample, extrapolated)) = deepest.and_then(|s| Some((s, s.extrapolated_n?))) {
-        let share = 100.0 * (extrapolated / sample.force_n - 1.0);
+        let share = signed_percent(extrapolated / sample.force_n - 1.0);
         job.context.say(format!(
-            "extrapolated to an infinitely fine mesh, the force at {:.2} mm is {extrapolated:.4} N ({share:+.1} %)",
+            "extrapolated to an infinitely fine mesh, the force at {:.2} mm is {extrapolated:.4} N ({share})",
             sample.depth_mm
         ))?;
     }
@@ -320,11 +330,11 @@ fn say_bars(job: &Job<'_>, report: &PressReport<'_>) -> anyhow::Result<()> {
             |bar| format!("±{bar:.4} N (±{:.1} %)", 100.0 * bar / force.abs()),
         );
         job.context.say(format!(
-            "lumps change the force at {:.2} mm by {:+.4} N ({:+.1} % of it), error bar of the change: {bar}; both without \
+            "lumps change the force at {:.2} mm by {:+.4} N ({} of it), error bar of the change: {bar}; both without \
              relaxation",
             change.depth_mm,
             change.change_n,
-            100.0 * change.change_n / force
+            signed_percent(change.change_n / force)
         ))?;
     }
     let steps = 2.0 * SAFETY * bars.load_step.map_or(0.0, f64::abs);
