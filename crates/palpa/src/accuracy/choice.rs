@@ -79,6 +79,8 @@ pub enum End {
         /// Time that it would take, s.
         expected_s: f64,
     },
+    /// A probe of the last mesh was too large.
+    ProbeTooLarge,
     /// Finer meshes did not make the bar smaller, or none found an equilibrium.
     NoProgress,
     /// It was given up before its end.
@@ -256,6 +258,7 @@ pub fn choose_mesh(
         }
         let probed = bars.as_ref().map(|bars| bars.deepest().clone());
         let half_width = probed.as_ref().and_then(Probed::half_width);
+        let is_too_large = bars.as_ref().is_some_and(|bars| bars.is_too_large);
         let is_best = best.as_ref().is_none_or(|(index, ..)| {
             let before = rounds[*index].half_width.unwrap_or(f64::INFINITY);
             half_width.is_some_and(|now| now < before)
@@ -276,6 +279,9 @@ pub fn choose_mesh(
         }
         if half_width.is_some_and(|half| half <= goal.accuracy) {
             break End::Reached;
+        }
+        if is_too_large {
+            break End::ProbeTooLarge;
         }
         if rounds.len() == MOST_ROUNDS {
             break End::NoProgress;

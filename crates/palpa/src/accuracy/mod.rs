@@ -232,6 +232,8 @@ pub struct ErrorBars {
     pub load_step: Option<f64>,
     /// Number of nodes of the largest probe.
     pub n_nodes: usize,
+    /// Whether a probe was left out because it would be too large.
+    pub is_too_large: bool,
     /// For each source, how far each node moves by its probe at the deepest, m; 0 outside the part
     /// that is probed. `[n_nodes of the press]`
     #[serde(skip)]

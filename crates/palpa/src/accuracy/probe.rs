@@ -18,6 +18,8 @@ use crate::press::tissue::{Deformed, Indentation};
 /// the tool's reach.
 const PART_DEPTHS: f64 = 1.0;
 const PART_REACHES: f64 = 2.0;
+/// Shares of that distance that are tried until a probe is not too large.
+const SMALLER_PARTS: [f64; 3] = [1.0, 0.7, 0.5];
 /// Tolerance of the force balance: far below the errors that are looked for.
 pub(super) const TOLERANCE: f64 = 1e-4;
 
@@ -70,24 +72,27 @@ pub(super) fn run(
             is_bonded: press.is_bonded(),
         })
         .collect();
-    let part = part(press);
     let mut n_nodes = 0;
+    let mut is_too_large = false;
     let mut moves: [Vec<f64>; N_SOURCES] =
         std::array::from_fn(|_| vec![0.0; press.model.n_nodes()]);
     for (i, source) in Source::ALL.into_iter().enumerate() {
         if !progress(i, Source::ALL.len()) {
             return None;
         }
-        let Some((body, carry)) = divided(press, &part, source) else {
-            // Nothing to divide.
-            for probed in &mut probed {
-                probed.changes[i] = Some(0.0);
+        let (part, mut probe) = match built(press, source) {
+            Built::Probe(part, probe) => (part, probe),
+            Built::NothingToDivide => {
+                for probed in &mut probed {
+                    probed.changes[i] = Some(0.0);
+                }
+                continue;
             }
-            continue;
-        };
-        // A probe that is too large has no result, like one without equilibrium.
-        let Ok(mut probe) = Probe::build(press, &part, &body, carry) else {
-            continue;
+            // It has no result, like one without equilibrium.
+            Built::TooLarge => {
+                is_too_large = true;
+                continue;
+            }
         };
         n_nodes = n_nodes.max(probe.model.n_nodes());
         // From the least depth on, so that each probe starts with the correction of the one before.
@@ -107,6 +112,7 @@ pub(super) fn run(
         probed,
         load_step: None,
         n_nodes,
+        is_too_large,
         moves,
     })
 }
@@ -114,7 +120,7 @@ pub(super) fn run(
 /// The equilibria near these deformed bodies, each with its depth, m, with nothing moved outside the
 /// part that is probed.
 pub(super) fn settle_part(press: &Indentation, stops: &[(f64, Deformed)]) -> Vec<Base> {
-    let part = part(press);
+    let part = part(press, 1.0);
     let whole = &press.mesh().body;
     let same: Carry = Box::new(<[Vec3]>::to_vec);
     let Ok(mut probe) = Probe::build(press, &part, &part.body, same) else {
@@ -151,11 +157,33 @@ fn stand_in(probed: &mut [Probed]) {
     }
 }
 
-/// The part of the body that is probed.
-fn part(press: &Indentation) -> Part {
+/// What becomes of a probe.
+enum Built {
+    Probe(Box<Part>, Box<Probe>),
+    NothingToDivide,
+    TooLarge,
+}
+
+/// The probe of a source, on the largest part on which it is not too large.
+fn built(press: &Indentation, source: Source) -> Built {
+    for share in SMALLER_PARTS {
+        let part = part(press, share);
+        let Some((body, carry)) = divided(press, &part, source) else {
+            return Built::NothingToDivide;
+        };
+        if let Ok(probe) = Probe::build(press, &part, &body, carry) {
+            return Built::Probe(part.into(), probe.into());
+        }
+    }
+    Built::TooLarge
+}
+
+/// The part of the body that is probed, as far as this share of the usual distance from the tool.
+fn part(press: &Indentation, share: f64) -> Part {
     let body = &press.mesh().body;
     let (points, reach) = press.footprint();
-    let radius = reach + (PART_DEPTHS * press.place().tissue_depth).max(PART_REACHES * reach);
+    let usual = (PART_DEPTHS * press.place().tissue_depth).max(PART_REACHES * reach);
+    let radius = reach + share * usual;
     let skin = &body.skin;
     let mut is_kept: Vec<bool> = (0..skin.triangles.len())
         .map(|t| (skin.corners(t).iter()).any(|p| distance(&points, p) <= radius))
@@ -495,7 +523,7 @@ mod tests {
         for body in [BLOCK, CYLINDER] {
             for tool in ["shape = \"disc\"", "shape = \"sphere\"\nradius = \"8 mm\""] {
                 let press = press(body, tool);
-                let part = part(&press);
+                let part = part(&press, 1.0);
                 assert!(part.body.n_vertices() < press.mesh().body.n_vertices());
                 assert!(part.is_border.contains(&true));
                 let mut record = Record::with_displacements(&press);
@@ -555,7 +583,7 @@ mod tests {
     #[test]
     fn sources_divide_all_of_the_part_and_nothing_twice() {
         let press = press(BLOCK, "shape = \"disc\"");
-        let part = part(&press);
+        let part = part(&press, 1.0);
         let (n_prisms, n_levels) = (part.body.n_prisms(), part.body.n_levels);
         let mut finer = 0;
         for source in [Source::Near, Source::LevelsDeep] {

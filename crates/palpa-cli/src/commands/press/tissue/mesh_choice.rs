@@ -102,6 +102,10 @@ fn refusal(job: &Job<'_>, choice: &MeshChoice) -> String {
             "a finer mesh would have too many levels".to_owned(),
             "make the tool larger or the layers thinner",
         ),
+        End::ProbeTooLarge => (
+            "a probe of the last mesh would be too large".to_owned(),
+            "make the tool larger or the layers thinner",
+        ),
         End::MaxTime { expected_s } => (
             format!("with the next mesh the choice would take about {expected_s:.0} s"),
             "raise --max-time",
