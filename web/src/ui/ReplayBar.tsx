@@ -12,6 +12,8 @@ const time = signal(0);
 const SEEK_PERIOD = 50;
 /** Step of an arrow key, s: longer than a frame, so that it always reaches another one. */
 const KEY_STEP = 0.05;
+/** Longest time for which frames from before a seek are not shown, ms. */
+const ARRIVAL = 1000;
 const ARROWS: Record<string, number> = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
 export function ReplayBar() {
@@ -19,12 +21,18 @@ export function ReplayBar() {
   const id = useId();
   const isDragging = useRef(false);
   const wanted = useRef<number | null>(null);
+  // The last time sought, until a frame of it has come: frames on the way show the time before it.
+  const sought = useRef<{ time: number; at: number } | null>(null);
 
   useEffect(() => {
     let shownAt = 0;
     return onFrame((frame) => {
       const now = performance.now();
       if (frame.is_replay === 0 || isDragging.current || now - shownAt < 80) return;
+      const last = sought.current;
+      const isOnTheWay = last !== null && Math.abs(frame.time - last.time) > KEY_STEP && now - last.at < ARRIVAL;
+      if (isOnTheWay) return;
+      sought.current = null;
       shownAt = now;
       time.value = frame.time;
     });
@@ -33,6 +41,7 @@ export function ReplayBar() {
   if (recording === undefined || !recording.is_replaying) return null;
   const seek = (to: number): void => {
     time.value = to;
+    sought.current = { time: to, at: performance.now() };
     // Only the newest time is sent.
     if (wanted.current === null) {
       window.setTimeout(() => {
@@ -68,7 +77,7 @@ export function ReplayBar() {
           const step = ARROWS[event.key];
           if (step === undefined) return;
           event.preventDefault();
-          seek(Math.min(Math.max((wanted.current ?? shown) + step * KEY_STEP, 0), recording.duration));
+          seek(Math.min(Math.max((sought.current?.time ?? shown) + step * KEY_STEP, 0), recording.duration));
         }}
         onPointerDown={() => (isDragging.current = true)}
         onInput={(event) => seek(event.currentTarget.valueAsNumber)}
