@@ -86,10 +86,7 @@ enum Model {
 /// # Errors
 /// If the scene or body is bad, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let Adjusted {
-        scene,
-        is_near_tool_replaced,
-    } = adjusted_scene(args)?;
+    let scene = adjusted_scene(args)?;
     let out = context.out_dir()?;
     let scene_name = args
         .scene
@@ -101,7 +98,6 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         out,
         scene: &scene,
         scene_name: &scene_name,
-        is_near_tool_replaced,
     };
     match scene.model.kind {
         ModelKind::Tissue => tissue::run(&job),
@@ -117,18 +113,10 @@ struct Job<'a> {
     out: &'a OutDir,
     scene: &'a Scene,
     scene_name: &'a str,
-    /// As in [`Adjusted`].
-    is_near_tool_replaced: bool,
 }
 
 /// The scene with the changes of the command line.
-struct Adjusted {
-    scene: Scene,
-    /// Whether the accuracy of the command line replaces the scene's edge length near the tool.
-    is_near_tool_replaced: bool,
-}
-
-fn adjusted_scene(args: &Args) -> anyhow::Result<Adjusted> {
+fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
     let mut scene = match &args.scene {
         Some(path) if is_surface(path) => bail!(
             "\"{}\" is a surface, not a scene; look at it with `palpa check`, or name it as `surface` in a scene (see \
@@ -170,16 +158,12 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Adjusted> {
         press.hold = hold.si();
     }
     press.retract &= !args.no_retract;
-    let is_near_tool_replaced = args.accuracy.is_some() && scene.mesh.near_tool.is_some();
     set_accuracy(&mut scene, args)?;
     let press = &scene.press;
     if let Err(problem) = press.check() {
         bail!("{problem}; see --depth, --step, --speed and --hold");
     }
-    Ok(Adjusted {
-        scene,
-        is_near_tool_replaced,
-    })
+    Ok(scene)
 }
 
 /// Sets accuracy and time limit from the command line.
@@ -187,8 +171,6 @@ fn set_accuracy(scene: &mut Scene, args: &Args) -> anyhow::Result<()> {
     let mesh = &mut scene.mesh;
     if let Some(accuracy) = args.accuracy {
         mesh.accuracy = Some(accuracy.si());
-        // The command line is stronger than the scene.
-        mesh.near_tool = None;
     }
     if let Some(time) = args.max_time {
         if mesh.accuracy.is_none() {

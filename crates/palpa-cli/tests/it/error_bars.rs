@@ -1,12 +1,10 @@
 //! Error bars of `palpa press`, and meshes chosen by them.
 
-use std::fs;
 use std::process::Stdio;
 
 use palpa_testkit::{Layer, Lump, Scene as SceneText, Value as Toml};
 use serde_json::Value;
 
-use crate::press::Press;
 use crate::press_tissue::{SIZE, array, arrays, column, number, tissue};
 
 /// A small block that is pressed in two steps.
@@ -15,6 +13,13 @@ fn block() -> SceneText {
         .press(2.0)
         .set("press", "step", "1 mm")
         .set("press", "hold", "0 s")
+}
+
+/// The block under a tool of a single node.
+fn under_a_node() -> SceneText {
+    block()
+        .set("tool", "shape", "node")
+        .without("tool", "radius")
 }
 
 #[test]
@@ -52,11 +57,7 @@ fn every_force_has_an_error_bar_unless_it_is_left_out() {
 #[test]
 fn the_change_by_a_lump_has_an_error_bar_and_errors_their_place() {
     let press = tissue();
-    let scene = SceneText::soft_over_stiff(SIZE, 8.0, 8.0, 10.0)
-        .lump(Lump::sphere(4.0, "hard", "200 kPa").below(9.0))
-        .press(2.0)
-        .set("press", "step", "1 mm")
-        .set("press", "hold", "0 s");
+    let scene = block().lump(Lump::sphere(4.0, "hard", "200 kPa").below(9.0));
     let report = press.report(&scene, &["--frames", "0", "--lump-change"]);
     let change = &report["lump_change"];
     let forces = column(&report, "force_n");
@@ -117,17 +118,12 @@ fn a_mesh_is_chosen_for_an_accuracy() {
     assert!(load_step.abs() > 1e-6, "{load_step}");
 }
 
-/// Whether a file of the press is there, and what it contains.
-fn file_of(press: &Press, name: &str) -> Option<String> {
-    fs::read_to_string(press.bench.path(&format!("out/press/{name}"))).ok()
-}
-
 #[test]
 fn an_accuracy_that_is_not_reached_keeps_what_was_there() {
     let press = tissue();
     let scene = block().set("mesh", "max_vertices", Toml::raw("150"));
     press.report(&scene, &["--frames", "0", "--no-error-bar"]);
-    let before = file_of(&press, "press.json").unwrap();
+    let before = press.bench.read("out/press/press.json");
     let (code, tried, said) = press.run(&["scene.toml", "--accuracy", "0.2 %"]);
     assert_eq!(code, 2, "{said}");
     assert!(tried.contains("error bar of ±0.2 %"), "{tried}");
@@ -136,9 +132,9 @@ fn an_accuracy_that_is_not_reached_keeps_what_was_there() {
         "{said}"
     );
     assert!(said.contains("raise max_vertices"), "{said}");
-    assert_eq!(file_of(&press, "press.json").unwrap(), before);
+    assert_eq!(press.bench.read("out/press/press.json"), before);
     let choice: Value =
-        serde_json::from_str(&file_of(&press, "mesh_choice.json").unwrap()).unwrap();
+        serde_json::from_str(&press.bench.read("out/press/mesh_choice.json")).unwrap();
     let bar = number(&choice["rounds"][0]["half_width"]);
     // What it says to ask for instead can be asked for.
     let asked = said.split("ask for --accuracy \"").nth(1);
@@ -175,9 +171,7 @@ fn an_accuracy_that_cannot_be_is_refused_before_the_work() {
     }
     let said = press.refusal(&[file, "--max-time", "60 s"]);
     assert!(said.contains("add --accuracy"), "{said}");
-    let node = block()
-        .set("tool", "shape", "node")
-        .without("tool", "radius");
+    let node = under_a_node();
     let file = press.bench.file("node", &node);
     let said = press.refusal(&[file, "--accuracy", "3 %"]);
     assert!(said.contains("tool of a single node"), "{said}");
@@ -196,11 +190,7 @@ fn an_accuracy_that_cannot_be_is_refused_before_the_work() {
 #[test]
 fn a_press_without_error_bars_says_why() {
     let press = tissue();
-    let node = block()
-        .set("tool", "shape", "node")
-        .without("tool", "radius")
-        .set("press", "step", "1 mm");
-    let report = press.report(&node, &["--frames", "0"]);
+    let report = press.report(&under_a_node(), &["--frames", "0"]);
     assert!(report["error_bars"].is_null());
     let notes = report["notes"].to_string();
     assert!(
@@ -251,7 +241,7 @@ fn ctrl_c_during_the_probes_keeps_the_press_and_says_why_there_are_no_bars() {
     });
     palpa_testkit::interrupt(&child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    let report: Value = serde_json::from_str(&file_of(&press, "press.json").unwrap()).unwrap();
+    let report: Value = serde_json::from_str(&press.bench.read("out/press/press.json")).unwrap();
     assert_eq!(report["samples"].as_array().unwrap().len(), 2);
     assert!(report["error_bars"].is_null());
     let notes = report["notes"].to_string();

@@ -63,8 +63,8 @@ impl Newton<'_> {
         if sliding.is_empty() && !is_stale && system.is_exact() {
             system.solve(structure, &carried, delta);
         } else {
+            let last = LAST * self.params.tolerance / self.residual;
             let ([tolerance, accepted], most) = if self.params.is_near {
-                let last = LAST * self.params.tolerance / self.residual;
                 let tolerance = if last < NEAR_TIGHTEST {
                     LOOSEST
                 } else {
@@ -72,7 +72,6 @@ impl Newton<'_> {
                 };
                 ([tolerance, LOOSEST], NEAR_VECTORS)
             } else if is_stale || sliding.is_empty() {
-                let last = LAST * self.params.tolerance / self.residual;
                 ([last.clamp(STALE_TOLERANCE, LOOSEST); 2], STALE_VECTORS)
             } else {
                 ([GMRES_TOLERANCE; 2], GMRES_VECTORS)

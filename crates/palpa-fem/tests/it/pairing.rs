@@ -41,6 +41,25 @@ fn corners(skin: &Surface, pairing: &Pairing) -> (f64, f64) {
     )
 }
 
+/// A square of irregular triangles with this spacing, m.
+fn irregular(spacing: f64) -> Surface {
+    let block = GradedBlock {
+        outline: Outline::Square,
+        half_width: 50e-3,
+        centre: [0.0, 0.0],
+        ring_radius: None,
+        spacing,
+        inner_growth: 0.0,
+        growth: 0.0,
+        jitter: Some(1),
+    };
+    let levels = LevelStack {
+        depths: vec![0.0, 0.04],
+        interval_layer: vec![0],
+    };
+    graded_block(&block, &levels).skin
+}
+
 #[test]
 fn cells_of_a_grid_are_paired_over_their_diagonals() {
     let skin = patch(31, 22, 0.01, &[0.0, 0.01], &[0]).skin;
@@ -72,21 +91,7 @@ fn limbs_are_paired_to_the_last_triangle() {
 
 #[test]
 fn a_part_of_a_skin_keeps_the_pairs_of_the_whole() {
-    let block = GradedBlock {
-        outline: Outline::Square,
-        half_width: 50e-3,
-        centre: [0.0, 0.0],
-        ring_radius: None,
-        spacing: 4e-3,
-        inner_growth: 0.0,
-        growth: 0.0,
-        jitter: Some(1),
-    };
-    let levels = LevelStack {
-        depths: vec![0.0, 0.04],
-        interval_layer: vec![0],
-    };
-    let whole = graded_block(&block, &levels).skin;
+    let whole = irregular(4e-3);
     let pairing = pair_triangles(&whole);
     // Half of the skin, through some pairs.
     let is_left: Vec<bool> = (0..whole.triangles.len())
@@ -259,21 +264,7 @@ fn a_reflex_pair_is_made_only_where_a_triangle_would_be_left_alone() {
 
 #[test]
 fn a_skin_of_twenty_thousand_irregular_triangles_leaves_at_most_the_odd_one_alone() {
-    let block = GradedBlock {
-        outline: Outline::Square,
-        half_width: 50e-3,
-        centre: [0.0, 0.0],
-        ring_radius: None,
-        spacing: 1e-3,
-        inner_growth: 0.0,
-        growth: 0.0,
-        jitter: Some(1),
-    };
-    let levels = LevelStack {
-        depths: vec![0.0, 0.04],
-        interval_layer: vec![0],
-    };
-    let skin = graded_block(&block, &levels).skin;
+    let skin = irregular(1e-3);
     assert!(skin.triangles.len() > 20_000);
     let pairing = pair_triangles(&skin);
     assert_sound(&skin, &pairing);

@@ -22,7 +22,6 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         out,
         scene,
         scene_name,
-        ..
     } = *job;
     let spinner = context.progress(0, "growing the body");
     let built = build(scene)?;

@@ -52,7 +52,9 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         None => {
             let prepared = Arc::new(Prepared::build(scene)?);
             spinner.set_message("setting up the model");
-            (Indentation::build(prepared)?, None)
+            let indentation = Indentation::build(prepared)?;
+            remove_older(out.path())?;
+            (indentation, None)
         }
         Some(accuracy) => match mesh_choice::choose(job, accuracy, &spinner)? {
             Some((indentation, choice)) => (indentation, Some(choice)),
@@ -60,10 +62,6 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
         },
     };
     context.begin_recording();
-    remove_older(out.path())?;
-    if let Some(choice) = &choice {
-        out.write_json("mesh_choice.json", choice)?;
-    }
     drop(spinner);
     let materials: Vec<_> = materials_of(scene);
     announce(job, &indentation, &materials)?;
@@ -105,7 +103,7 @@ pub(super) fn run(job: &Job<'_>) -> anyhow::Result<Outcome> {
     let mut notes: Vec<String> = (indentation.notes.iter().chain(&recorded.notes()))
         .map(Note::to_string)
         .collect();
-    if job.is_near_tool_replaced {
+    if job.args.accuracy.is_some() && scene.mesh.near_tool.is_some() {
         notes.push(NEAR_TOOL_REPLACED.to_owned());
     }
     notes.extend(why_no_bars.map(str::to_owned));

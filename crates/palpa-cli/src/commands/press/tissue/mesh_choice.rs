@@ -11,6 +11,7 @@ use palpa_scene::Mesh;
 use palpa_scene::units::Share;
 
 use super::super::Job;
+use super::super::files::remove_older;
 use crate::table::Table;
 
 /// The press on a mesh with this accuracy, a share, and how the mesh was chosen; `None` if it was
@@ -45,6 +46,10 @@ pub(super) fn choose(
     let Some((indentation, choice)) = chosen else {
         return Ok(None);
     };
+    if choice.end == End::Reached {
+        // Only the press replaces what was there.
+        remove_older(job.out.path())?;
+    }
     job.out.write_json("mesh_choice.json", &choice)?;
     say_rounds(job, &choice)?;
     match choice.end {
