@@ -156,6 +156,20 @@ impl Memory {
         }
     }
 
+    /// Copies the factors of the materials, and the constant stresses of some groups.
+    pub(crate) fn copy_from(&mut self, model: &Model, from: &Self, groups: &[u32]) {
+        self.scales.copy_from_slice(&from.scales);
+        self.steps.copy_from_slice(&from.steps);
+        if !model.has_memory {
+            return;
+        }
+        for &g in groups {
+            let first = model.first_phase[g as usize] as usize;
+            let end = model.first_phase[g as usize + 1] as usize;
+            self.overstress[first..end].copy_from_slice(&from.overstress[first..end]);
+        }
+    }
+
     /// Prepares a step that lasts `dt`.
     pub(crate) fn begin(&mut self, model: &Model, state: &State, dt: f64) {
         if !model.has_memory {

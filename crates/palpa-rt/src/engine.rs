@@ -18,7 +18,7 @@ use crate::{
     smoothness::ForceStats,
     threads::{Granted, Wish, lock_memory},
     tissue::{Tissue, empty_patch},
-    tissue_thread::{Background, PoseSample, TissueStats, TissueThread, run_background},
+    tissue_thread::{Background, Pause, PoseSample, TissueStats, TissueThread, run_background},
 };
 use palpa_device::HapticDevice;
 use palpa_servo::{DeviceSpec, MAX_TOOLS, Servo, ServoParams};
@@ -254,6 +254,7 @@ impl Engine {
             done,
             thread,
             is_busy: false,
+            pause: Pause::default(),
         })
     }
 
@@ -327,6 +328,7 @@ impl Engine {
             step_wall: self.tissue_stats.wall.quantiles(),
             held_back: self.tissue_stats.held_back.load(Ordering::Relaxed),
             jobs,
+            jobs_panicked: self.tissue_stats.jobs_panicked.load(Ordering::Relaxed),
             background_cpu_share: jobs.mean * jobs.count as f64 / duration.max(1e-9),
             lost_records: [
                 self.loop_stats.lost_records.load(Ordering::Relaxed),

@@ -54,7 +54,8 @@ pub enum Happening {
     /// The tissue was moved on by less time than passed; total difference since the last such
     /// event, s.
     TimeLost(f64),
-    /// A background job panicked; the tissue continues without its result.
+    /// A background job panicked; the tissue continues without its result and requests another one
+    /// after some steps.
     JobPanicked,
     /// A fault hook caused a fault on purpose.
     Injected(Injection),
@@ -70,6 +71,8 @@ pub enum Happening {
 pub enum Injection {
     /// The tissue panics.
     TissuePanics,
+    /// A background job panics.
+    JobPanics,
     /// A patch has a force that is not a number.
     PatchWithNan,
     /// The tissue's patch is late.
@@ -175,7 +178,10 @@ impl fmt::Display for Happening {
                 s * 1e3
             ),
             Self::JobPanicked => {
-                write!(f, "a background job panicked; the tissue keeps what it has")
+                write!(
+                    f,
+                    "a background job panicked; the tissue keeps its zone and mesh, and requests another job after some steps"
+                )
             }
             Self::Injected(what) => write!(f, "fault on purpose: {what}"),
             Self::RecordsLost(kind, n) => write!(f, "ring full: {n} {kind} not recorded"),
@@ -202,6 +208,7 @@ impl fmt::Display for Injection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::TissuePanics => "the tissue panics",
+            Self::JobPanics => "a background job panics",
             Self::PatchWithNan => "a patch with NaN",
             Self::PatchLate => "the tissue's patch is late",
             Self::TissuePauses => "the tissue pauses",

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 pub struct FaultHooks {
     is_paused: AtomicBool,
     panics: AtomicBool,
+    jobs_to_panic: AtomicU32,
     to_spoil: AtomicU32,
     /// Bits of a time, s; the affected thread takes it once.
     tissue_delay: AtomicU64,
@@ -35,6 +36,11 @@ impl FaultHooks {
         self.panics.store(true, Ordering::Relaxed);
     }
 
+    /// The next `n` background jobs panic.
+    pub fn panic_jobs(&self, n: u32) {
+        self.jobs_to_panic.store(n, Ordering::Relaxed);
+    }
+
     /// The 1 kHz loop wakes up `seconds` late, once.
     pub fn delay_loop(&self, seconds: f64) {
         self.loop_delay.store(seconds.to_bits(), Ordering::Relaxed);
@@ -49,13 +55,11 @@ impl FaultHooks {
     }
 
     pub(crate) fn take_spoil(&self) -> bool {
-        // Only the tissue thread takes from this counter. A new value stored meanwhile either wins
-        // or is counted down by one; both are harmless.
-        let n = self.to_spoil.load(Ordering::Relaxed);
-        if n > 0 {
-            self.to_spoil.store(n - 1, Ordering::Relaxed);
-        }
-        n > 0
+        take_one(&self.to_spoil)
+    }
+
+    pub(crate) fn take_job_panic(&self) -> bool {
+        take_one(&self.jobs_to_panic)
     }
 
     pub(crate) fn take_tissue_delay(&self) -> Option<f64> {
@@ -66,6 +70,16 @@ impl FaultHooks {
     pub(crate) fn take_loop_delay(&self) -> Option<f64> {
         take_delay(&self.loop_delay)
     }
+}
+
+/// Counts down. Only the tissue thread takes from these counters. A new value stored meanwhile either
+/// wins or is counted down by one; both are harmless.
+fn take_one(count: &AtomicU32) -> bool {
+    let n = count.load(Ordering::Relaxed);
+    if n > 0 {
+        count.store(n - 1, Ordering::Relaxed);
+    }
+    n > 0
 }
 
 #[inline]

@@ -32,6 +32,7 @@
 //!     fn take_job(&mut self) -> Option<()> { None }
 //!     fn run((): ()) {}
 //!     fn install(&mut self, (): ()) {}
+//!     fn job_failed(&mut self) {}
 //! }
 //!
 //! struct Still;

@@ -120,6 +120,8 @@ record! {
         orientations: [f64; 4 * palpa_servo::MAX_TOOLS],
         /// Whether the result of a background job was installed before the step.
         installed: bool,
+        /// Whether it became known before the step that a background job had panicked.
+        job_failed: bool,
         /// Whether a background job was taken after the step.
         job_taken: bool,
         /// Status of the step as a number, in the order of `StepStatus`.

@@ -198,6 +198,12 @@ impl<T: Tissue> Run<'_, T> {
             self.tissue.install(T::run(job));
             self.report.jobs += 1;
         }
+        if logged.job_failed {
+            self.job.take().ok_or_else(|| {
+                format!("step {}: a job panicked that was never taken", logged.step)
+            })?;
+            self.tissue.job_failed();
+        }
         let input = logged.input();
         let patch = &mut *self.patches.next;
         let result = self.tissue.step(&input, patch);

@@ -112,6 +112,10 @@ pub trait Tissue: Send {
 
     /// Installs the result of the last job; called between steps.
     fn install(&mut self, done: Self::Done);
+
+    /// Called between steps, instead of [`Self::install`], if the last job panicked. The job and all
+    /// that it held are gone.
+    fn job_failed(&mut self);
 }
 
 /// A boxed patch that was never written (`id` 0); its memory is allocated and touched.

@@ -21,6 +21,11 @@ use std::{
     time::Duration,
 };
 
+/// Steps in which no job is handed out after one that panicked, and their largest number. The number
+/// doubles with each job that panics, and halves with each that does not.
+const FIRST_PAUSE: u64 = 16;
+const LONGEST_PAUSE: u64 = 4096;
+
 /// Settings of the tissue thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueParams {
@@ -70,6 +75,8 @@ pub struct TissueStats {
     pub wall: Histogram,
     /// CPU time of background jobs, s.
     pub background: Histogram,
+    /// Background jobs that panicked.
+    pub jobs_panicked: AtomicU64,
     /// Steps whose patch was not published.
     pub held_back: AtomicU64,
     /// Steps not recorded because the ring was full.
@@ -93,11 +100,48 @@ pub(crate) struct TissueThread<T: Tissue, C: Clock> {
 
 /// The tissue thread's side of the background.
 pub(crate) struct Background<T: Tissue> {
-    pub(crate) jobs: Producer<T::Job>,
+    pub(crate) jobs: Producer<Errand<T::Job>>,
     /// Result of a job; `None` if it panicked.
     pub(crate) done: Consumer<Option<T::Done>>,
     pub(crate) thread: Thread,
     pub(crate) is_busy: bool,
+    pub(crate) pause: Pause,
+}
+
+/// The pause after jobs that panicked, so that one that always panics is not run in every step.
+#[derive(Debug, Default)]
+pub(crate) struct Pause {
+    /// Length of the last pause, steps; 0 if there was none.
+    length: u64,
+    /// The step from which on jobs are handed out again.
+    until: u64,
+}
+
+impl Pause {
+    fn after_panic(&mut self, step: u64) {
+        self.length = (2 * self.length).clamp(FIRST_PAUSE, LONGEST_PAUSE);
+        self.until = step + self.length;
+    }
+
+    fn after_success(&mut self) {
+        self.length /= 2;
+    }
+}
+
+/// A job on its way to the background thread.
+pub(crate) struct Errand<J> {
+    job: J,
+    /// Whether it panics on purpose.
+    panics: bool,
+}
+
+/// The end of a background job, as the tissue learns of it between two steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum JobEnd {
+    /// No job has ended.
+    None,
+    Installed,
+    Panicked,
 }
 
 impl<T: Tissue, C: Clock> TissueThread<T, C> {
@@ -159,7 +203,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
     /// One step with its hand-over, hash and record.
     fn step(&mut self, step: u64, now: f64, elapsed: f64, period: f64) -> (StepStatus, StepRecord) {
         let cpu_t0 = thread_cpu();
-        let installed = self.install();
+        let job_end = self.take_in_job(step);
         self.poses.take();
         let sample = *self.poses.current();
         let input = TissueInput {
@@ -197,10 +241,11 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         } else {
             self.stats.held_back.fetch_add(1, Ordering::Relaxed);
         }
-        record.installed = installed;
+        record.installed = job_end == JobEnd::Installed;
+        record.job_failed = job_end == JobEnd::Panicked;
         record.spoilt = u8::from(is_spoilt);
         record.lost = elapsed - input.dt;
-        record.job_taken = self.hand_out_job();
+        record.job_taken = self.hand_out_job(step);
         record.cpu = thread_cpu() - cpu_t0;
         record.wall = self.clock.now() - now;
         self.stats.cpu.add(record.cpu);
@@ -210,31 +255,38 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         (result.status, record)
     }
 
-    fn install(&mut self) -> bool {
-        match self.background.done.pop() {
-            Ok(Some(done)) => {
-                self.background.is_busy = false;
-                self.tissue.install(done);
-                true
-            }
-            Ok(None) => {
-                self.background.is_busy = false;
-                self.speaker.say(self.clock.now(), Happening::JobPanicked);
-                false
-            }
-            Err(_) => false,
+    fn take_in_job(&mut self, step: u64) -> JobEnd {
+        let Ok(done) = self.background.done.pop() else {
+            return JobEnd::None;
+        };
+        self.background.is_busy = false;
+        if let Some(done) = done {
+            self.tissue.install(done);
+            self.background.pause.after_success();
+            return JobEnd::Installed;
         }
+        self.tissue.job_failed();
+        self.background.pause.after_panic(step);
+        self.stats.jobs_panicked.fetch_add(1, Ordering::Relaxed);
+        self.speaker.say(self.clock.now(), Happening::JobPanicked);
+        JobEnd::Panicked
     }
 
-    fn hand_out_job(&mut self) -> bool {
-        if self.background.is_busy {
+    fn hand_out_job(&mut self, step: u64) -> bool {
+        if self.background.is_busy || step < self.background.pause.until {
             return false;
         }
         let Some(job) = self.tissue.take_job() else {
             return false;
         };
+        let panics = self.faults.take_job_panic();
+        if panics {
+            self.speaker
+                .say(self.clock.now(), Happening::Injected(Injection::JobPanics));
+        }
         // The ring is never full, because there is one job at a time.
-        self.background.is_busy = self.background.jobs.push(job).is_ok();
+        let errand = Errand { job, panics };
+        self.background.is_busy = self.background.jobs.push(errand).is_ok();
         self.background.thread.unpark();
         self.background.is_busy
     }
@@ -256,15 +308,19 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
 
 /// Runs jobs until `stop` is set and no job is left.
 pub(crate) fn run_background<T: Tissue>(
-    jobs: &mut Consumer<T::Job>,
+    jobs: &mut Consumer<Errand<T::Job>>,
     done: &mut Producer<Option<T::Done>>,
     stop: &AtomicBool,
     stats: &TissueStats,
 ) {
     loop {
-        if let Ok(job) = jobs.pop() {
+        if let Ok(Errand { job, panics }) = jobs.pop() {
             let t0 = thread_cpu();
-            let result = catch_unwind(AssertUnwindSafe(|| T::run(job))).ok();
+            let run = || {
+                assert!(!panics, "a panic on purpose");
+                T::run(job)
+            };
+            let result = catch_unwind(AssertUnwindSafe(run)).ok();
             stats.background.add(thread_cpu() - t0);
             // The ring has room for every job that can be running. If the tissue thread is gone,
             // the result is not needed.

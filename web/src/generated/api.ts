@@ -1164,7 +1164,7 @@ export interface components {
             snapshot_version: number;
         };
         /** @description A fault that was caused on purpose. */
-        InjectedFault: "tissue_panics" | "patch_with_nan" | "patch_late" | "tissue_pauses" | "tissue_goes_on" | "loop_late";
+        InjectedFault: "tissue_panics" | "job_panics" | "patch_with_nan" | "patch_late" | "tissue_pauses" | "tissue_goes_on" | "loop_late";
         /** @description A reason why the force is ramped to zero. */
         LawFault: "no_patch" | "stale_patch" | "bad_patch" | "missed_deadline" | "bad_clock" | "device_lost" | "bad_reading" | "device_stalled" | "device_jumped" | "no_solution";
         /** @description A layer. */

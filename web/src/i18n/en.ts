@@ -441,6 +441,7 @@ export const en = {
   'trouble.garbled': 'answer not understood',
   'trouble.unusable': 'not usable',
   'injected.tissue_panics': 'the tissue thread panics',
+  'injected.job_panics': 'a background job panics',
   'injected.patch_with_nan': 'a contact patch is not a number',
   'injected.patch_late': 'the contact patch is late',
   'injected.tissue_pauses': 'the tissue pauses',

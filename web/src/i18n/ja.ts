@@ -443,6 +443,7 @@ export const ja: Dictionary = {
   'trouble.garbled': '応答を解釈できない',
   'trouble.unusable': '使用できない',
   'injected.tissue_panics': '組織スレッドの異常終了',
+  'injected.job_panics': 'バックグラウンド処理の異常終了',
   'injected.patch_with_nan': '接触データに数でない値',
   'injected.patch_late': '接触データの遅れ',
   'injected.tissue_pauses': '組織の計算の停止',

@@ -35,6 +35,11 @@ impl History {
         }
     }
 
+    /// Marks the memory of all pairs as unknown.
+    pub(crate) fn forget(&mut self) {
+        self.is_known.fill(false);
+    }
+
     /// Takes over the memory of another mesh's pairs. `old` has, for each of this pair's two
     /// wedges, the old pair and the index of the wedge in it.
     pub(crate) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {

@@ -60,6 +60,8 @@ pub(crate) struct Batches {
     local_double: Box<Local<f64>>,
     local_single: Box<Local<f32>>,
     response: GroupResponse,
+    /// Scratch of the pairs that are evaluated one by one; empty between calls.
+    phases: Vec<PhaseAt<'static>>,
 }
 
 /// Half the shear modulus of a group at rest at each point, Pa, its bulk modulus times its volume,
@@ -84,6 +86,13 @@ fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f6
     common.map(|hardening| (slopes, bulk, hardening))
 }
 
+/// The memory of a list, for phases that live for another time. Nothing is allocated.
+fn recycled<'a>(phases: &mut Vec<PhaseAt<'_>>) -> Vec<PhaseAt<'a>> {
+    phases.clear();
+    let none = std::mem::take(phases).into_iter();
+    none.map_while(|_| None).collect()
+}
+
 impl Batches {
     /// The prisms under the groups that `keep` selects. `tangent` says
     /// whether they can be assembled into blocks of the pattern.
@@ -96,7 +105,7 @@ impl Batches {
     ) -> Self {
         let mut batches: Vec<Box<LaneBatch>> = Vec::new();
         let mut others = Vec::new();
-        let mut phases = Vec::new();
+        let (mut phases, mut most_phases) = (Vec::new(), 0);
         let n_groups = model.n_groups();
         for i in 0..model.body.n_levels - 1 {
             // Batches of this interval that have room.
@@ -109,6 +118,7 @@ impl Batches {
                 phases_at(model, memory, pair, &mut phases);
                 let columns = kernel_columns(group);
                 let Some((slopes, bulk, hardening)) = lane(&phases, model.has_memory) else {
+                    most_phases = most_phases.max(phases.len());
                     others.push(SinglePair {
                         pair: pair as u32,
                         blocks: places(model, pattern, group, i, [0, 1, 2, 3]),
@@ -142,6 +152,7 @@ impl Batches {
             local_double: Box::new(Local::new()),
             local_single: Box::new(Local::new()),
             response: GroupResponse::new(),
+            phases: Vec::with_capacity(most_phases),
         }
     }
 
@@ -155,8 +166,13 @@ impl Batches {
         self.begin_lanes(memory);
     }
 
+    /// The pairs that are not in lanes: they are evaluated one by one.
+    pub(crate) fn singles(&self) -> impl Iterator<Item = u32> {
+        self.others.iter().map(|other| other.pair)
+    }
+
     /// As [`Self::begin`], for the pairs that are not in lanes.
-    pub(crate) fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
+    fn begin_others(&self, model: &Model, memory: &mut Memory, state: &State) {
         for other in &self.others {
             memory.begin_group(model, state, other.pair as usize);
         }
@@ -187,7 +203,7 @@ impl Batches {
     }
 
     /// As [`Self::commit`], for the pairs that are not in lanes.
-    pub(crate) fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
+    fn commit_others(&self, model: &Model, memory: &Memory, state: &mut State) {
         for other in &self.others {
             memory.commit_group(model, state, other.pair as usize);
         }
@@ -220,16 +236,12 @@ impl Batches {
         Arch::new()
             .dispatch(pass)
             .map_err(|pair| inverted(model, pair))?;
-        let mut phases = Vec::new();
-        for other in &self.others {
-            let response = &mut self.response;
-            other.evaluate(model, memory, displacements, &mut phases, response, false)?;
+        self.for_others(model, memory, displacements, false, |other, response| {
             let (group, nodes) = group_nodes(model, other.pair as usize);
             for (n, &node) in nodes.iter().enumerate().take(group.n_nodes()) {
-                forces[node] += self.response.forces[n];
+                forces[node] += response.forces[n];
             }
-        }
-        Ok(())
+        })
     }
 
     /// Adds the stiffness of these prisms to the blocks of the pattern, N/m. An extra block past
@@ -250,12 +262,28 @@ impl Batches {
         Arch::new()
             .dispatch(pass)
             .map_err(|pair| inverted(model, pair))?;
-        let mut phases = Vec::new();
-        for other in &self.others {
-            let response = &mut self.response;
-            other.evaluate(model, memory, displacements, &mut phases, response, true)?;
+        self.for_others(model, memory, displacements, true, |other, response| {
             other.add_blocks(response, blocks);
-        }
-        Ok(())
+        })
+    }
+
+    /// Evaluates the pairs that are not in lanes, one after the other.
+    fn for_others(
+        &mut self,
+        model: &Model,
+        memory: &Memory,
+        displacements: &[Vec3],
+        with_tangent: bool,
+        mut act: impl FnMut(&SinglePair, &GroupResponse),
+    ) -> Result<(), Inverted> {
+        let (response, mut phases) = (&mut self.response, recycled(&mut self.phases));
+        let result = self.others.iter().try_for_each(|other| {
+            let phases = &mut phases;
+            other.evaluate(model, memory, displacements, phases, response, with_tangent)?;
+            act(other, response);
+            Ok(())
+        });
+        self.phases = recycled(&mut phases);
+        result
     }
 }

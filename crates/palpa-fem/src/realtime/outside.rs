@@ -2,7 +2,7 @@
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
-    Exterior, FactorScratch, Half, SolveScratch, back_substitute_to, fronts_above, substitute,
+    Exterior, FactorScratch, Half, SolveScratch, back_substitute_to, substitute,
 };
 use palpa_sparse::{Block, ColumnPattern};
 use pulp::{Simd, WithSimd};
@@ -66,13 +66,14 @@ impl Outside {
         }
     }
 
-    /// Updates the displacements of the exterior to follow those of the ring. Cost: a substitution
-    /// through the exterior; for some columns only, through the fronts above them.
+    /// Updates the displacements of the exterior to follow those of the ring; `only` those of some
+    /// columns, given with the fronts above them. Cost: a substitution through the exterior, or
+    /// through those fronts.
     pub(super) fn settle(
         &self,
         model: &Model,
         plan: &Plan,
-        only: Option<&[u32]>,
+        only: Option<(&[u32], &[bool])>,
         displacements: &mut [Vec3],
         x: &mut [f32],
         scratch: &mut SolveScratch<f32>,
@@ -80,8 +81,6 @@ impl Outside {
         if plan.exterior.is_empty() {
             return;
         }
-        let wanted =
-            only.map(|columns| fronts_above(&plan.tree, Half::Exterior, columns.iter().copied()));
         let n = plan.tree.first_zone_dof();
         x[..n].copy_from_slice(&self.right[..n]);
         x[n..].fill(0.0);
@@ -91,7 +90,7 @@ impl Outside {
                 x[dof as usize + c] = change[c] as f32;
             }
         }
-        let (tree, wanted) = (&plan.tree, wanted.as_deref());
+        let (tree, wanted) = (&plan.tree, only.map(|(_, fronts)| fronts));
         back_substitute_to(tree, Half::Exterior, wanted, &self.factor, x, scratch);
         let mut put = |node: usize, dof: usize| {
             let change = Vec3::from_fn(|c, _| f64::from(x[dof + c]));
@@ -99,7 +98,7 @@ impl Outside {
             displacements[node] = self.at[node] + change;
         };
         match only {
-            Some(columns) => columns.iter().for_each(|&v| {
+            Some((columns, _)) => columns.iter().for_each(|&v| {
                 let first = tree.first_dof(v as usize);
                 (0..model.structure.n_free_levels)
                     .for_each(|l| put(model.body.node(v as usize, l), first + 3 * l));

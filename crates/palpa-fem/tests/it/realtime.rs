@@ -20,8 +20,16 @@ fn model(n: usize, with_sides: bool) -> Arc<Model> {
     model_of(n, with_sides, None)
 }
 
+/// Skin, fat and muscle over 30 mm.
+pub(crate) fn levels() -> LevelStack {
+    LevelStack {
+        depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
+        interval_layer: vec![0, 1, 1, 2],
+    }
+}
+
 /// A square block of so many cells a side.
-fn block(n: usize, side: f64, jitter: Option<u64>, levels: &LevelStack) -> LayeredBody {
+pub(crate) fn block(n: usize, side: f64, jitter: Option<u64>, levels: &LevelStack) -> LayeredBody {
     let grid = Grid {
         n_cells: [n, n],
         diagonal: Diagonal::Alternate,
@@ -31,11 +39,8 @@ fn block(n: usize, side: f64, jitter: Option<u64>, levels: &LevelStack) -> Layer
     mapped_grid(&grid, place, levels)
 }
 
-fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
-    let levels = LevelStack {
-        depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
-        interval_layer: vec![0, 1, 1, 2],
-    };
+pub(crate) fn model_of(n: usize, with_sides: bool, prony: Option<&Prony>) -> Arc<Model> {
+    let levels = levels();
     let body = block(n, 0.06, Some(2), &levels);
     let mut supports = Supports::on_base(&body);
     if with_sides {
@@ -63,11 +68,11 @@ fn model_on(body: &LayeredBody, supports: &Supports, prony: Option<&Prony>) -> A
     Arc::new(Model::build(body, &materials, supports, ModelParams::default()).unwrap())
 }
 
-fn sphere(friction: f64) -> Tool {
+pub(crate) fn sphere(friction: f64) -> Tool {
     Tool::new(Sphere::new(8e-3).unwrap(), friction).unwrap()
 }
 
-fn at(tool: Tool, x: f64, y: f64, depth: f64) -> [PosedTool; 1] {
+pub(crate) fn at(tool: Tool, x: f64, y: f64, depth: f64) -> [PosedTool; 1] {
     let pose = Pose::translation(x, y, -depth);
     [PosedTool { tool, pose }]
 }
@@ -233,9 +238,9 @@ fn a_followed_exterior_does_not_swing() {
 
 /// A block with edges of 4 mm within 24 mm of a place, and of 10 mm elsewhere.
 #[derive(Debug)]
-struct Meshes {
-    coarse: LayeredBody,
-    prony: Option<Prony>,
+pub(crate) struct Meshes {
+    pub(crate) coarse: LayeredBody,
+    pub(crate) prony: Option<Prony>,
 }
 
 impl FineBodies for Meshes {
@@ -263,10 +268,7 @@ impl FineBodies for Meshes {
 #[test]
 fn a_fine_mesh_moves_with_the_tool() {
     const LATE: u32 = 6;
-    let levels = LevelStack {
-        depths: vec![0.0, 2e-3, 7e-3, 12e-3, 30e-3],
-        interval_layer: vec![0, 1, 1, 2],
-    };
+    let levels = levels();
     let terms = vec![PronyTerm { g: 0.4, tau: 0.1 }];
     let prony = Prony::new(terms, Moduli::Instantaneous, true).unwrap();
     for (friction, prony) in [(0.0, None), (0.3, None), (0.0, Some(prony))] {

@@ -50,6 +50,8 @@ pub struct Report {
     pub held_back: u64,
     /// CPU time of each background job, s.
     pub jobs: Quantiles,
+    /// Background jobs that panicked.
+    pub jobs_panicked: u64,
     /// CPU time of all background jobs as a share of the run.
     pub background_cpu_share: f64,
     /// Ticks and steps that are not in the log because a ring was full.

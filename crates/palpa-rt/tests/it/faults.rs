@@ -211,6 +211,40 @@ fn a_job_that_panics_is_said_and_the_next_one_runs() {
 }
 
 #[test]
+fn jobs_that_always_panic_are_run_ever_more_rarely() {
+    let (report, log) = faulty(&Bed::new(), |engine, _| {
+        engine.faults().panic_jobs(5);
+        until("jobs panicked", || {
+            let panicked = &engine.tissue_stats().jobs_panicked;
+            panicked.load(Ordering::Relaxed) == 5
+        });
+        go_on(engine, 0, 0, 3);
+    });
+    assert_eq!(report.jobs_panicked, 5);
+    let is_said = |e: &&palpa_rt::Event| e.what == Happening::JobPanicked;
+    assert_eq!(report.events.iter().filter(is_said).count(), 5);
+    check_said(
+        &report,
+        &[
+            |e| *e == Happening::Injected(Injection::JobPanics),
+            |e| *e == Happening::JobPanicked,
+        ],
+    );
+    let failed = (log.steps.iter()).filter(|s| s.job_failed).map(|s| s.step);
+    let pauses: Vec<u64> = failed
+        .map(|at| {
+            let mut after = log.steps.iter().filter(|s| s.step >= at && s.job_taken);
+            after.next().unwrap().step - at
+        })
+        .collect();
+    // The bed requests a job in every seventh step.
+    for (pause, least) in pauses.iter().zip([16, 32, 64, 128, 256]) {
+        assert!((least..least + 7).contains(pause), "{pauses:?}");
+    }
+    assert_eq!(pauses.len(), 5);
+}
+
+#[test]
 fn devices_fail_in_all_ways_and_come_back() {
     let (report, log) = faulty(&Bed::new(), |_, hand| {
         for ill in [Ill::Unplugged, Ill::NaN, Ill::Stalled, Ill::Jumped] {

@@ -160,4 +160,6 @@ impl Tissue for Bed {
         self.factor = factor;
         self.scale = scale;
     }
+
+    fn job_failed(&mut self) {}
 }

@@ -137,6 +137,7 @@ fn trouble(fault: DeviceFault) -> DeviceTrouble {
 fn injected(injection: Injection) -> InjectedFault {
     match injection {
         Injection::TissuePanics => InjectedFault::TissuePanics,
+        Injection::JobPanics => InjectedFault::JobPanics,
         Injection::PatchWithNan => InjectedFault::PatchWithNan,
         Injection::PatchLate => InjectedFault::PatchLate,
         Injection::TissuePauses => InjectedFault::TissuePauses,

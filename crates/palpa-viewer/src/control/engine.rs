@@ -293,7 +293,8 @@ pub enum EventKind {
         /// Total difference since the last such event, s.
         seconds: f64,
     },
-    /// A background job panicked; the tissue continues without its result.
+    /// A background job panicked; the tissue continues without its result and requests another one
+    /// after some steps.
     JobPanicked,
     /// A fault was caused on purpose.
     Injected {
@@ -334,6 +335,8 @@ pub enum DeviceTrouble {
 pub enum InjectedFault {
     /// The tissue panics.
     TissuePanics,
+    /// A background job panics.
+    JobPanics,
     /// A patch has a force that is not a number.
     PatchWithNan,
     /// The tissue's patch is late.

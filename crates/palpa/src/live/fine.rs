@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use palpa_fem::realtime::FineBodies;
 use palpa_fem::{FemError, Model, ModelParams};
@@ -24,8 +24,8 @@ pub struct FineScene {
     prepared: Arc<Prepared>,
     coarse: CoarseBody,
     radius: f64,
-    /// Meshes kept for reuse, with the place around which each is fine; the latest is last. Only
-    /// the background thread locks it.
+    /// Meshes kept for reuse, with the place around which each is fine; the latest is last. It is
+    /// not locked while a mesh is made, so a panic there leaves it whole.
     kept: Mutex<VecDeque<(Vec3, Arc<Model>)>>,
 }
 
@@ -52,6 +52,17 @@ impl FineScene {
         })
     }
 
+    fn kept(&self) -> MutexGuard<'_, VecDeque<(Vec3, Arc<Model>)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes the mesh of a place from those that are kept.
+    fn take(&self, place: Vec3) -> Option<Arc<Model>> {
+        let mut kept = self.kept();
+        let found = kept.iter().position(|(at, _)| *at == place)?;
+        kept.remove(found).map(|(_, model)| model)
+    }
+
     fn build(&self, place: Vec3) -> Result<Model, FemError> {
         let scene = &self.prepared.scene;
         let body = self.coarse.fine_round(scene, place, self.radius);
@@ -74,13 +85,11 @@ impl FineBodies for FineScene {
     }
 
     fn model(&self, place: Vec3) -> Result<Arc<Model>, FemError> {
-        // After a panic the list still holds complete meshes only.
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = kept.iter().position(|(at, _)| *at == place);
-        let model = match found.and_then(|i| kept.remove(i)) {
-            Some((_, model)) => model,
+        let model = match self.take(place) {
+            Some(model) => model,
             None => Arc::new(self.build(place)?),
         };
+        let mut kept = self.kept();
         if kept.len() >= MOST_KEPT {
             kept.pop_front();
         }

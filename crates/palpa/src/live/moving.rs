@@ -194,4 +194,8 @@ impl Tissue for LiveTissue {
     fn install(&mut self, done: RoamDone) {
         self.body.install(done);
     }
+
+    fn job_failed(&mut self) {
+        self.body.job_failed();
+    }
 }

@@ -273,6 +273,9 @@ impl Tissue for SpringTissue {
         scene.held(vertex).ok()
     }
 
+    /// The next step wants its node again.
+    fn job_failed(&mut self) {}
+
     fn install(&mut self, done: Option<Held>) {
         let Some(held) = done else { return };
         // If the tip presses a node by now, that node stays operated.

@@ -7,5 +7,6 @@ mod accuracy;
 mod error_bar;
 mod live;
 mod notes;
+mod panics;
 mod place;
 mod record;

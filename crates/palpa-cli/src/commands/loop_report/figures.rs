@@ -96,6 +96,7 @@ pub(super) struct TissueFigures {
     /// Share of the ticks without a force because the tissue was late.
     pub(super) stale_share: f64,
     jobs: u64,
+    jobs_panicked: u64,
     job_cpu_us: Times,
     /// Wall time from the request of a zone until it is taken over, ms: 90th percentile.
     zone_wall_p90_ms: Option<f64>,
@@ -192,6 +193,7 @@ impl TissueFigures {
             behind_share: behind as f64 / touching.max(1) as f64,
             stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
             jobs: report.jobs.count,
+            jobs_panicked: report.jobs_panicked,
             job_cpu_us: report.jobs.into(),
             zone_wall_p90_ms: zone_wall.map(|s| s * 1e3),
             background_cpu_share: report.background_cpu_share,
@@ -275,9 +277,9 @@ impl Figures {
         let t = &self.tissue;
         context.say(format!(
             "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones, {} meshes), \
-             {} background jobs, {:.1} % of a core",
+             {} background jobs ({} panicked), {:.1} % of a core",
             self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones, t.meshes,
-            t.jobs, 100.0 * t.background_cpu_share
+            t.jobs, t.jobs_panicked, 100.0 * t.background_cpu_share
         ))?;
         context.say(format!(
             "the hand goes at {:.0} mm/s; steps ({:.2} mm each) and zones come in time for up to {:.0} mm/s",

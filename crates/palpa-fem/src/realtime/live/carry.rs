@@ -43,10 +43,8 @@ impl Come {
     pub(super) fn of(live: &mut Live) -> Self {
         live.settle();
         let history = live.model.has_memory.then(|| {
-            let mut history = History::new(&live.model);
-            if let Some(shop) = live.jobs.shop() {
-                shop.follower.batches.store(&mut history);
-            }
+            let kept = live.jobs.kept.as_deref();
+            let mut history = kept.cloned().unwrap_or_else(|| History::new(&live.model));
             live.remember(&mut history);
             history
         });

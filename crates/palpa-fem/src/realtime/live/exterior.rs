@@ -5,7 +5,7 @@ use std::sync::Arc;
 use palpa_sparse::fronts::SolveScratch;
 
 use super::super::outside::{Follower, Outside};
-use super::super::plan::{Plan, Trouble};
+use super::super::plan::Trouble;
 use super::Live;
 
 /// The way in which the exterior follows the zone; see [`super::ExteriorMode`].
@@ -21,6 +21,9 @@ pub(super) enum ExteriorState {
     Linear {
         /// Time by which its memory lags behind, s.
         lag: f64,
+        /// As `lag`, for the prisms that are evaluated one by one: their memory is updated when a
+        /// job is requested, not when it is done.
+        singles_lag: f64,
         /// Whether the body has restarted from rest since then; that state must then not be used.
         is_lost: bool,
     },
@@ -35,6 +38,7 @@ impl ExteriorState {
             },
             None => Self::Linear {
                 lag: 0.0,
+                singles_lag: 0.0,
                 is_lost: false,
             },
         }
@@ -63,10 +67,11 @@ impl ExteriorState {
         }
     }
 
-    /// Takes over the prisms of the exterior of a new zone.
-    pub(super) fn replace_follower(&mut self, new: Option<Box<Follower>>) {
-        if let (Self::Followed { follower, .. }, Some(new)) = (self, new) {
-            *follower = new;
+    /// Takes over the prisms of the exterior of a new zone. Returns those of the old one.
+    pub(super) fn replace_follower(&mut self, new: Option<Box<Follower>>) -> Option<Box<Follower>> {
+        match (self, new) {
+            (Self::Followed { follower, .. }, Some(new)) => Some(std::mem::replace(follower, new)),
+            (_, new) => new,
         }
     }
 
@@ -93,6 +98,26 @@ impl ExteriorState {
         }
     }
 
+    /// Counts the duration of a step, s, for the memory of a linear exterior.
+    pub(super) fn age(&mut self, dt: f64) {
+        if let Self::Linear {
+            lag, singles_lag, ..
+        } = self
+        {
+            *lag += dt;
+            *singles_lag += dt;
+        }
+    }
+
+    /// Time by which the memory of the prisms of a linear exterior that are evaluated one by one lags
+    /// behind, s; 0 from now on.
+    pub(super) fn take_singles_lag(&mut self) -> f64 {
+        match self {
+            Self::Followed { .. } => 0.0,
+            Self::Linear { singles_lag, .. } => std::mem::take(singles_lag),
+        }
+    }
+
     /// Called when the body restarts from rest.
     pub(super) fn lose(&mut self) {
         if let Self::Linear { is_lost, .. } = self {
@@ -109,15 +134,10 @@ impl ExteriorState {
         }
     }
 
-    /// The factor and zone that determine the displacements outside the zone; `None` if those
-    /// displacements are up to date.
-    pub(super) fn origin(
-        &self,
-        plan: &Arc<Plan>,
-        outside: &Arc<Outside>,
-    ) -> Option<(Arc<Plan>, Arc<Outside>)> {
-        self.answers_linearly()
-            .then(|| (Arc::clone(plan), Arc::clone(outside)))
+    /// The factor that determines the displacements outside the zone; `None` if those displacements
+    /// are up to date.
+    pub(super) fn origin(&self, outside: &Arc<Outside>) -> Option<Arc<Outside>> {
+        self.answers_linearly().then(|| Arc::clone(outside))
     }
 }
 
@@ -158,16 +178,11 @@ impl Live {
     /// Updates the displacements outside the zone. Cost: a substitution through the exterior, and
     /// memory.
     pub fn settle(&mut self) {
-        self.settle_columns(None);
-    }
-
-    /// As [`Self::settle`], for some columns only.
-    pub(super) fn settle_columns(&mut self, only: Option<&[u32]>) {
         let mut scratch = SolveScratch::new(&self.plan.tree);
         self.outside.settle(
             &self.model,
             &self.plan,
-            only,
+            None,
             &mut self.state.displacements,
             &mut self.ws.moves,
             &mut scratch,

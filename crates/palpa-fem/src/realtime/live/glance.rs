@@ -51,7 +51,8 @@ impl Live {
         displacements.extend_from_slice(&self.state.displacements);
         Glance {
             model: Arc::clone(&self.model),
-            exterior: self.exterior.origin(&self.plan, &self.outside),
+            exterior: (self.exterior.origin(&self.outside))
+                .map(|outside| (Arc::clone(&self.plan), outside)),
             displacements,
         }
     }

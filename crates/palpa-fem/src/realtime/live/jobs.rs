@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 
-use super::super::outside::Outside;
 use super::pressed::{Pressed, nearest_point};
-use super::rebuild::{Rebuild, Rebuilt, Shop, Target};
+use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
 use super::{ExteriorMode, Live};
 use crate::batch::History;
 use crate::law::Prony;
@@ -34,21 +33,18 @@ pub(super) struct Jobs {
     depth_at_factor: f64,
     /// Longest time by which the memory of a linear exterior may lag behind, s.
     longest_lag: f64,
+    /// Time by which the exterior's memory lagged behind when the present job was requested, s.
+    lag_out: f64,
+    /// Viscous memory of the exterior's prisms at the end of the last job; `None` if there is none,
+    /// or if the exterior is followed.
+    pub(super) kept: Option<Arc<History>>,
 }
 
-/// Where the job and the memory that jobs work in are.
+/// Where the job and its room are.
 #[derive(Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one to a body, and a box would be allocated in a step"
-)]
 enum Job {
-    /// No job is requested.
-    Idle {
-        shop: Box<Shop>,
-        /// An exterior that is no longer needed.
-        retired: Option<Arc<Outside>>,
-    },
+    /// No job is requested. The room is `None` after a job that panicked.
+    Idle(Option<Box<Room>>),
     /// A job is requested, and no thread has taken it.
     Waiting(Rebuild),
     /// A thread is working on it.
@@ -56,18 +52,23 @@ enum Job {
 }
 
 impl Jobs {
-    pub(super) fn new(model: &Model, shop: Box<Shop>, n_asked: u64, n_zones: u64) -> Self {
+    pub(super) fn new(
+        model: &Model,
+        room: Box<Room>,
+        kept: Option<Arc<History>>,
+        n_asked: u64,
+        n_zones: u64,
+    ) -> Self {
         Self {
-            job: Job::Idle {
-                shop,
-                retired: None,
-            },
+            job: Job::Idle(Some(room)),
             n_asked,
             n_zones,
             age: 0,
             latency: 0,
             depth_at_factor: 0.0,
             longest_lag: longest_lag(model),
+            lag_out: 0.0,
+            kept,
         }
     }
 
@@ -85,14 +86,6 @@ impl Jobs {
     pub(super) fn is_factored_at(&mut self, depth: f64) {
         self.depth_at_factor = depth;
     }
-
-    /// The exterior's prisms, unless a job has them.
-    pub(super) fn shop(&self) -> Option<&Shop> {
-        match &self.job {
-            Job::Idle { shop, .. } => Some(shop),
-            Job::Waiting(_) | Job::Out => None,
-        }
-    }
 }
 
 /// A job that is due.
@@ -105,51 +98,70 @@ struct Due {
 }
 
 impl Live {
-    /// Requests a job if one is due and none is under way.
+    /// Requests a job if one is due and none is under way. Cost: a copy of the zone's displacements
+    /// and viscous memory; of the whole body's displacements if the exterior is followed.
     pub(super) fn ask(&mut self, dt: f64) {
-        if self.jobs.shop().is_none() || self.plan.exterior.is_empty() {
+        if !matches!(self.jobs.job, Job::Idle(_)) || self.plan.exterior.is_empty() {
             return;
         }
-        let Some(Due { zone, depth }) = self.due() else {
+        let has_room = matches!(self.jobs.job, Job::Idle(Some(_)));
+        let due = if has_room { self.due() } else { None };
+        if due.is_none() && has_room {
             return;
+        }
+        let is_followed = self.params.exterior == ExteriorMode::Followed;
+        let mut job = Rebuild {
+            model: Arc::clone(&self.model),
+            pattern: Arc::clone(&self.pattern),
+            plan: Arc::clone(&self.plan),
+            target: None,
+            old: None,
+            room: None,
+            kept: self.jobs.kept.clone(),
+            dt,
+            lag: 0.0,
+            is_followed,
+            id: self.jobs.n_asked,
         };
-        self.jobs.n_asked += 1;
-        self.jobs.age = 0;
-        self.jobs.depth_at_factor = depth;
-        let target = match zone {
-            Some((centre, radius)) => {
+        if let Some(Due { zone, depth }) = due {
+            self.jobs.n_asked += 1;
+            self.jobs.age = 0;
+            self.jobs.depth_at_factor = depth;
+            job.id = self.jobs.n_asked;
+            job.target = zone.map(|(centre, radius)| {
                 self.jobs.n_zones += 1;
                 let id = self.jobs.n_zones;
-                Target::New { id, centre, radius }
+                Target { id, centre, radius }
+            });
+            job.old = self.exterior.origin(&self.outside);
+            job.lag = self.exterior.lag();
+            self.exterior.set_lag(0.0);
+            self.bring_up_singles(dt);
+            if let Job::Idle(room) = &mut self.jobs.job {
+                job.room = room.take();
             }
-            None => Target::Same(Arc::clone(&self.plan)),
-        };
-        let is_followed = self.params.exterior == ExteriorMode::Followed;
-        let old = self.exterior.origin(&self.plan, &self.outside);
-        let history =
-            (self.model.has_memory && (zone.is_some() || is_followed)).then(|| self.history());
-        let lag = self.exterior.lag();
-        self.exterior.set_lag(0.0);
-        self.bring_up_others(dt, lag);
-        match std::mem::replace(&mut self.jobs.job, Job::Out) {
-            Job::Idle { shop, retired } => {
-                self.jobs.job = Job::Waiting(Rebuild {
-                    model: Arc::clone(&self.model),
-                    pattern: Arc::clone(&self.pattern),
-                    memory: self.memory.clone(),
-                    displacements: self.state.displacements.clone(),
-                    old,
-                    target,
-                    shop,
-                    retired,
-                    is_followed,
-                    dt,
-                    lag,
-                    history,
-                    id: self.jobs.n_asked,
-                });
+            if let Some(room) = &mut job.room {
+                let needs_memory = job.target.is_some() || is_followed;
+                self.furnish(room, job.old.is_some(), needs_memory);
             }
-            other => self.jobs.job = other,
+        }
+        self.jobs.job = Job::Waiting(job);
+    }
+
+    /// Copies the state that a job needs into its room.
+    fn furnish(&self, room: &mut Room, of_zone: bool, with_memory: bool) {
+        let (model, displacements) = (&*self.model, &self.state.displacements);
+        if of_zone {
+            for &[node, _] in &self.plan.zone {
+                room.displacements[node as usize] = displacements[node as usize];
+            }
+        } else {
+            room.displacements.copy_from_slice(displacements);
+        }
+        room.memory.copy_from(model, &self.memory, &self.singles);
+        if let (true, Some(history)) = (with_memory, &mut room.history) {
+            history.forget();
+            self.remember(history);
         }
     }
 
@@ -202,14 +214,7 @@ impl Live {
         middle + lead * (most / lead.norm()).min(1.0)
     }
 
-    /// Memory of the prisms whose memory is updated in every step.
-    pub(super) fn history(&self) -> History {
-        let mut history = History::new(&self.model);
-        self.remember(&mut history);
-        history
-    }
-
-    /// Writes the memory of those prisms into a history.
+    /// Writes the memory of the prisms whose memory is updated in every step into a history.
     pub(super) fn remember(&self, history: &mut History) {
         self.inside.batches.store(history);
         if let Some(follower) = self.exterior.follower() {
@@ -219,28 +224,32 @@ impl Live {
 
     /// Updates the memory of those prisms of a linear exterior that are evaluated one by one: they
     /// are few.
-    fn bring_up_others(&mut self, dt: f64, lag: f64) {
+    fn bring_up_singles(&mut self, dt: f64) {
+        let lag = self.exterior.take_singles_lag();
         if !self.model.has_memory || lag <= 0.0 {
             return;
         }
-        let Some(shop) = self.jobs.shop() else {
-            return;
-        };
-        let batches = &shop.follower.batches;
-        self.memory.begin_materials(&self.model, lag);
-        batches.commit_others(&self.model, &self.memory, &mut self.state);
-        self.memory.begin_materials(&self.model, dt);
-        batches.begin_others(&self.model, &mut self.memory, &self.state);
+        let (model, memory, state) = (&*self.model, &mut self.memory, &mut self.state);
+        let plan = &self.plan;
+        let is_outside =
+            |pair: usize| !plan.holds(&model.structure.groups[pair % model.n_groups()]);
+        let singles = self.singles.iter().map(|&pair| pair as usize);
+        let singles = singles.filter(|&pair| is_outside(pair));
+        memory.begin_materials(model, lag);
+        for pair in singles.clone() {
+            memory.commit_group(model, state, pair);
+        }
+        memory.begin_materials(model, dt);
+        for pair in singles {
+            memory.begin_group(model, state, pair);
+        }
     }
 
     /// Takes back a job that no thread has taken.
     pub(super) fn take_back_job(&mut self) {
         match std::mem::replace(&mut self.jobs.job, Job::Out) {
             Job::Waiting(job) => {
-                self.jobs.job = Job::Idle {
-                    shop: job.shop,
-                    retired: job.retired,
-                };
+                self.jobs.job = Job::Idle(job.room);
                 self.exterior.set_lag(self.exterior.lag() + job.lag);
             }
             other => self.jobs.job = other,
@@ -250,7 +259,10 @@ impl Live {
     /// A job for the background thread, if one is due. Give its result to [`Self::install`].
     pub fn take_job(&mut self) -> Option<Rebuild> {
         match std::mem::replace(&mut self.jobs.job, Job::Out) {
-            Job::Waiting(job) => Some(job),
+            Job::Waiting(job) => {
+                self.jobs.lag_out = job.lag;
+                Some(job)
+            }
             other => {
                 self.jobs.job = other;
                 None
@@ -258,44 +270,68 @@ impl Live {
         }
     }
 
+    /// Call it instead of [`Self::install`] if the job panicked. Its room is lost; the next job makes
+    /// another one, with the memory kept at the end of the last good job.
+    pub fn job_failed(&mut self) {
+        let lag = self.exterior.lag() + self.jobs.lag_out;
+        self.exterior.set_lag(lag);
+        self.jobs.job = Job::Idle(None);
+        self.jobs.ask_for_factor();
+    }
+
     /// Installs the result of a job of this body.
     pub fn install(&mut self, done: Rebuilt) {
-        self.jobs.latency = self.jobs.age;
-        let Some(outside) = done.outside else {
-            self.jobs.job = Job::Idle {
-                shop: done.shop,
-                retired: None,
-            };
-            return;
-        };
-        let was_linear = self.exterior.renew();
-        if done.inside.is_some() && was_linear {
-            // Columns that enter the zone start at their positions in the old exterior.
-            let entering = done.plan.vertices.iter().copied();
-            let entering: Vec<u32> = entering
-                .filter(|&v| !self.plan.is_inside[v as usize])
-                .collect();
-            self.settle_columns(Some(&entering));
+        let Rebuilt {
+            mut room,
+            kept,
+            made,
+        } = done;
+        room.retired.kept = std::mem::replace(&mut self.jobs.kept, kept);
+        if let Some(made) = made {
+            self.jobs.latency = self.jobs.age;
+            self.put_in(made, &mut room);
         }
-        self.plan = done.plan;
-        let retired = std::mem::replace(&mut self.outside, outside);
-        self.jobs.job = Job::Idle {
-            shop: done.shop,
-            retired: Some(retired),
-        };
-        if let Some((mut inside, mut follower)) = done.inside {
-            if self.model.has_memory {
+        self.jobs.job = Job::Idle(Some(room));
+    }
+
+    /// Puts new parts in the place of old ones, which stay in the room for the next job.
+    fn put_in(&mut self, made: Made, room: &mut Room) {
+        let was_linear = self.exterior.renew();
+        let (mut inside, mut follower) = (None, None);
+        if let Some(zone) = made.zone {
+            (inside, follower) = (Some(zone.inside), zone.follower);
+            room.retired.entering = zone.entering;
+        }
+        if let (true, Some(entering)) = (was_linear, &mut room.retired.entering) {
+            // Columns that enter the zone start at their positions in the old exterior.
+            self.outside.settle(
+                &self.model,
+                &self.plan,
+                Some((&entering.columns, &entering.fronts)),
+                &mut self.state.displacements,
+                &mut self.ws.moves,
+                &mut entering.scratch,
+            );
+        }
+        room.retired.plan = Some(std::mem::replace(&mut self.plan, made.plan));
+        room.retired.outside = Some(std::mem::replace(&mut self.outside, made.outside));
+        if let Some(mut inside) = inside {
+            if let Some(history) = &mut room.history {
                 // The memory has changed since the job was taken.
-                let (model, history) = (&*self.model, self.history());
-                inside.batches.load(&history);
-                inside.batches.begin(model, &mut self.memory, &self.state);
+                history.forget();
+                self.remember(history);
+                inside.batches.load(history);
+                inside
+                    .batches
+                    .begin(&self.model, &mut self.memory, &self.state);
                 if let Some(follower) = &mut follower {
-                    follower.batches.load(&history);
-                    follower.batches.begin(model, &mut self.memory, &self.state);
+                    follower.batches.load(history);
+                    let batches = &mut follower.batches;
+                    batches.begin(&self.model, &mut self.memory, &self.state);
                 }
             }
-            self.inside = inside;
-            self.exterior.replace_follower(follower);
+            room.retired.inside = Some(std::mem::replace(&mut self.inside, inside));
+            room.retired.follower = self.exterior.replace_follower(follower);
             self.keep_good();
         }
         self.forget_forces();

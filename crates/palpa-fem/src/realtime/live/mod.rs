@@ -55,7 +55,7 @@ use super::inside::Inside;
 use super::local::LocalModel;
 use super::outside::{Follower, Outside};
 use super::plan::{Plan, Trouble};
-use crate::batch::Tangent;
+use crate::batch::{History, Tangent};
 use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -67,7 +67,7 @@ use exterior::ExteriorState;
 use iteration::{Known, Scratch};
 use jobs::Jobs;
 use pressed::nearest_point;
-use rebuild::Shop;
+use rebuild::Room;
 use recovery::Recovery;
 use springs::Springs;
 
@@ -94,6 +94,8 @@ pub struct Live {
     /// The exterior, linearised about an earlier state.
     outside: Arc<Outside>,
     exterior: ExteriorState,
+    /// The pairs that are evaluated one by one.
+    singles: Vec<u32>,
     skin: SkinForces,
     known: Known,
     course: Course,
@@ -137,7 +139,10 @@ impl Live {
         let n_zones = n_before + 1;
         let plan = Plan::new(&model, &pattern, n_zones, centre, params.zone_radius)?;
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
-        let mut shop = Box::new(Shop::new(&model, &memory, &pattern, &plan));
+        let mut room = Room::new(&model, &pattern, &plan, come.history.as_ref());
+        let shop = &mut room.shop;
+        let singles = (inside.batches.singles()).chain(shop.follower.batches.singles());
+        let singles = singles.collect();
         let is_followed = params.exterior == ExteriorMode::Followed;
         let mut follower = is_followed.then(|| {
             Box::new(Follower::new(
@@ -150,7 +155,6 @@ impl Live {
         });
         if let Some(history) = &come.history {
             inside.batches.load(history);
-            shop.follower.batches.load(history);
             if let Some(follower) = &mut follower {
                 follower.batches.load(history);
             }
@@ -172,6 +176,11 @@ impl Live {
             Trouble::Inverted(at) => FemError::NoRest { at: at.into() },
             Trouble::Singular => FemError::NoRest { at: centre.into() },
         })?;
+        let kept = (model.has_memory && !is_followed).then(|| {
+            let mut kept = History::new(&model);
+            shop.follower.batches.store(&mut kept);
+            Arc::new(kept)
+        });
         Ok(Self {
             plan: Arc::new(plan),
             inside,
@@ -179,10 +188,11 @@ impl Live {
             exterior: ExteriorState::new(follower),
             recovery: Recovery::new(&state.displacements, &come.skin.pressures, tools),
             skin: come.skin,
+            singles,
             known: Known::Nothing,
             course: Course::new(tools),
             springs: Springs::NONE,
-            jobs: Jobs::new(&model, shop, n_before, n_zones),
+            jobs: Jobs::new(&model, room, kept, n_before, n_zones),
             problem: ContactProblem::new(),
             ws: Scratch::new(&model),
             model,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
-use palpa_sparse::fronts::SolveScratch;
+use palpa_sparse::fronts::{Half, SolveScratch, fronts_above};
 
 use super::super::inside::Inside;
 use super::super::outside::{Follower, Outside, Workshop};
@@ -18,50 +18,101 @@ use crate::state::Memory;
 pub struct Rebuild {
     pub(super) model: Arc<Model>,
     pub(super) pattern: Arc<ColumnPattern>,
-    pub(super) memory: Memory,
-    /// Displacements at the time of the request, m. `[n_nodes]`
-    pub(super) displacements: Vec<Vec3>,
+    /// The present zone.
+    pub(super) plan: Arc<Plan>,
+    /// The zone to be made; `None` for a new factor of the present exterior.
+    pub(super) target: Option<Target>,
     /// The exterior that determines the displacements outside the zone; `None` if those are up to
     /// date.
-    pub(super) old: Option<(Arc<Plan>, Arc<Outside>)>,
-    pub(super) target: Target,
-    /// Memory kept from the last job.
-    pub(super) shop: Box<Shop>,
+    pub(super) old: Option<Arc<Outside>>,
+    /// The room to work in. `None` if a job that panicked has taken it along; then this job only
+    /// makes another one.
+    pub(super) room: Option<Box<Room>>,
+    /// Viscous memory of the exterior's prisms at the end of the last job; `None` if there is none,
+    /// or if the exterior is followed.
+    pub(super) kept: Option<Arc<History>>,
     /// Duration of a step, and the time by which the exterior's memory lags behind, s.
     pub(super) dt: f64,
     pub(super) lag: f64,
-    /// Viscous memory of the prisms that the shop lacks, or of all prisms.
-    pub(super) history: Option<History>,
-    /// An exterior that is no longer needed. The background reuses its memory or frees it, so that
-    /// the step need not.
-    pub(super) retired: Option<Arc<Outside>>,
     pub(super) is_followed: bool,
     /// Number of the factor.
     pub(super) id: u64,
 }
 
-/// The zone whose exterior is to be factored.
+/// A new zone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    pub(super) id: u64,
+    /// Its centre at rest, m.
+    pub(super) centre: Vec3,
+    /// Its radius, m.
+    pub(super) radius: f64,
+}
+
+/// The arrays that go to the background with each job and come back with its result, so that the
+/// step allocates and frees nothing.
 #[derive(Debug)]
-pub(super) enum Target {
-    /// The present zone.
-    Same(Arc<Plan>),
-    /// A new zone.
-    New {
-        id: u64,
-        /// Its centre at rest, m.
-        centre: Vec3,
-        /// Its radius, m.
-        radius: f64,
-    },
+pub(super) struct Room {
+    pub(super) shop: Shop,
+    /// Factors and constant stresses at the time of the request.
+    pub(super) memory: Memory,
+    /// Displacements at the time of the request, m: of the zone, or of all nodes if the exterior does
+    /// not determine the others. `[n_nodes]`
+    pub(super) displacements: Vec<Vec3>,
+    /// Viscous memory at the time of the request of the prisms whose memory is updated in every
+    /// step; `None` without viscous materials.
+    pub(super) history: Option<History>,
+    pub(super) retired: Retired,
+}
+
+/// Parts of the body that are no longer needed. The next job reuses or frees them.
+#[derive(Debug, Default)]
+pub(super) struct Retired {
+    pub(super) plan: Option<Arc<Plan>>,
+    pub(super) outside: Option<Arc<Outside>>,
+    pub(super) kept: Option<Arc<History>>,
+    pub(super) inside: Option<Box<Inside>>,
+    pub(super) follower: Option<Box<Follower>>,
+    pub(super) entering: Option<Entering>,
+}
+
+/// Columns that enter a zone, and what it takes to update their displacements.
+#[derive(Debug)]
+pub(super) struct Entering {
+    pub(super) columns: Vec<u32>,
+    /// The fronts above them in the exterior of the old zone.
+    pub(super) fronts: Vec<bool>,
+    pub(super) scratch: SolveScratch<f32>,
+}
+
+impl Room {
+    /// A room for jobs of a zone.
+    pub(super) fn new(
+        model: &Model,
+        pattern: &ColumnPattern,
+        plan: &Plan,
+        kept: Option<&History>,
+    ) -> Box<Self> {
+        let memory = Memory::new(model);
+        let mut shop = Shop::new(model, &memory, pattern, plan);
+        if let Some(kept) = kept {
+            shop.follower.batches.load(kept);
+        }
+        Box::new(Self {
+            shop,
+            memory,
+            displacements: vec![Vec3::zeros(); model.n_nodes()],
+            history: model.has_memory.then(|| History::new(model)),
+            retired: Retired::default(),
+        })
+    }
 }
 
 /// The exterior's prisms with their tangents, and the arrays that it is factored in.
 #[derive(Debug)]
 pub(super) struct Shop {
-    /// Number of the zone whose exterior this is.
-    plan: u64,
     pub(super) follower: Follower,
-    workshop: Workshop,
+    pub(super) workshop: Workshop,
 }
 
 impl Shop {
@@ -72,7 +123,6 @@ impl Shop {
         plan: &Plan,
     ) -> Self {
         Self {
-            plan: plan.id,
             follower: Follower::new(model, memory, pattern, plan, Tangent::Single),
             workshop: Workshop::new(model, pattern, plan),
         }
@@ -104,12 +154,30 @@ impl Shop {
 /// The result of a [`Rebuild`].
 #[derive(Debug)]
 pub struct Rebuilt {
+    pub(super) room: Box<Room>,
+    /// As [`Rebuild::kept`], at the time of the request.
+    pub(super) kept: Option<Arc<History>>,
+    /// The new parts; `None` if the factor failed, or if only a room was made.
+    pub(super) made: Option<Made>,
+}
+
+/// The new parts of a body.
+#[derive(Debug)]
+pub(super) struct Made {
     pub(super) plan: Arc<Plan>,
-    /// The prisms of a new zone, and those of its exterior if it is followed.
-    pub(super) inside: Option<(Box<Inside>, Option<Box<Follower>>)>,
-    /// The new exterior; `None` if the factor failed.
-    pub(super) outside: Option<Arc<Outside>>,
-    pub(super) shop: Box<Shop>,
+    pub(super) outside: Arc<Outside>,
+    /// Those of a new zone.
+    pub(super) zone: Option<MadeZone>,
+}
+
+/// The prisms of a new zone.
+#[derive(Debug)]
+pub(super) struct MadeZone {
+    pub(super) inside: Box<Inside>,
+    /// The prisms of its exterior, if it is followed.
+    pub(super) follower: Option<Box<Follower>>,
+    /// The columns that were in the old exterior, if it responds linearly.
+    pub(super) entering: Option<Entering>,
 }
 
 impl Rebuild {
@@ -118,116 +186,146 @@ impl Rebuild {
     /// # Panics
     /// Never: a body that could be factored with one zone can be factored with another.
     pub fn run(mut self) -> Rebuilt {
-        let model = Arc::clone(&self.model);
-        let pattern = Arc::clone(&self.pattern);
-        let is_new = matches!(self.target, Target::New { .. });
+        let (model, pattern) = (Arc::clone(&self.model), Arc::clone(&self.pattern));
+        let Some(mut room) = self.room.take() else {
+            let kept = self.kept;
+            return Rebuilt {
+                room: Room::new(&model, &pattern, &self.plan, kept.as_deref()),
+                kept,
+                made: None,
+            };
+        };
+        let Retired { outside, kept, .. } = std::mem::take(&mut room.retired);
         let plan = match self.target {
-            Target::Same(plan) => plan,
-            Target::New { id, centre, radius } => {
+            None => Arc::clone(&self.plan),
+            Some(Target { id, centre, radius }) => {
                 let plan = Plan::new(&model, &pattern, id, centre, radius);
                 Arc::new(
                     plan.expect("a body that could be factored with one zone can be with another"),
                 )
             }
         };
-        let (mut shop, mut other) = if self.shop.plan == plan.id {
-            (self.shop, None)
-        } else {
-            let shop = Box::new(Shop::new(&model, &self.memory, &pattern, &plan));
-            (shop, Some(self.shop))
-        };
-        if let Some((plan, old)) = &self.old {
-            let mut scratch = SolveScratch::new(&plan.tree);
-            let x = &mut shop.workshop.x;
-            old.settle(&model, plan, None, &mut self.displacements, x, &mut scratch);
-        }
-        let past = ExteriorMemory {
-            memory: &mut self.memory,
-            displacements: &self.displacements,
-            is_linear: self.old.is_some(),
-            lag: self.lag,
-        };
-        past.bring_up(
-            &model,
-            self.history.as_mut(),
-            &mut shop,
-            other.as_deref_mut(),
-        );
+        let is_new = self.target.is_some();
+        let mut old_shop = is_new.then(|| {
+            let shop = Shop::new(&model, &room.memory, &pattern, &plan);
+            std::mem::replace(&mut room.shop, shop)
+        });
+        let entering = self.settle(&mut room, &plan);
         if model.has_memory {
-            self.memory.begin_materials(&model, self.dt);
-            shop.follower.batches.begin_lanes(&self.memory);
+            self.bring_up_memory(&mut room, old_shop.as_mut());
         }
-        let recycled = self
-            .retired
-            .filter(|old| old.plan == plan.id)
-            .and_then(Arc::into_inner);
-        let mut outside = recycled.unwrap_or_else(|| Outside::new(&model, &plan));
+        let recycled = outside.filter(|old| old.plan == plan.id);
+        let mut outside = recycled
+            .and_then(Arc::into_inner)
+            .unwrap_or_else(|| Outside::new(&model, &plan));
         outside.id = self.id;
-        let (memory, here) = (&self.memory, &self.displacements);
-        let made = shop.refactor(&mut outside, &model, memory, &pattern, &plan, here);
-        let inside = is_new.then(|| {
-            let mut follower = self.is_followed.then(|| {
-                Box::new(Follower::new(
-                    &model,
-                    memory,
-                    &pattern,
-                    &plan,
-                    Tangent::None,
-                ))
-            });
-            let mut inside = Box::new(Inside::new(&model, memory, &pattern, &plan));
-            if let Some(history) = &self.history {
-                inside.batches.load(history);
-                if let Some(follower) = &mut follower {
-                    follower.batches.load(history);
-                }
-            }
-            (inside, follower)
+        let Room {
+            shop,
+            memory,
+            displacements,
+            history,
+            ..
+        } = &mut *room;
+        let result = shop.refactor(&mut outside, &model, memory, &pattern, &plan, displacements);
+        let zone = (is_new && result.is_ok())
+            .then(|| self.zone(memory, history.as_ref(), &plan, entering));
+        if let (Err(_), Some(old)) = (&result, old_shop) {
+            *shop = old;
+        }
+        let kept = (model.has_memory && !self.is_followed).then(|| {
+            let recycled = kept.and_then(Arc::into_inner);
+            let mut kept = recycled.unwrap_or_else(|| History::new(&model));
+            kept.forget();
+            shop.follower.batches.store(&mut kept);
+            Arc::new(kept)
         });
         Rebuilt {
-            plan,
-            inside,
-            shop: match (&made, other) {
-                (Err(_), Some(old)) => old,
-                _ => shop,
-            },
-            outside: made.is_ok().then(|| Arc::new(outside)),
+            room,
+            kept,
+            made: result.is_ok().then(|| Made {
+                plan,
+                outside: Arc::new(outside),
+                zone,
+            }),
         }
     }
-}
 
-/// The viscous memory of the exterior's prisms, which may lag behind.
-struct ExteriorMemory<'a> {
-    memory: &'a mut Memory,
-    displacements: &'a [Vec3],
-    /// Whether the exterior answers linearly; then only background jobs update its memory.
-    is_linear: bool,
-    /// Time by which the memory lags behind, s.
-    lag: f64,
-}
+    /// Updates the displacements outside the present zone. Returns the columns that enter another
+    /// one.
+    fn settle(&self, room: &mut Room, plan: &Plan) -> Option<Entering> {
+        let old = self.old.as_ref()?;
+        let tree = &self.plan.tree;
+        let mut scratch = SolveScratch::new(tree);
+        let (displacements, x) = (&mut room.displacements, &mut room.shop.workshop.x);
+        old.settle(
+            &self.model,
+            &self.plan,
+            None,
+            displacements,
+            x,
+            &mut scratch,
+        );
+        let entering = plan.vertices.iter().copied();
+        let columns: Vec<u32> = entering
+            .filter(|&v| !self.plan.is_inside[v as usize])
+            .collect();
+        Some(Entering {
+            fronts: fronts_above(tree, Half::Exterior, columns.iter().copied()),
+            columns,
+            scratch,
+        })
+    }
 
-impl ExteriorMemory<'_> {
-    /// Updates the memory in a shop. `history` holds that of the prisms that no shop has; the
-    /// memory of `other`, the shop of another zone, is added to it.
-    fn bring_up(
-        self,
-        model: &Model,
-        history: Option<&mut History>,
-        shop: &mut Shop,
-        other: Option<&mut Shop>,
-    ) {
-        if let Some(history) = history {
-            if let (true, Some(old)) = (self.is_linear, other) {
-                self.memory.begin_materials(model, self.lag);
-                let batches = &mut old.follower.batches;
-                batches.commit_lanes(self.memory, self.displacements);
+    /// Updates the viscous memory of the exterior's prisms, and gives it to the shop; `old` is that
+    /// of the present zone, if there is a new one.
+    fn bring_up_memory(&self, room: &mut Room, old: Option<&mut Shop>) {
+        let Room {
+            shop,
+            memory,
+            displacements,
+            history,
+            ..
+        } = room;
+        let is_new = old.is_some();
+        if !self.is_followed {
+            // Nothing else updates the memory of a linear exterior.
+            memory.begin_materials(&self.model, self.lag);
+            let batches = &mut old.map_or(&mut *shop, |old| old).follower.batches;
+            batches.commit_lanes(memory, displacements);
+            if let (true, Some(history)) = (is_new, &mut *history) {
                 batches.store(history);
             }
+        }
+        if let (true, Some(history)) = (is_new || self.is_followed, history) {
             shop.follower.batches.load(history);
-        } else if model.has_memory {
-            self.memory.begin_materials(model, self.lag);
-            let batches = &mut shop.follower.batches;
-            batches.commit_lanes(self.memory, self.displacements);
+        }
+        memory.begin_materials(&self.model, self.dt);
+        shop.follower.batches.begin_lanes(memory);
+    }
+
+    /// The prisms of a new zone.
+    fn zone(
+        &self,
+        memory: &Memory,
+        history: Option<&History>,
+        plan: &Plan,
+        entering: Option<Entering>,
+    ) -> MadeZone {
+        let (model, pattern) = (&self.model, &self.pattern);
+        let mut inside = Box::new(Inside::new(model, memory, pattern, plan));
+        let mut follower = self
+            .is_followed
+            .then(|| Box::new(Follower::new(model, memory, pattern, plan, Tangent::None)));
+        if let Some(history) = history {
+            inside.batches.load(history);
+            if let Some(follower) = &mut follower {
+                follower.batches.load(history);
+            }
+        }
+        MadeZone {
+            inside,
+            follower,
+            entering,
         }
     }
 }

@@ -8,6 +8,7 @@ use palpa_mesh::Vec3;
 use super::carry::{Carry, Come};
 use super::pressed::{Pressed, nearest_point};
 use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome};
+use crate::batch::History;
 use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -73,7 +74,7 @@ pub struct RoamJob {
 
 #[derive(Debug)]
 enum Kind {
-    Zone(Box<Rebuild>),
+    Zone(Rebuild),
     Mesh(Arc<dyn FineBodies>, Vec3),
     Move(Box<Move>),
 }
@@ -190,7 +191,9 @@ impl Moved {
             skin.anchors[v] = now.anchors[u];
         }
         if model.has_memory {
-            let history = self.carry.history(&old.model, &old.history(), &model);
+            let mut history = History::new(&old.model);
+            old.remember(&mut history);
+            let history = self.carry.history(&old.model, &history, &model);
             live.inside.batches.load(&history);
             if let Some(follower) = live.exterior.follower_mut() {
                 follower.batches.load(&history);
@@ -295,7 +298,7 @@ impl Roaming {
             return None;
         }
         let is_mesh_first = self.next.is_some() || self.was_zone;
-        let zone = |live: &mut Live| Some(Kind::Zone(Box::new(live.take_job()?)));
+        let zone = |live: &mut Live| live.take_job().map(Kind::Zone);
         // Without contact this check searches the skin, so it is made once a step.
         let kind = if is_mesh_first {
             self.ask().or_else(|| zone(&mut self.live))
@@ -346,6 +349,16 @@ impl Roaming {
         let displacements = &live.state.displacements;
         let (_, point) = nearest_point(&live.model, displacements, &live.course.tools, None);
         (point, Vec3::zeros())
+    }
+
+    /// Call it instead of [`Self::install`] if the job panicked. The body keeps its zone and mesh,
+    /// and requests another job.
+    pub fn job_failed(&mut self) {
+        self.is_job_out = false;
+        // The body's own job is out only if it was a zone.
+        if self.was_zone {
+            self.live.job_failed();
+        }
     }
 
     /// Installs the result of a job.

@@ -136,7 +136,7 @@ impl Live {
             ExteriorState::Followed { follower, .. } => {
                 follower.batches.commit(model, memory, &mut self.state);
             }
-            ExteriorState::Linear { lag, .. } => *lag += dt,
+            ExteriorState::Linear { .. } => self.exterior.age(dt),
         }
     }
 }
