@@ -68,6 +68,11 @@ pub struct Model {
 }
 
 impl Model {
+    /// Whether any material has tension at rest.
+    pub(crate) fn is_tense(&self) -> bool {
+        self.materials.iter().any(|m| m.prestress != 0.0)
+    }
+
     /// Builds a model. Cost: the symbolic factor, which grows a little faster than the number of
     /// nodes.
     ///

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::Mat3;
 use crate::element::{N_POINTS, Overstress, elastic_stresses};
-use crate::law::PronyStep;
+use crate::law::{Prony, PronyStep};
 use crate::model::Model;
 
 /// How a skin vertex touches a tool.
@@ -66,6 +66,24 @@ pub(crate) struct PhaseHistory {
 }
 
 impl PhaseHistory {
+    /// Adds a multiple of the last elastic stresses of another memory.
+    pub(crate) fn add_last(&mut self, by: f64, other: &Self) {
+        let n_rows = self.volume.len();
+        for (into, from) in self
+            .points
+            .iter_mut()
+            .zip(&other.points)
+            .step_by(n_rows.max(1))
+        {
+            for (into, from) in into.iter_mut().zip(from) {
+                *into += by * from;
+            }
+        }
+        if let (Some(into), Some(from)) = (self.volume.first_mut(), other.volume.first()) {
+            into[0] += by * from[0];
+        }
+    }
+
     /// Takes over the memory of other pairs' phases. `old` has, for each of this pair's two wedges,
     /// the old phase and the index of the wedge in its pair.
     pub(crate) fn carry(&mut self, old: [(&Self, usize); 2]) {
@@ -203,6 +221,13 @@ impl Memory {
                 }
                 _ => [1.0; 2],
             };
+        }
+    }
+
+    /// Prepares a step at whose end only the last elastic stresses are updated.
+    pub(crate) fn hold(&mut self, model: &Model) {
+        for (material, step) in model.materials.iter().zip(&mut self.steps) {
+            *step = material.prony.as_ref().map(Prony::hold);
         }
     }
 

@@ -124,12 +124,13 @@ mod tests {
         let text = format!("{}\n{lump}", before.to_toml());
         let pressed = Scene::parse(&text, &before.base_dir).unwrap();
         assert_eq!(pressed.lumps.len(), 1);
-        let notes = [Note::LevelsTooHigh { max_levels: 9 }, Note::TensionRelaxes];
+        let left_out = Note::TensionLeftOut;
+        let notes = [Note::LevelsTooHigh { max_levels: 9 }, left_out.clone()];
 
         let drawn = Veil::Drawn { before: &before };
         assert!(drawn.scene(&pressed).lumps.is_empty());
         assert_eq!(*drawn.scene_file(&pressed), before);
-        assert_eq!(drawn.notes(&notes), [shown(&Note::TensionRelaxes)]);
+        assert_eq!(drawn.notes(&notes), [shown(&left_out)]);
         assert!(drawn.check_field(Field::VonMises).is_err());
         assert!(drawn.check_field(Field::None).is_ok());
         assert!(drawn.check_recording().is_err());

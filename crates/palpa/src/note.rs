@@ -209,8 +209,6 @@ pub enum Note {
         /// Largest ratio at which bars represent it.
         most: f64,
     },
-    /// The tension of layers relaxes during the first steps of the tissue.
-    TensionRelaxes,
     /// The motion leaves the skin.
     MotionOffSkin {
         /// Distance along the motion at which it leaves the skin, m.
@@ -518,9 +516,6 @@ impl fmt::Display for Note {
                     unsound.join(", ")
                 )
             }
-            Self::TensionRelaxes => f.write_str(
-                "tension of layers is not in equilibrium when the loop starts: the first steps of the tissue relax it",
-            ),
             Self::MotionOffSkin { far, length } => write!(
                 f,
                 "{:.0} mm along its motion the tool is off the skin, where nothing is felt; shorten [motion] length = \"{:.0} mm\"",

@@ -329,9 +329,6 @@ export interface components {
              */
             most: number;
         } | {
-            /** @constant */
-            kind: "tension_relaxes";
-        } | {
             /**
              * Format: double
              * @description Distance along the motion at which it leaves the skin, m.

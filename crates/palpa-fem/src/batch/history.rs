@@ -40,6 +40,29 @@ impl History {
         self.is_known.fill(false);
     }
 
+    /// Adds a multiple of another memory, row by row; only the last elastic stress if `is_last`.
+    pub(crate) fn add(&mut self, by: f64, other: &Self, is_last: bool) {
+        let n_rows = if is_last {
+            self.n_rows.min(1)
+        } else {
+            self.n_rows
+        };
+        for (pair, _) in self
+            .is_known
+            .iter()
+            .enumerate()
+            .filter(|(_, known)| **known)
+        {
+            for row in 0..n_rows {
+                let range = self.row(pair, row);
+                let from = &other.numbers[range.clone()];
+                for (into, from) in self.numbers[range].iter_mut().zip(from) {
+                    *into += by * from;
+                }
+            }
+        }
+    }
+
     /// Takes over the memory of another mesh's pairs. `old` has, for each of this pair's two
     /// wedges, the old pair and the index of the wedge in it.
     pub(crate) fn carry(&mut self, pair: usize, from: &Self, old: [(usize, usize); 2]) {
@@ -87,6 +110,15 @@ impl Batches {
 
     /// Takes the memory of these pairs from a history, as far as it is known there.
     pub(crate) fn load(&mut self, history: &History) {
+        self.update(history, |into, from| *into = from);
+    }
+
+    /// Adds a history to the memory of these pairs, as far as it is known.
+    pub(crate) fn add(&mut self, history: &History) {
+        self.update(history, |into, from| *into += from);
+    }
+
+    fn update(&mut self, history: &History, put: impl Fn(&mut f64, f64)) {
         for batch in &mut self.full {
             let Some(past) = &mut batch.past else {
                 continue;
@@ -99,7 +131,7 @@ impl Batches {
                     let range = history.row(pair as usize, r);
                     let numbers = row.stress.iter_mut().flatten().chain([&mut row.pressure]);
                     for (into, from) in numbers.zip(&history.numbers[range]) {
-                        into[lane] = *from;
+                        put(&mut into[lane], *from);
                     }
                 }
             }

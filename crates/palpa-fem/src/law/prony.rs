@@ -173,6 +173,16 @@ impl Prony {
         step
     }
 
+    /// Factors with which [`PronyStep::advance`] leaves the memories as they are and only takes over
+    /// the last stress.
+    pub(crate) fn hold(&self) -> PronyStep {
+        PronyStep {
+            scale: self.long_term(),
+            decay: [1.0; Self::MOST_TERMS],
+            gain: [0.0; Self::MOST_TERMS],
+        }
+    }
+
     fn relaxing(&self) -> f64 {
         self.terms.iter().map(|term| term.g).sum()
     }

@@ -8,6 +8,7 @@ mod law;
 mod lump;
 mod pairing;
 mod realtime;
+mod rest;
 mod robust;
 mod shape;
 mod statics;

@@ -105,8 +105,8 @@ impl LiveScene {
         let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
         let way = if moves { Vec::new() } else { way(scene) };
         let prepared = Arc::new(Prepared::on(scene, grown, &way)?);
-        // The body's state when the loop begins. Without tension it is the undeformed mesh, so
-        // there is nothing to solve.
+        // The loop begins at rest, as the press does. Without tension that is the undeformed mesh,
+        // so there is nothing to solve.
         let rest = if prepared.is_tense() {
             Some(prepared.rest()?)
         } else {
@@ -140,9 +140,6 @@ impl LiveScene {
         note_mesh(&model, mesh, scene, &mut notes);
         note_tension(&mesh.body, scene, &mut notes);
         check_way(scene, &prepared, &mut notes)?;
-        if prepared.is_tense() {
-            notes.push(Note::TensionRelaxes);
-        }
         Ok(Self {
             start,
             meshes,

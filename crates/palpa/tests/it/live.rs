@@ -1,10 +1,14 @@
 //! Scenes set up for real time: what is refused, and what is noted.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use palpa::Note;
 use palpa::live::{LiveScene, SpringScene};
+use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
+use palpa::{Note, Prepared};
+use palpa_rt::{Tissue, TissueInput, empty_patch};
+use palpa_servo::{MAX_TOOLS, Pose};
 use palpa_testkit::{Layer, Scene as SceneText, Value};
 
 fn block() -> SceneText {
@@ -44,4 +48,60 @@ fn a_bonded_tool_and_a_moving_mesh_without_refinement_are_refused() {
         .set("mesh", "refine", false);
     let still = refusal(still);
     assert!(still.contains("needs refine = true"), "{still}");
+}
+
+/// Tissue whose upper layer is under tension, pressed near an edge, where tension moves the skin.
+fn tense() -> SceneText {
+    SceneText::soft_over_stiff([60.0, 60.0, 24.0], 8.0, 8.0, 10.0)
+        .with_layer(0, |soft| soft.set("prestress", "3 kPa"))
+        .sphere(8.0)
+        .press(2.0)
+        .set("press", "at", Value::lengths([18.0, 0.0, 0.0]))
+        .set("press", "step", "0.5 mm")
+        .set("press", "retract", false)
+        .near_tool(4.0)
+        .motion("press", 2.0)
+}
+
+#[test]
+fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
+    let scene = parse(&tense());
+    let indentation = Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap();
+    let mut run = indentation.start(0);
+    let last = std::iter::from_fn(|| run.advance()).last().unwrap();
+    let expected = last.force_n;
+
+    let live = LiveScene::build(&scene).unwrap();
+    let mut tissue = live.tissue().unwrap();
+    let mut patch = empty_patch();
+    let mut step = |number: u64, depth: f64| {
+        let z = -(scene.motion.above + depth);
+        let input = TissueInput {
+            step: number,
+            tick: number,
+            sampled_at: 0.0,
+            now: 0.0,
+            dt: 5e-3,
+            period: 5e-3,
+            poses: [Pose::translation(0.0, 0.0, z); MAX_TOOLS],
+            n_tools: 1,
+        };
+        tissue.step(&input, &mut patch);
+        if let Some(job) = tissue.take_job() {
+            let done = palpa::live::LiveTissue::run(job);
+            tissue.install(done);
+        }
+        tissue.force(0).z
+    };
+    // Twenty steps just above the skin at rest: nothing touches, so nothing has moved.
+    for k in 0..20 {
+        assert_eq!(step(k, -0.05e-3), 0.0, "step {k}");
+    }
+    let mut force = 0.0;
+    for k in 0..100 {
+        force = step(20 + k, 2e-3 * (k.min(50) as f64) / 50.0);
+    }
+    println!("{force} N, {expected} N in a scripted press");
+    assert!(expected > 0.05, "{expected} N");
+    assert!((force / expected - 1.0).abs() < 0.01, "{force} {expected}");
 }

@@ -4,9 +4,9 @@ use palpa_mesh::{SurfaceIndex, Vec3};
 
 use super::Live;
 use super::candidates::SkinForces;
-use crate::batch::History;
+use crate::batch::{Batches, History, Tangent};
 use crate::model::Model;
-use crate::state::State;
+use crate::state::{Memory, State};
 
 /// The places of a mesh's columns and prisms in another mesh of the same body. Both have the same
 /// skin at rest and the same levels.
@@ -30,10 +30,13 @@ pub(super) struct Come {
 }
 
 impl Come {
-    /// A body at rest.
-    pub(super) fn rest(model: &Model) -> Self {
+    /// A body at rest, with these displacements, m. `[n_nodes]`
+    pub(super) fn rest(model: &Model, displacements: &[Vec3]) -> Self {
         Self {
-            state: State::new(model),
+            state: State {
+                displacements: displacements.to_vec(),
+                ..State::new(model)
+            },
             history: None,
             skin: SkinForces::none(model.body.n_vertices()),
         }
@@ -54,6 +57,32 @@ impl Come {
             skin: live.skin.clone(),
         }
     }
+}
+
+impl Come {
+    /// Adds a multiple of the last elastic stresses of another state.
+    fn add_last(&mut self, by: f64, other: &Self) {
+        for (into, from) in self.state.history.iter_mut().zip(&other.state.history) {
+            into.add_last(by, from);
+        }
+        if let (Some(into), Some(from)) = (&mut self.history, &other.history) {
+            into.add(by, from, true);
+        }
+    }
+}
+
+/// A state whose memory has the elastic stresses of these displacements (m, `[n_nodes]`).
+fn elastic(model: &Model, displacements: &[Vec3]) -> Come {
+    let mut come = Come::rest(model, displacements);
+    let mut memory = Memory::new(model);
+    memory.hold(model);
+    let pattern = &model.structure.pattern;
+    let mut batches = Batches::new(model, &memory, pattern, &|_| true, Tangent::None);
+    batches.commit(model, &memory, &mut come.state);
+    let mut history = History::new(model);
+    batches.store(&mut history);
+    come.history = Some(history);
+    come
 }
 
 impl Carry {
@@ -95,14 +124,17 @@ impl Carry {
         }
     }
 
-    /// Carries a state on the old mesh over to the new one.
-    pub(super) fn onto(&self, old: &Model, come: &Come, new: &Model) -> Come {
-        let mut out = Come::rest(new);
+    /// Carries a state on the old mesh over to the new one. `rest` has the displacements of both
+    /// meshes at rest, m: what is carried is the difference from rest.
+    pub(super) fn onto(&self, old: &Model, come: &Come, new: &Model, rest: [&[Vec3]; 2]) -> Come {
+        let from_rest = come.state.displacements.iter().zip(rest[0]);
+        let from_rest: Vec<Vec3> = from_rest.map(|(u, rest)| u - rest).collect();
+        let mut displacements = self.displacements(new, &from_rest);
+        for (u, rest) in displacements.iter_mut().zip(rest[1]) {
+            *u += rest;
+        }
+        let mut out = Come::rest(new, &displacements);
         for v in 0..self.parts.len() {
-            for l in 0..new.body.n_levels {
-                out.state.displacements[new.body.node(v, l)] =
-                    self.displacement(v, l, new, &come.state.displacements);
-            }
             if let Some(u) = self.same[v] {
                 out.skin.pressures[v] = come.skin.pressures[u as usize];
                 out.skin.frictions[v] = come.skin.frictions[u as usize];
@@ -110,10 +142,29 @@ impl Carry {
             }
         }
         if new.has_memory {
-            self.carry_phases(old, &come.state, new, &mut out.state);
-            out.history = come.history.as_ref().map(|h| self.history(old, h, new));
+            self.carry_memory(old, come, new, &mut out);
         }
         out
+    }
+
+    /// Carries the viscous memory over. The last elastic stresses are carried by their difference from
+    /// those of the present displacements: another mesh has other stresses at the same displacements,
+    /// and a body at rest must not take that for a stress that has changed.
+    fn carry_memory(&self, old: &Model, come: &Come, new: &Model, out: &mut Come) {
+        let last = elastic(old, &come.state.displacements);
+        let mut from = come.clone();
+        from.add_last(-1.0, &last);
+        self.carry_phases(old, &from.state, new, &mut out.state);
+        out.history = from.history.map(|history| self.history(old, &history, new));
+        out.add_last(1.0, &elastic(new, &out.state.displacements));
+    }
+
+    /// Displacements of all nodes of the new mesh, interpolated in the old one, m. `[n_nodes]`
+    pub(super) fn displacements(&self, new: &Model, old: &[Vec3]) -> Vec<Vec3> {
+        (0..self.parts.len())
+            .flat_map(|v| (0..new.body.n_levels).map(move |l| (v, l)))
+            .map(|(v, l)| self.displacement(v, l, new, old))
+            .collect()
     }
 
     /// Displacement at the place of a new vertex, interpolated in the old mesh, m.

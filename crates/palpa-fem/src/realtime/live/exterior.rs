@@ -118,10 +118,17 @@ impl ExteriorState {
         }
     }
 
-    /// Called when the body restarts from rest.
+    /// Called when the body restarts from rest, where it has been for ever.
     pub(super) fn lose(&mut self) {
-        if let Self::Linear { is_lost, .. } = self {
+        if let Self::Linear {
+            lag,
+            singles_lag,
+            is_lost,
+        } = self
+        {
             *is_lost = true;
+            *lag = f64::INFINITY;
+            *singles_lag = f64::INFINITY;
         }
     }
 

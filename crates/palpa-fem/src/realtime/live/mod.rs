@@ -11,6 +11,7 @@
 //! | `course` | how far the tools may go in a step |
 //! | `pressed` | where the tools press, how deep and how wide |
 //! | `exterior` | the body outside the zone |
+//! | `rest` | the body at rest |
 //! | `recovery` | the last good state, the way back to it, and the start again at rest |
 //! | `rebuild` | a job for the background: a new zone, or a new factor of the exterior |
 //! | `jobs` | when a job is due, and how its result is installed |
@@ -40,6 +41,7 @@ mod pressed;
 mod rebuild;
 mod recovery;
 mod report;
+mod rest;
 mod roaming;
 mod springs;
 mod step;
@@ -89,6 +91,8 @@ pub struct Live {
     memory: Memory,
     /// Which columns are in the zone.
     plan: Arc<Plan>,
+    /// Displacements at rest, m: zero unless a layer has tension. `[n_nodes]`
+    rest: Arc<[Vec3]>,
     /// The zone's prisms and factor.
     inside: Box<Inside>,
     /// The exterior, linearised about an earlier state.
@@ -117,25 +121,26 @@ impl Live {
         tools: &[PosedTool],
         params: LiveParams,
     ) -> Result<Self, FemError> {
-        let come = Come::rest(&model);
-        let centre = nearest_point(&model, &come.state.displacements, tools, None).1;
-        Self::at(model, tools, params, centre, come, 0)
+        let rest = rest::displacements(&model)?;
+        let centre = nearest_point(&model, &rest, tools, None).1;
+        let come = Come::rest(&model, &rest);
+        Self::at(model, tools, params, centre, come, rest, 0)
     }
 
-    /// A body in a given state, with its first zone around a point of the skin at rest. Zones are
-    /// numbered from `n_before` on.
+    /// A body in a given state, with its first zone around a point of the skin at rest. Without a
+    /// history it has relaxed. Zones are numbered from `n_before` on.
     fn at(
         model: Arc<Model>,
         tools: &[PosedTool],
         params: LiveParams,
         centre: Vec3,
         come: Come,
+        rest: Arc<[Vec3]>,
         n_before: u64,
     ) -> Result<Self, FemError> {
         let pattern = Arc::new(model.structure.pattern.clone());
-        let state = come.state;
+        let mut state = come.state;
         let mut memory = Memory::new(&model);
-        memory.begin(&model, &state, 0.0);
         let n_zones = n_before + 1;
         let plan = Plan::new(&model, &pattern, n_zones, centre, params.zone_radius)?;
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
@@ -159,6 +164,14 @@ impl Live {
                 follower.batches.load(history);
             }
         }
+        if come.history.is_none() {
+            rest::relax(&mut inside.batches, &model, &mut memory, &mut state);
+            rest::relax(&mut shop.follower.batches, &model, &mut memory, &mut state);
+            if let Some(follower) = &mut follower {
+                rest::relax(&mut follower.batches, &model, &mut memory, &mut state);
+            }
+        }
+        memory.begin(&model, &state, 0.0);
         if model.has_memory {
             shop.follower.batches.begin(&model, &mut memory, &state);
         }
@@ -186,6 +199,7 @@ impl Live {
             inside,
             outside: Arc::new(outside),
             exterior: ExteriorState::new(follower),
+            rest,
             recovery: Recovery::new(&state.displacements, &come.skin.pressures, tools),
             skin: come.skin,
             singles,

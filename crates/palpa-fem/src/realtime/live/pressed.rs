@@ -42,11 +42,11 @@ impl Live {
             .fold(0.0, f64::max)
     }
 
-    /// Largest displacement of a vertex that presses, m.
+    /// Largest distance of a vertex that presses from its place at rest, m.
     pub(super) fn depth(&self) -> f64 {
         self.problem
             .pressing()
-            .map(|c| self.state.displacements[self.model.body.node(c.vertex as usize, 0)].norm())
+            .map(|c| self.indentation(c.vertex))
             .fold(0.0, f64::max)
     }
 

@@ -111,13 +111,12 @@ impl Live {
     /// state.
     fn start_again(&mut self) {
         self.recovery.n_failed = 0;
-        self.state.displacements.fill(Vec3::zeros());
+        self.lie_down();
         self.skin.pressures.fill(0.0);
         self.skin.frictions.fill(Vec3::zeros());
         self.springs.take_off();
         self.forget_forces();
         self.jobs.ask_for_factor();
-        self.exterior.lose();
         self.lift_tools();
         self.course.clearance = 0.0;
         self.keep_good();

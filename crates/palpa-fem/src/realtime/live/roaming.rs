@@ -7,7 +7,7 @@ use palpa_mesh::Vec3;
 
 use super::carry::{Carry, Come};
 use super::pressed::{Pressed, nearest_point};
-use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome};
+use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome, rest};
 use crate::batch::History;
 use crate::error::FemError;
 use crate::model::Model;
@@ -16,6 +16,10 @@ use crate::posed_tool::PosedTool;
 /// Largest number of steps that bring a body to equilibrium on a new mesh, each with a new
 /// stiffness.
 const MOST_SETTLING: usize = 8;
+/// Most steps that bring a body with tension to rest on a new mesh, each with a new stiffness, and
+/// the largest displacement in a step, m, at which it is at rest.
+const REST_STEPS: usize = 8;
+const REST_CHANGE: f64 = 1e-8;
 /// Distance of the tools from the centre of the fine part at which the mesh moves, and distance by
 /// which the next centre lies ahead of them; both as a share of the radius of the fine part.
 const LEAVE: f64 = 0.25;
@@ -97,6 +101,8 @@ struct Move {
     old: Arc<Model>,
     new: Arc<Model>,
     come: Come,
+    /// Displacements of the old mesh at rest, m.
+    rest: Arc<[Vec3]>,
     tools: Vec<PosedTool>,
     params: LiveParams,
     centre: Vec3,
@@ -133,10 +139,11 @@ impl RoamJob {
 impl Move {
     fn run(self) -> Option<Box<Moved>> {
         let carry = Carry::new(&self.old, &self.new);
-        let come = carry.onto(&self.old, &self.come, &self.new);
+        let rest = self.rest_on(&carry)?;
+        let come = carry.onto(&self.old, &self.come, &self.new, [&self.rest, &rest]);
         let model = Arc::clone(&self.new);
         let (params, n) = (self.params, self.n_before);
-        let live = Live::at(model, &self.tools, params, self.centre, come, n).ok()?;
+        let live = Live::at(model, &self.tools, params, self.centre, come, rest, n).ok()?;
         let mut live = Box::new(live);
         live.exterior.set_lag(self.lag);
         for round in 0..MOST_SETTLING {
@@ -160,6 +167,48 @@ impl Move {
                     lag: self.lag,
                 }));
             }
+        }
+        None
+    }
+}
+
+impl Move {
+    /// Displacements of the new mesh at rest, m. With tension the static solver finds them where the
+    /// steps do not; it uses the threads of rayon's pool.
+    fn rest_on(&self, carry: &Carry) -> Option<Arc<[Vec3]>> {
+        if self.new.is_tense() {
+            let found = self.rest_by_steps(carry);
+            return found.or_else(|| rest::displacements(&self.new).ok());
+        }
+        Some(Arc::from(vec![Vec3::zeros(); self.new.n_nodes()]))
+    }
+
+    /// As [`Self::rest_on`]: the rest of the old mesh, brought to equilibrium on the new one in steps
+    /// of infinite duration without tools. `None` if that fails, as in coarse triangles that tension
+    /// bends strongly.
+    fn rest_by_steps(&self, carry: &Carry) -> Option<Arc<[Vec3]>> {
+        let model = Arc::clone(&self.new);
+        let rest: Arc<[Vec3]> = carry.displacements(&model, &self.rest).into();
+        let come = Come::rest(&model, &rest);
+        let mut live = Live::at(model, &[], self.params, self.centre, come, rest, 0).ok()?;
+        let mut before = live.state.displacements.clone();
+        for _ in 0..REST_STEPS {
+            live.jobs.ask_for_factor();
+            if live.step(&[], f64::INFINITY).outcome != StepOutcome::Arrived {
+                return None;
+            }
+            if let Some(mut job) = live.take_job() {
+                // Nothing presses, so the zone need not move.
+                job.target = None;
+                live.install(job.run());
+            }
+            live.settle();
+            let now = &live.state.displacements;
+            let changes = now.iter().zip(&before).map(|(now, before)| now - before);
+            if changes.map(|change| change.amax()).fold(0.0, f64::max) < REST_CHANGE {
+                return Some(live.state.displacements.into());
+            }
+            before.copy_from_slice(now);
         }
         None
     }
@@ -191,12 +240,15 @@ impl Moved {
             skin.anchors[v] = now.anchors[u];
         }
         if model.has_memory {
-            let mut history = History::new(&old.model);
-            old.remember(&mut history);
-            let history = self.carry.history(&old.model, &history, &model);
-            live.inside.batches.load(&history);
+            let mut change = History::new(&old.model);
+            old.remember(&mut change);
+            if let Some(then) = &self.then.history {
+                change.add(-1.0, then, false);
+            }
+            let change = self.carry.history(&old.model, &change, &model);
+            live.inside.batches.add(&change);
             if let Some(follower) = live.exterior.follower_mut() {
-                follower.batches.load(&history);
+                follower.batches.add(&change);
             }
         }
         let lag = live.exterior.lag() + old.exterior.lag() - self.lag;
@@ -320,6 +372,7 @@ impl Roaming {
                 old: Arc::clone(&self.live.model),
                 new,
                 come: Come::of(&mut self.live),
+                rest: Arc::clone(&self.live.rest),
                 tools: self.live.course.tools.clone(),
                 params: self.params,
                 centre: self.live.next_centre(),
