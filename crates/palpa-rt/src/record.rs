@@ -192,7 +192,7 @@ record! {
         stale_periods: f64,
         /// Smallest age at which a patch can count as stale, s.
         stale_after: f64,
-        /// Time between two ticks beyond which the deadline counts as missed, s.
+        /// Time between two ticks beyond which the force ramps to zero, s.
         late_after: f64,
         /// Time of equal readings beyond which a device counts as stalled, s.
         stall_after: f64,

@@ -40,6 +40,8 @@ impl HandPiece {
         params: &ServoParams,
     ) -> Faults {
         self.travel = Vec3::zeros();
+        // While the loop itself was away, no reading could be new.
+        self.changed_at += (dt - 2.0 * params.period).max(0.0);
         let Some(state) = state else {
             return self.lost(Faults::DEVICE_LOST);
         };

@@ -22,7 +22,8 @@ pub struct ServoParams {
     pub stale_periods: f64,
     /// Smallest age at which a patch can count as stale, s.
     pub stale_after: f64,
-    /// Time between two ticks beyond which the deadline counts as missed, s.
+    /// Time between two ticks beyond which the force ramps to zero, s. After a shorter time the
+    /// force goes on by the local model, within the slew of two periods.
     pub late_after: f64,
     /// Time for which a device may repeat the same reading before it counts as stalled, s.
     pub stall_after: f64,
@@ -55,7 +56,7 @@ impl Default for ServoParams {
             max_transfer: 0.25,
             stale_periods: 4.0,
             stale_after: 0.05,
-            late_after: 0.01,
+            late_after: 0.03,
             stall_after: 0.02,
             max_speed: 5.0,
             ramp_down: 0.05,

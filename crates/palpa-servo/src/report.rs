@@ -73,7 +73,8 @@ flags! {
         STALE_PATCH = 1, "stale patch";
         /// The newest patch holds values that cannot be a contact.
         BAD_PATCH = 2, "patch not usable";
-        /// The time since the last tick was too long.
+        /// The time since the last tick was longer than the local model may be held, or many
+        /// ticks were late.
         MISSED_DEADLINE = 3, "missed deadline";
         /// The clock went back, stood still, or was not a number.
         BAD_CLOCK = 4, "bad clock";

@@ -120,6 +120,50 @@ fn a_hiccup_of_the_clock_is_survived() {
 }
 
 #[test]
+fn hiccups_below_30_ms_are_not_felt() {
+    // While the hand rests, and in the middle of a stroke.
+    for (name, is_stroke) in [("rest", false), ("stroke", true)] {
+        let mut trial = trial(0.1);
+        if is_stroke {
+            let above = Vec3::new(0.0, 0.0, trial.bed.radius + 3e-3);
+            trial.path = Path::from(above)
+                .hold(0.8)
+                .to(above - Vec3::z() * 10e-3, 0.1)
+                .hold(1.0)
+                .to(above + Vec3::new(10e-3, 0.0, -10e-3), 0.05)
+                .hold(5.0);
+        }
+        let device = || SimulatedDevice::new(trial.device, trial.grip, trial.path.clone());
+        // The force at each time without a hiccup.
+        let plain = trial.run_with(device(), SimulatedDevice::position, |_| 0.0);
+        let force_at = |time: f64| -> f64 {
+            let close = plain.samples.iter().find(|s| s.time >= time - 5e-4);
+            close.unwrap_or(&plain.samples[0]).force.norm()
+        };
+        for gap in [0.01, 0.02, 0.028] {
+            // Three of them, as a busy system takes them.
+            let mut left = vec![3.1, 3.03, 2.95];
+            let report = trial.run_with(device(), SimulatedDevice::position, |clock| {
+                let now = left.last().is_some_and(|at| clock >= *at);
+                if now {
+                    left.pop();
+                }
+                if now { gap } else { 0.0 }
+            });
+            let late = (report.samples.windows(2)).filter(|p| p[1].time - p[0].time > 0.9 * gap);
+            assert_eq!(late.count(), 3);
+            let least = (report.samples.iter())
+                .filter(|s| s.time > 2.9)
+                .map(|s| s.force.norm() / force_at(s.time))
+                .fold(f64::INFINITY, f64::min);
+            println!("{name}, {gap} s: {least:.3} of the force");
+            assert!(least > 0.9, "{name}, {gap} s: {least} of the force");
+            assert!(report.rms < 0.02, "{name}, {gap} s: {}", report.rms);
+        }
+    }
+}
+
+#[test]
 fn a_hand_at_a_metre_a_second_is_survived() {
     let trial = trial(1.0);
     check(&trial.run(), Faults::NONE, "1 m/s");

@@ -128,6 +128,109 @@ fn faults_of_device_and_clock_ramp_down_and_recover() {
     }
 }
 
+/// The share of the force that is left at the worst tick of the half second after a tick that
+/// begins `gap` seconds after the one before it, and the faults in that time. The hand moves across
+/// at `speed`, m/s, until then. If `is_stuck`, the device's first reading is an old one.
+fn least_share(gap: f64, speed: f64, is_stuck: bool) -> (f64, Faults) {
+    let (mut servo, patch) = settled();
+    let mut at = DEEP;
+    let mut before = f64::INFINITY;
+    for k in 0..60 {
+        at += Vec3::x() * (1e-3 * speed);
+        let mut fresh = patch.clone();
+        fresh.id += 2000 + k;
+        servo.send(fresh);
+        before = servo.tick(Some(at)).tools[0].force.norm();
+    }
+    let read_at = servo.now;
+    // The system gives the time to another program: the tissue rests too.
+    servo.now += gap;
+    at += Vec3::x() * (gap * speed);
+    let (mut least, mut faults) = (f64::INFINITY, Faults::NONE);
+    for k in 0..500 {
+        if k % 5 == 4 {
+            let mut fresh = patch.clone();
+            fresh.id += 3000 + k;
+            servo.send(fresh);
+        }
+        // The driver of the device may have rested too: then its first reading is that of before.
+        let time = if is_stuck && k == 0 {
+            read_at
+        } else {
+            servo.now
+        };
+        let states = [Some(crate::support::state(time, at))];
+        let report = servo
+            .servo
+            .tick(servo.now, &states, &mut servo.mail, &mut servo.command);
+        servo.mail.next = None;
+        servo.now += 1e-3;
+        faults |= report.faults;
+        least = least.min(report.tools[0].force.norm() / before);
+    }
+    (least, faults)
+}
+
+#[test]
+fn a_tick_that_the_system_steals_for_30_ms_is_not_felt() {
+    for gap in [0.005, 0.011, 0.02, 0.0299] {
+        for (speed, is_stuck) in [(0.0, false), (0.0, true), (0.05, false)] {
+            let (least, faults) = least_share(gap, speed, is_stuck);
+            let case = format!("{gap} s at {speed} m/s, stuck: {is_stuck}");
+            println!("{case}: {least:.4} of the force");
+            assert_eq!(faults, Faults::NONE, "{case}");
+            // Nothing at rest. In a stroke the tool leaves the middle of the grid; that is felt
+            // without a late tick too.
+            let most = if speed > 0.0 { 0.9 } else { 0.999 };
+            assert!(least > most, "{case}: {least} of the force");
+        }
+    }
+    let (least, faults) = least_share(0.032, 0.0, false);
+    assert!(least < 1e-3 && faults.contains(Faults::MISSED_DEADLINE));
+}
+
+#[test]
+fn the_step_of_the_force_after_a_late_tick_is_limited() {
+    let (mut servo, patch) = settled();
+    let before = servo.command[0].force;
+    servo.now += 0.024;
+    // 12 mm deeper in 25 ms, and out of the tissue in the next 25 ms: more than the slew of two
+    // periods.
+    for at in [DEEP - Vec3::z() * 12e-3, DEEP + Vec3::z() * 12e-3] {
+        let last = servo.command[0].force;
+        servo.send(patch.clone());
+        let report = servo.tick(Some(at));
+        assert_eq!(report.faults, Faults::NONE);
+        assert!(report.limits.contains(Limits::SLEW));
+        let step = (report.tools[0].force - last).norm();
+        assert!((step - 1.0).abs() < 1e-9, "{step} N");
+        servo.now += 0.024;
+    }
+    assert!(before.norm() > 0.5);
+}
+
+#[test]
+fn a_loop_that_is_always_late_lets_the_force_go() {
+    for (gap, is_let_go) in [(0.009, false), (0.02, true), (0.025, true)] {
+        let (mut servo, patch) = settled();
+        let (mut faults, mut ticks) = (Faults::NONE, 0);
+        while ticks < 200 && !faults.contains(Faults::MISSED_DEADLINE) {
+            let mut fresh = patch.clone();
+            fresh.id += 2000 + ticks;
+            servo.send(fresh);
+            servo.now += gap - 1e-3;
+            faults |= servo.tick(Some(DEEP)).faults;
+            ticks += 1;
+        }
+        let lasted = gap * ticks as f64;
+        assert_eq!(is_let_go, !faults.is_empty(), "{gap}: {faults:?}");
+        assert!(
+            !is_let_go || (0.1..0.5).contains(&lasted),
+            "{gap}: {lasted}"
+        );
+    }
+}
+
 #[test]
 fn a_stalled_device_is_noticed() {
     let (mut servo, patch) = settled();
