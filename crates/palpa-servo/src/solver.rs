@@ -23,6 +23,10 @@ const N: usize = ContactPatch::STRIDE;
 /// Largest number of contact visits in one tick, whatever the settings say. The next tick continues
 /// from there.
 const MAX_VISITS: u32 = 1200;
+/// Ratio of the squared norm of a compliance to its squared trace above which it counts as of rank
+/// one. It is 1 for rank one, and below 0.6 for a vertex of an elastic half-space.
+const RANK_ONE: f64 = 0.98;
+
 /// The load of a solution on one tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ToolLoad {
@@ -169,7 +173,7 @@ impl ContactSolver {
         load
     }
 
-    /// Compliance of the vertex nearest to a tool, m/N, as a mean over directions; `None` without
+    /// Compliance along the tool's normal of the vertex nearest to the tool, m/N; `None` without
     /// candidates.
     pub(crate) fn nearest_compliance(
         &self,
@@ -190,7 +194,7 @@ impl ContactSolver {
             let gap = candidate.normal.dot(&d);
             if candidate.tool as usize == tool && gap < least {
                 least = gap;
-                nearest = Some(own.trace() / 3.0);
+                nearest = Some(along_normal(own, &(pose.rotation * candidate.normal)));
             }
         }
         nearest
@@ -249,6 +253,19 @@ impl ContactSolver {
                 is_bonded: tool.is_bonded,
             });
         }
+    }
+}
+
+/// Compliance of a vertex along a unit normal, m/N.
+///
+/// Without friction the tissue computes the response along the normal of its step only: a matrix of
+/// rank one, whose trace is that compliance.
+fn along_normal(own: &Mat3, normal: &Vec3) -> f64 {
+    let trace = own.trace();
+    if own.norm_squared() > RANK_ONE * trace * trace {
+        trace
+    } else {
+        normal.dot(&(own * normal))
     }
 }
 

@@ -8,6 +8,7 @@
 mod devices;
 mod engine;
 mod faults;
+mod first_touch;
 mod logs;
 mod realtime;
 mod toy;

@@ -23,8 +23,8 @@ pub(super) struct Coupling {
     pub(super) stiffness: f64,
     /// Present estimate of [`SHAPE`], 1 to 2.
     shape: f64,
-    /// Compliance of the tissue nearest to the tool, m/N. The coupling adapts to it before the tool
-    /// touches anything.
+    /// Compliance along the normal of the tissue nearest to the tool, m/N. The coupling adapts to it
+    /// before the tool touches anything.
     pub(super) ahead: Option<f64>,
 }
 
