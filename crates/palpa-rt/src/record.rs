@@ -88,6 +88,11 @@ record! {
         energy_out: f64,
         /// Bank of the energy observer, J; negative if energy was generated.
         bank: f64,
+        /// Energy that the local model stores, J.
+        stored: f64,
+        /// Energy by which the patch that arrived in this tick changed the stored energy at the same
+        /// pose, J.
+        jump: f64,
         /// Faults of this device: bits of `palpa_servo::Faults`.
         faults: u32,
         /// Limits that its force met: bits of `palpa_servo::Limits`.
@@ -204,7 +209,7 @@ record! {
         ramp_up: f64,
         /// Energy budget, J.
         energy_budget: f64,
-        /// Time in which the energy observer forgets a surplus, s.
+        /// Length of the energy observer's window, s.
         bank_time: f64,
         /// Step of the position sensor, m.
         resolution: f64,

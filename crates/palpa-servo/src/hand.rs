@@ -12,6 +12,8 @@ pub(crate) struct HandPiece {
     /// Motion since the previous tick, m; zero after a jump or a loss, because the hand did not
     /// make that motion.
     pub(crate) travel: Vec3,
+    /// Rotation since the previous tick, rad; zero where `travel` is.
+    pub(crate) turn: Vec3,
     /// Loop's clock when the reading last changed, and the device's time of that reading, s.
     changed_at: f64,
     read_at: f64,
@@ -25,6 +27,7 @@ impl HandPiece {
             pose: at,
             velocity: Vec3::new(0.0, 0.0, 0.0),
             travel: Vec3::new(0.0, 0.0, 0.0),
+            turn: Vec3::new(0.0, 0.0, 0.0),
             changed_at: 0.0,
             read_at: f64::NAN,
             is_known: false,
@@ -40,6 +43,7 @@ impl HandPiece {
         params: &ServoParams,
     ) -> Faults {
         self.travel = Vec3::zeros();
+        self.turn = Vec3::zeros();
         // While the loop itself was away, no reading could be new.
         self.changed_at += (dt - 2.0 * params.period).max(0.0);
         let Some(state) = state else {
@@ -53,6 +57,7 @@ impl HandPiece {
             return self.lost(Faults::BAD_READING);
         }
         let mut faults = Faults::NONE;
+        let rotation = nalgebra::UnitQuaternion::new_normalize(*state.pose.rotation);
         if self.is_known {
             self.travel = at - self.pose.translation.vector;
             // Scaled with `dt`, so that a fast hand does not count as a jump when a tick or two
@@ -61,6 +66,10 @@ impl HandPiece {
                 faults |= Faults::DEVICE_JUMPED;
                 self.travel = Vec3::zeros();
                 self.estimate.clear();
+            } else {
+                // Twice the imaginary part: the rotation is small.
+                let by = rotation * self.pose.rotation.inverse();
+                self.turn = by.imag() * libm::copysign(2.0, by.w);
             }
         }
         if !self.is_known || state.time.to_bits() != self.read_at.to_bits() {
@@ -70,7 +79,7 @@ impl HandPiece {
             faults |= Faults::DEVICE_STALLED;
         }
         self.pose = state.pose;
-        self.pose.rotation = nalgebra::UnitQuaternion::new_normalize(*state.pose.rotation);
+        self.pose.rotation = rotation;
         self.is_known = true;
         self.velocity = self.estimate.update(now, &at, params.resolution);
         if !self.velocity.iter().all(|v| v.abs() < MAX_POSITION) {

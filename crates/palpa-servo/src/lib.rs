@@ -7,8 +7,8 @@
 //!             jumps   poses              patches     faults  energy
 //! ```
 //! [`Servo::tick`] may be called from Palpa's own loop or from a vendor's callback. While the force
-//! is ramped, the energy observer pauses: the duration of the ramp limits the energy that a ramp up
-//! gives out, not the budget.
+//! is ramped, the energy observer counts the share that is let through. The duration of the ramp
+//! limits the energy that a ramp up gives out, not the budget.
 //!
 //! Nothing here allocates, waits or panics; the crate has no heap. All lengths are in metres,
 //! forces in newtons, times in seconds.

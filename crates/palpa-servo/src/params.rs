@@ -36,7 +36,8 @@ pub struct ServoParams {
     /// Energy budget, J: energy that the loop may give out beyond the energy it took in. Beyond the
     /// budget, the observer injects strong damping.
     pub energy_budget: f64,
-    /// Time in which the observer forgets energy that was lost in the tissue, s.
+    /// Length of the energy observer's window, s. Energy that was lost in the tissue is no credit
+    /// after it.
     pub bank_time: f64,
     /// Damping that is always rendered in contact, N s/m. It is 0 except in trials, because the
     /// tissue has its own damping.

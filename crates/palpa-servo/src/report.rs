@@ -144,6 +144,11 @@ pub struct ToolReport {
     pub energy_out: f64,
     /// Bank of the energy observer, J; negative if energy was generated.
     pub bank: f64,
+    /// Energy that the local model stores, J.
+    pub stored: f64,
+    /// Energy by which the patch that arrived in this tick changed the stored energy at the same
+    /// pose, J; 0 in other ticks.
+    pub jump: f64,
     /// The limits that were met.
     pub limits: Limits,
     /// Faults of this tool's device.
@@ -165,6 +170,8 @@ impl ToolReport {
         energy_in: 0.0,
         energy_out: 0.0,
         bank: 0.0,
+        stored: 0.0,
+        jump: 0.0,
         limits: Limits::NONE,
         faults: Faults::NONE,
     };

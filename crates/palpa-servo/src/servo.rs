@@ -167,9 +167,8 @@ impl Servo {
             let solutions = if is_newer { 2 } else { 1 };
             loads = self.evaluate(patches.current(), solutions, report);
         }
-        let is_ramping = self.ramp.gain() < 1.0;
         for (tool, load) in self.tools.iter_mut().zip(&loads) {
-            tool.count_energy(load, is_ramping, dt, &self.params);
+            tool.count_energy(load, dt, &self.params);
         }
         if is_newer {
             patches.take();
@@ -191,15 +190,20 @@ impl Servo {
             *coupling = tool.coupling.compliance;
         }
         let solution = (self.solver).solve(patch, &poses, &couplings, &self.params, solutions);
+        let mut loads = [ToolLoad::ZERO; MAX_TOOLS];
+        for (t, (load, pose)) in loads.iter_mut().zip(&poses).enumerate() {
+            let coupling = couplings.get(t).copied().unwrap_or_default();
+            *load = ToolLoad {
+                stored: self.solver.stored(patch, t, coupling),
+                rubbed: self.solver.rubbed(patch, t, pose),
+                ..self.solver.load(patch, t, pose)
+            };
+        }
         self.solver.move_anchors(patch, &poses);
         report.sweeps += solution.sweeps;
         report.residual = solution.residual;
         report.n_active = solution.n_active;
         report.n_sliding = solution.n_sliding;
-        let mut loads = [ToolLoad::ZERO; MAX_TOOLS];
-        for (t, (load, pose)) in loads.iter_mut().zip(&poses).enumerate() {
-            *load = self.solver.load(patch, t, pose);
-        }
         loads
     }
 
@@ -222,8 +226,8 @@ impl Servo {
     }
 
     /// Updates the share of the force that the ramp lets through. When the force begins to return,
-    /// the friction anchors, the transfer and the energy bank are reset, so that no force from
-    /// before the fault returns.
+    /// the friction anchors and the transfer are reset, so that no force from before the fault
+    /// returns. What the energy observer counted stays.
     fn update_ramp(&mut self, dt: f64, patch: &ContactPatch, report: &mut TickReport) {
         let comes_back = self.ramp.update(report.faults, dt, &self.params);
         if comes_back && self.patch.is_used() {
@@ -231,7 +235,6 @@ impl Servo {
             self.solver.release_anchors(patch, &poses);
             for tool in &mut self.tools {
                 tool.transfer.drop_force();
-                tool.energy.forget();
             }
         }
         report.gain = self.ramp.gain();

@@ -11,6 +11,7 @@
 
 mod adopt;
 mod anchors;
+mod store;
 mod sweeps;
 
 use self::adopt::Key;
@@ -37,6 +38,10 @@ pub(crate) struct ToolLoad {
     /// `rᵀ W r` of the tool's own contacts, J: twice the energy that the tissue stores in the
     /// patch's model.
     pub(crate) work: f64,
+    /// Energy stored in the local model, J.
+    pub(crate) stored: f64,
+    /// Energy that friction took in the tick, J.
+    pub(crate) rubbed: f64,
 }
 
 impl ToolLoad {
@@ -44,12 +49,16 @@ impl ToolLoad {
         force: Vec3::new(0.0, 0.0, 0.0),
         torque: Vec3::new(0.0, 0.0, 0.0),
         work: 0.0,
+        stored: 0.0,
+        rubbed: 0.0,
     };
 
     /// Whether all numbers are finite, and force and moment are of a plausible size.
     pub(crate) fn is_finite(&self) -> bool {
         let small = |x: &f64| x.abs() < 1e12;
-        self.force.iter().all(small) && self.torque.iter().all(small) && self.work.is_finite()
+        self.force.iter().all(small)
+            && self.torque.iter().all(small)
+            && [self.work, self.stored, self.rubbed].iter().all(small)
     }
 }
 

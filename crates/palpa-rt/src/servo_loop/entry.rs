@@ -41,6 +41,8 @@ impl DeviceRecord {
             energy_in: tool.energy_in,
             energy_out: tool.energy_out,
             bank: tool.bank,
+            stored: tool.stored,
+            jump: tool.jump,
             faults: tool.faults.bits().into(),
             limits: tool.limits.bits().into(),
             ..Self::default()

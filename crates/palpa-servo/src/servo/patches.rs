@@ -77,7 +77,10 @@ impl Servo {
             self.params.transfer_periods * period,
         );
         for (t, ((tool, old), new)) in (self.tools.iter_mut()).zip(before).zip(&loads).enumerate() {
-            tool.restart_store(new);
+            let jump = tool.book_patch(old, new, was_used);
+            if let Some(tool_report) = report.tools.get_mut(t) {
+                tool_report.jump = jump;
+            }
             tool.coupling.calibrate(patch.tools.get(t), new);
             tool.coupling.ahead = self.solver.nearest_compliance(patch, t, &tool.hand.pose);
             if !was_used {

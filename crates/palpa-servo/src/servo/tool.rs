@@ -4,7 +4,7 @@ use super::coupling::Coupling;
 use super::limits::{NO_DEVICE, limited};
 use super::ramp::Ramp;
 use super::transfer::Transfer;
-use crate::energy::Energy;
+use crate::energy::{Energy, TickEnergy};
 use crate::hand::HandPiece;
 use crate::solver::ToolLoad;
 use crate::{DeviceSpec, ForceCommand, Limits, ServoParams, ToolContact, ToolReport, Vec3};
@@ -21,8 +21,13 @@ pub(super) struct Tool {
     /// The tissue's force and moment in the last good tick, with the transfer.
     held: ForceCommand,
     pub(super) transfer: Transfer,
-    /// Energy in the tissue and the coupling in the last tick, J.
+    /// Energy stored in the local model at the end of the last tick, J.
     stored: f64,
+    /// Share of the local model's force in the last command; none while the last good force is
+    /// held.
+    share: f64,
+    /// Whether the last command came from the last good force instead of the local model.
+    is_held: bool,
     pub(super) coupling: Coupling,
 }
 
@@ -35,6 +40,8 @@ impl Tool {
         held: ForceCommand::ZERO,
         transfer: Transfer::NONE,
         stored: 0.0,
+        share: 0.0,
+        is_held: true,
         coupling: Coupling::NONE,
     };
 
@@ -42,40 +49,49 @@ impl Tool {
         self.spec.unwrap_or(NO_DEVICE)
     }
 
-    /// Energy in the tissue and the coupling by the local model, J.
-    fn stored_by(&self, load: &ToolLoad) -> f64 {
-        0.5 * (load.work + self.coupling.compliance * load.force.norm_squared())
-    }
-
-    /// Resets the stored energy after a new patch: it stores a different energy at the same pose,
-    /// and this difference is not work.
-    pub(super) fn restart_store(&mut self, load: &ToolLoad) {
-        self.stored = self.stored_by(load);
-    }
-
-    /// Counts the energy of the tick that ended. While the force ramps, the work says nothing about
-    /// the tissue.
-    pub(super) fn count_energy(
-        &mut self,
-        load: &ToolLoad,
-        is_ramping: bool,
-        dt: f64,
-        params: &ServoParams,
-    ) {
-        let stored = self.stored_by(load);
-        let grown = if is_ramping {
-            0.0
+    /// Counts the energy of the tick that ended, in which the last command acted. The ramp lets
+    /// through a share of the force, and so of the energy.
+    pub(super) fn count_energy(&mut self, load: &ToolLoad, dt: f64, params: &ServoParams) {
+        let work =
+            -self.command.force.dot(&self.hand.travel) - self.command.torque.dot(&self.hand.turn);
+        let (grown, rubbed) = if self.is_held {
+            // A force that is held does not come from the model; it gives back on the way back what
+            // it took.
+            (work, 0.0)
         } else {
-            stored - self.stored
+            (
+                self.share * (load.stored - self.stored),
+                self.share * load.rubbed,
+            )
         };
-        let travel = self.hand.travel;
-        (self.energy).count(&self.command.force, &travel, grown, dt, params);
-        if is_ramping {
-            self.energy.forget();
+        let tick = TickEnergy {
+            work,
+            grown,
+            rubbed,
+            is_free: self.command == ForceCommand::ZERO,
+        };
+        self.energy.count(&tick, dt, params);
+        self.stored = if load.stored.is_finite() {
+            load.stored
+        } else {
+            0.0
+        };
+    }
+
+    /// Books the energy by which a new patch changes the stored energy at the same pose, as far as
+    /// the ramp lets it through, and returns it, J.
+    pub(super) fn book_patch(&mut self, old: &ToolLoad, new: &ToolLoad, was_used: bool) -> f64 {
+        self.stored = if new.stored.is_finite() {
+            new.stored
+        } else {
+            0.0
+        };
+        let jump = self.share * (new.stored - old.stored);
+        if !was_used || self.is_held || !jump.is_finite() {
+            return 0.0;
         }
-        if stored.is_finite() {
-            self.stored = stored;
-        }
+        self.energy.jump(jump);
+        jump
     }
 
     /// Turns the tissue's force into the command, through ramp, damping and limits.
@@ -106,6 +122,9 @@ impl Tool {
         };
         let (command, limits) = limited(&wanted, &self.command, &spec, dt);
         self.command = command;
+        self.energy.ramp((gain - self.share) * self.stored);
+        self.share = gain;
+        self.is_held = ramp.is_held();
         report.limits |= limits;
         if gain < 1.0 {
             report.limits |= Limits::RAMP;
@@ -130,5 +149,6 @@ impl Tool {
         report.energy_in = self.energy.taken;
         report.energy_out = self.energy.given;
         report.bank = self.energy.bank();
+        report.stored = self.stored;
     }
 }

@@ -3,6 +3,7 @@
 mod contact;
 #[cfg(debug_assertions)] // the allocator that forbids is not there in a release build
 mod cost;
+mod energy;
 mod garbage;
 mod support;
 mod tick;
