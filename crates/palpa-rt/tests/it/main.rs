@@ -10,5 +10,6 @@ mod engine;
 mod faults;
 mod first_touch;
 mod logs;
+mod machine;
 mod realtime;
 mod toy;
