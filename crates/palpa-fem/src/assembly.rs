@@ -8,7 +8,7 @@ use crate::batch::{Batches, Slots, Sums, Tangent};
 use crate::columns::SurfaceGroup;
 use crate::element::{GroupResponse, PhaseAt, evaluate};
 use crate::model::Model;
-use crate::state::Memory;
+use crate::state::{Memory, State};
 use crate::system::{LinearSystem, Region};
 
 /// The place where the body is inverted.
@@ -91,6 +91,25 @@ impl Assembler {
         }
         Ok(())
     }
+}
+
+/// Stiffness at rest, in the order of the model's structure, without supports.
+pub(crate) fn stiffness_at_rest(model: &Model) -> Vec<Mat3> {
+    let state = State::new(model);
+    let mut memory = Memory::new(model);
+    memory.begin(model, &state, 0.0);
+    let mut assembler = Assembler::new(model, &memory, None);
+    assembler.begin(model, &memory);
+    let mut forces = vec![Vec3::zeros(); model.n_nodes()];
+    let mut blocks = vec![Mat3::zeros(); model.structure.n_blocks()];
+    let mut sums = Sums {
+        forces: &mut forces,
+        blocks: Some(&mut blocks),
+    };
+    let Assembler { inner, slots, .. } = &mut assembler;
+    // A body at rest has no prism that is inverted.
+    let _ = inner.add_to(model, &memory, &state.displacements, slots, &mut sums);
+    blocks
 }
 
 /// Strain energy at the given displacements, J. The sum does not depend on the number of threads.
@@ -221,7 +240,7 @@ mod tests {
 
     use super::*;
     use crate::law::NeoHookean;
-    use crate::{Material, Materials, ModelParams, State, Supports};
+    use crate::{Material, Materials, ModelParams, Supports};
 
     fn body(n_cells: [usize; 2], diagonal: Diagonal, jitter: Option<u64>) -> LayeredBody {
         let levels = LevelStack {

@@ -180,6 +180,16 @@ impl Structure {
         self.pattern.n_blocks()
     }
 
+    /// The block between the skin's nodes of two columns, `v ≥ w`; `None` if no triangle has both.
+    pub(crate) fn skin_block(&self, v: usize, w: usize) -> Option<usize> {
+        if v == w {
+            return Some(self.pattern.own(v));
+        }
+        let pair = self.pattern.find(v, w)?;
+        // Between columns, the first place is for levels that differ; see `for_each_block_between`.
+        Some(self.pattern.between(pair) + 1)
+    }
+
     /// The diagonal block of a node that has unknowns.
     pub(crate) fn diagonal(&self, node: usize) -> usize {
         let (v, l) = (node / self.n_levels, node % self.n_levels);

@@ -7,6 +7,7 @@ mod one_of;
 mod assembly;
 mod batch;
 mod columns;
+mod contact;
 mod dynamics;
 mod element;
 mod error;
@@ -24,6 +25,7 @@ mod state;
 mod statics;
 mod system;
 
+pub use contact::Touch;
 pub use dynamics::Dynamics;
 pub use error::FemError;
 pub use fields::{PrismField, level_forces, prism_fields, relaxed_fields};
@@ -31,10 +33,10 @@ pub use law::{Kinematics, Law, Material, Response, VolumeMeasure};
 pub use materials::{Materials, StiffnessField};
 pub use model::{Model, ModelParams, Supports};
 pub use posed_tool::PosedTool;
-pub use state::{State, Touch};
+pub use state::State;
 pub use statics::{
-    ContactResiduals, Load, Outcome, SolveParams, StepReport, Workspace, advance, assume_touches,
-    equilibrate,
+    ContactResiduals, Load, Outcome, SolveParams, StepReport, Workspace, advance, assume_pressures,
+    equilibrate, pressures_at,
 };
 
 /// A 3 × 3 matrix, such as a deformation gradient.

@@ -4,6 +4,7 @@ use palpa_mesh::{LayeredBody, Vec3};
 
 use crate::Material;
 use crate::columns::Structure;
+use crate::contact::SkinStiffness;
 use crate::element::{GroupGeometry, Phase};
 use crate::error::FemError;
 use crate::materials::{Materials, assign};
@@ -61,6 +62,8 @@ pub struct Model {
     pub(crate) masses: Vec<f64>,
     /// Area of skin that each skin vertex stands for, m².
     pub(crate) skin_areas: Vec<f64>,
+    /// Stiffness of the skin in contact.
+    pub(crate) skin_stiffness: SkinStiffness,
     pub(crate) params: ModelParams,
     pairing: Pairing,
     /// Whether any material relaxes or has tension at rest.
@@ -126,8 +129,9 @@ impl Model {
             phase_group[range[0] as usize..range[1] as usize].fill(g as u32);
         }
         let masses = masses(body, &structure, &geometries, materials);
-        Ok(Self {
+        let mut model = Self {
             skin_areas: skin_areas(body),
+            skin_stiffness: SkinStiffness::default(),
             has_memory: materials
                 .materials
                 .iter()
@@ -143,7 +147,9 @@ impl Model {
             supports: holds,
             masses,
             params,
-        })
+        };
+        model.skin_stiffness = SkinStiffness::new(&model);
+        Ok(model)
     }
 
     /// The body at rest.

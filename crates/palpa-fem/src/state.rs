@@ -4,40 +4,10 @@ use palpa_mesh::Vec3;
 use rayon::prelude::*;
 
 use crate::Mat3;
+use crate::contact::Touch;
 use crate::element::{N_POINTS, Overstress, elastic_stresses};
 use crate::law::{Prony, PronyStep};
 use crate::model::Model;
-
-/// How a skin vertex touches a tool.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Touch {
-    /// No contact.
-    Open,
-    /// The vertex slides, or may slide freely.
-    Slip {
-        /// Which tool.
-        tool: u32,
-        /// Its position in the tool's frame at the end of the last step, m.
-        anchor: Vec3,
-    },
-    /// Friction holds the vertex.
-    Stick {
-        /// Which tool.
-        tool: u32,
-        /// The point in the tool's frame where it is held, m.
-        anchor: Vec3,
-    },
-}
-
-impl Touch {
-    /// Index of the touched tool, if any.
-    pub fn tool(&self) -> Option<usize> {
-        match *self {
-            Self::Open => None,
-            Self::Slip { tool, .. } | Self::Stick { tool, .. } => Some(tool as usize),
-        }
-    }
-}
 
 /// The state of a body; cheap to copy back and forth.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,7 +98,7 @@ impl State {
             displacements: vec![Vec3::zeros(); n],
             velocities: vec![Vec3::zeros(); n],
             accelerations: vec![Vec3::zeros(); n],
-            touches: vec![Touch::Open; model.body.n_vertices()],
+            touches: vec![Touch::OPEN; model.body.n_vertices()],
             time: 0.0,
             history,
         }

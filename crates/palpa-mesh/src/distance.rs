@@ -195,7 +195,7 @@ impl SelectionFunction<IndexedTriangle> for RaySelection {
 
 /// The point of a triangle closest to `p`, and its barycentric weights. The method distinguishes
 /// regions (Ericson 2005, §5.1.5).
-fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, [f64; 3]) {
+pub fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {

@@ -21,7 +21,7 @@ pub mod write;
 
 pub use body::{CutFace, LayeredBody};
 pub use check::{SurfaceReport, Verdict, check_surface, examine};
-pub use distance::SurfaceIndex;
+pub use distance::{SurfaceIndex, closest_on_triangle};
 pub use growth::{Growth, GrowthError, GrowthParams, LayerSpec, grow};
 pub use part::Part;
 pub use read::{Format, ReadError, SurfaceFile, read_surface, read_surface_bytes};

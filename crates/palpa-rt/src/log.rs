@@ -463,15 +463,15 @@ impl Start {
 
 /// Name and fields of the records on a topic, in this version.
 fn schema_of(topic: Topic) -> Option<(&'static str, String)> {
-    fn of<R: Record>() -> Option<(&'static str, String)> {
-        Some((R::NAME, R::schema()))
+    fn of<R: Record>() -> (&'static str, String) {
+        (R::NAME, R::schema())
     }
     match topic {
-        Topic::Spec => of::<SpecRecord>(),
-        Topic::Servo => of::<ServoRecord>(),
-        Topic::Tick => of::<TickRecord>(),
-        Topic::Device(_) => of::<DeviceRecord>(),
-        Topic::Step => of::<StepRecord>(),
+        Topic::Spec => Some(of::<SpecRecord>()),
+        Topic::Servo => Some(of::<ServoRecord>()),
+        Topic::Tick => Some(of::<TickRecord>()),
+        Topic::Device(_) => Some(of::<DeviceRecord>()),
+        Topic::Step => Some(of::<StepRecord>()),
         Topic::Header | Topic::Event | Topic::Other => None,
     }
 }

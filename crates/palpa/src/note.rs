@@ -180,13 +180,6 @@ pub enum Note {
         /// Name of the layer's tissue.
         layer: String,
     },
-    /// Steps are too long for friction.
-    LongFrictionSteps {
-        /// Length of a step, m.
-        step: f64,
-        /// Largest step length that is short enough, m.
-        enough: f64,
-    },
     /// Few vertices lie under the disc of the reference method.
     FewUnderDisc {
         /// Number of vertices under the disc.
@@ -245,15 +238,6 @@ pub enum Note {
         depth: f64,
         /// The middle of the worst prism, m.
         at: [f64; 3],
-    },
-    /// Friction had to be smoothed.
-    FrictionSmoothed {
-        /// Number of steps with smoothed friction.
-        n: usize,
-        /// Number of all steps.
-        n_all: usize,
-        /// Largest slip over which it was smoothed, m.
-        slip: f64,
     },
     /// Few vertices touch the tool.
     FewTouching {
@@ -475,14 +459,6 @@ impl fmt::Display for Note {
                  of a block 60 mm wide fall to 3 kPa in its middle); set cut_faces = \"fixed\" or \"symmetric\" in \
                  [body] to keep it"
             ),
-            Self::LongFrictionSteps { step, enough } => write!(
-                f,
-                "with friction the force depends on the step length, here {:.2} mm (for example, a sphere of radius 8 \
-                 mm with friction 0.4, pressed 3 mm deep, gives 13 % less force in one step and 5 % less in steps of 1 \
-                 mm); press with --step \"{} mm\" or shorter",
-                mm(step),
-                rounded(enough * 1e3)
-            ),
             Self::FewUnderDisc {
                 n_vertices,
                 radius,
@@ -551,12 +527,6 @@ impl fmt::Display for Note {
                 mm(depth),
                 Mm(*at)
             ),
-            Self::FrictionSmoothed { n, n_all, slip } => write!(
-                f,
-                "friction had to be smoothed in {n} of {n_all} steps, over a slip of up to {:.0} µm: vertices that should stick \
-                 creep by about as much",
-                slip * 1e6
-            ),
             Self::FewTouching {
                 n_vertices,
                 radius,
@@ -570,11 +540,6 @@ impl fmt::Display for Note {
             ),
         }
     }
-}
-
-/// Rounds down to hundredths, but never to zero.
-fn rounded(mm: f64) -> f64 {
-    ((mm * 100.0).floor() / 100.0).max(0.01)
 }
 
 /// Removes the digits that come from binary fractions.

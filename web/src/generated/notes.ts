@@ -279,19 +279,6 @@ export interface components {
         } | {
             /**
              * Format: double
-             * @description Largest step length that is short enough, m.
-             */
-            enough: number;
-            /** @constant */
-            kind: "long_friction_steps";
-            /**
-             * Format: double
-             * @description Length of a step, m.
-             */
-            step: number;
-        } | {
-            /**
-             * Format: double
              * @description Mean length of the skin's edges near the tool, m.
              */
             edge: number;
@@ -390,24 +377,6 @@ export interface components {
              * @description Number of prisms.
              */
             n: number;
-        } | {
-            /** @constant */
-            kind: "friction_smoothed";
-            /**
-             * Format: uint
-             * @description Number of steps with smoothed friction.
-             */
-            n: number;
-            /**
-             * Format: uint
-             * @description Number of all steps.
-             */
-            n_all: number;
-            /**
-             * Format: double
-             * @description Largest slip over which it was smoothed, m.
-             */
-            slip: number;
         } | {
             /**
              * Format: double

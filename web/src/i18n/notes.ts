@@ -87,7 +87,6 @@ const en: Words<Note> = {
   coarse_under_tool: ({ edge, radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of its radius of ${mm(radius)}: the force depends on the mesh. Refine it with [mesh] near_tool.`,
   coarse_at_edge: ({ edge, edge_radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of the radius of its edge, ${mm(edge_radius)}: the force depends on the steps. Make the edge rounder or the mesh finer.`,
   tension_lost: ({ layer }) => `The cut faces are free and let go of most of the tension of “${layer}”. Set cut_faces = "fixed" or "symmetric" to keep it.`,
-  long_friction_steps: ({ step, enough }) => `With friction the force depends on the steps, here of ${mm(step, 2)}. Steps of ${mm(enough, 2)} are short enough.`,
   few_under_disc: ({ n_vertices, radius, edge }) => `Only ${n_vertices} skin vertices lie under the tool of radius ${mm(radius)}, with edges of ${mm(edge)} there: the force depends on the mesh.`,
   tension_left_out: () => 'Bars have no tension at rest; “prestress” was left out.',
   first_speed_only: () => 'Forces of bars do not depend on time: only the first of “speeds” was run.',
@@ -97,7 +96,6 @@ const en: Words<Note> = {
   coarser_for_touch: ({ edge }) => `Skin edges under the tool are ${mm(edge)} long, so that the body can follow a hand. [mesh] near_tool makes them finer.`,
   step_failed: ({ depth, outcome }) => `The step to ${mm(depth, 2)} failed.${said(enOutcomes, outcome)} Press less deep, or refine the mesh there.`,
   turned_prisms: ({ n, depth, at }) => `${n} prisms have a corner turned inside out at ${mm(depth, 2)}, the worst near ${place(at)}. The force may be off.`,
-  friction_smoothed: ({ n, n_all, slip }) => `Friction had to be smoothed in ${n} of ${n_all} steps, over a slip of up to ${Math.round(slip * 1e6)} µm.`,
   few_touching: ({ n_vertices, radius, edge }) => `At most ${n_vertices} skin vertices touch the tool, over a circle of radius ${mm(radius)} with edges of ${mm(edge)}: the force depends on the mesh.`,
 };
 
@@ -150,7 +148,6 @@ const ja: Words<Note> = {
   coarse_under_tool: ({ edge, radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の半径 ${mm(radius)} の 3 分の 1 を超えています。力がメッシュに依存します。[mesh] near_tool で細かくしてください。`,
   coarse_at_edge: ({ edge, edge_radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の縁の半径 ${mm(edge_radius)} の 3 分の 1 を超えています。力がステップに依存します。縁を丸くするか、メッシュを細かくしてください。`,
   tension_lost: ({ layer }) => `切断面が自由なため、「${layer}」の張力の大部分が失われます。保つには cut_faces を "fixed" か "symmetric" にしてください。`,
-  long_friction_steps: ({ step, enough }) => `摩擦があるとき、力はステップの長さ（現在 ${mm(step, 2)}）に依存します。${mm(enough, 2)} 以下なら十分です。`,
   few_under_disc: ({ n_vertices, radius, edge }) => `半径 ${mm(radius)} の圧子の下にある皮膚の頂点は ${n_vertices} 個だけです（辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
   tension_left_out: () => '棒には初期張力がないため、prestress は使われません。',
   first_speed_only: () => '棒には時間の効果がないため、speeds の最初の値だけを使いました。',
@@ -160,7 +157,6 @@ const ja: Words<Note> = {
   coarser_for_touch: ({ edge }) => `手の動きに追従できるよう、圧子の下の皮膚の辺の長さを ${mm(edge)} にしました。[mesh] near_tool で細かくできます。`,
   step_failed: ({ depth, outcome }) => `${mm(depth, 2)} までのステップに失敗しました。${said(jaOutcomes, outcome)}浅く押すか、その付近のメッシュを細かくしてください。`,
   turned_prisms: ({ n, depth, at }) => `深さ ${mm(depth, 2)} で ${n} 個の要素が裏返っています（最悪の位置 ${place(at)}）。力が正しくない可能性があります。`,
-  friction_smoothed: ({ n, n_all, slip }) => `${n_all} ステップ中 ${n} ステップで摩擦を平滑化しました（滑り 最大 ${Math.round(slip * 1e6)} µm）。`,
   few_touching: ({ n_vertices, radius, edge }) => `圧子に触れる皮膚の頂点は最大 ${n_vertices} 個です（半径 ${mm(radius)}、辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
 };
 

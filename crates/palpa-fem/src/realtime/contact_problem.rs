@@ -1,66 +1,98 @@
 //! The small contact problem of a moving step: forces on a few skin vertices (the *candidates*),
 //! given their compliance.
 //!
-//! The project solves contact in three places:
+//! The law is that of [`crate::contact`], which statics and the haptic loop have as well:
 //!
 //! | who | where | unknowns | friction |
 //! | --- | --- | --- | --- |
-//! | statics, each Newton iteration | [`crate::statics`], `active_set.rs` | displacements of all nodes; a touching vertex is held on the tool's surface | each touching vertex sticks (held at its anchor) or slides; decided between iterations |
-//! | moving step, each iteration at some 100 Hz | here | forces on at most 160 candidates, on their compliance | decided in sweeps over the candidates (`rub`), once an iteration |
-//! | servo, each tick at 1 kHz | `palpa-servo`, `solver.rs` and `contact.rs` | forces on at most 60 vertices of the patch, and the coupling's displacement | decided each tick, on the round cone, one vertex after the other |
+//! | statics, each Newton iteration | [`crate::statics`], `contacts.rs` | displacements of all nodes, pressure and friction of the vertices near the tools | with everything else, in one system |
+//! | moving step, each iteration at some 500 Hz | here | pressing forces on the candidates, on their compliance | in turns with the pressing forces, by sweeps |
+//! | servo, each tick at 1 kHz | `palpa-servo`, `solver.rs` and `contact.rs` | forces on at most 60 vertices or clusters of the patch, each on its own compliance in series with the law's, and the coupling's displacement | each tick, on the round cone, one vertex after the other |
 //!
 //! ```text
-//! s = s0 + w (f − p0),   p = f − κ s,   0 ≤ g0 + s − s0 ⟂ p ≥ 0
+//! s = s0 + w (f − p0),   p = f − κ s,   p_i = ∫ φ_i max(0, Σ φ_j p_j/A_j − ε g(s))
 //! ```
-//! along the normals. `s` is the displacement of a vertex, m, `p` its pressing force, N, `g` its
-//! gap, m, and `f` the force in the linear system, N. Where `κ > 0`, a spring holds the vertex in
-//! the linear system: deep under a tool the free body is not stable, and only the tool holds it.
-//! The compliance `w`, m/N, includes the spring; `p` excludes the spring's force. Without friction
-//! this is the whole problem, and an active set solves it exactly. With friction, `|t| ≤ μ p`, and
-//! where `t` reaches that limit it opposes the slip from the anchor. Projected Gauss–Seidel sweeps
-//! then start from the frictionless solution.
-
-#![expect(
-    clippy::needless_range_loop,
-    reason = "candidates index several arrays together"
-)]
+//! along the normals. `s` is the displacement of a vertex, m, `p` its pressing force, N, `g` the gap
+//! at a point, m, and `f` the force in the linear system, N. Where `κ > 0`, a spring holds the vertex
+//! in the linear system: deep under a tool the free body is not stable, and only the tool holds it.
+//! The compliance `w`, m/N, includes the spring; `p` excludes the spring's force. Newton's method
+//! finds the forces; with friction, `|t| ≤ μ p`, and where `t` reaches that limit it opposes the slip
+//! from the anchor. Sweeps find it for given pressing forces, in turns with these.
 
 use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
-use super::candidate::Candidate;
+use super::candidate::{Candidate, Point};
+use super::dense;
+use super::local::Clusters;
 use crate::Mat3;
+use crate::contact::first_touch;
 use crate::posed_tool::PosedTool;
 
-/// Largest number of changes of the active set.
-const MOST_CHANGES: usize = 40;
-/// Largest number of sweeps with friction.
+/// Largest number of Newton iterations, and of halvings in one.
+const MOST_ITERATIONS: usize = 30;
+const MOST_HALVINGS: usize = 6;
+/// Largest number of turns with friction, and of sweeps in each.
+const MOST_TURNS: usize = 20;
 const SWEEPS: usize = 60;
-/// Relative change of the forces in a sweep below which they count as settled.
-const SETTLED: f64 = 1e-6;
-/// Gaps below this (m) count as zero.
-const NO_GAP: f64 = 1e-12;
+/// Relative error of the pressing forces, and relative change of the forces in a sweep and in a turn,
+/// at which they count as settled.
+const SETTLED: f64 = 1e-7;
+const SETTLED_SWEEP: f64 = 1e-6;
+const SETTLED_TURN: f64 = 1e-5;
+/// Errors of the forces above this share count as unsettled.
+const UNSETTLED: f64 = 1e-3;
 
 /// The problem, in memory for [`MOST_CANDIDATES`].
 #[derive(Debug)]
 pub(super) struct ContactProblem {
     /// Sorted by vertex.
     pub(super) candidates: Vec<Candidate>,
+    /// Points of the skin near the tools.
+    pub(super) points: Vec<Point>,
+    /// Tools at the start of the step.
+    pub(super) tools_before: Vec<PosedTool>,
     /// Whether any tool has friction: a candidate then has three unknowns, otherwise one.
     pub(super) has_friction: bool,
+    /// Whether the last solution satisfies the law of contact.
+    pub(super) is_settled: bool,
     /// Compliance, column by column, m/N: `n × n` along the normals, or `3 n × 3 n` along the axes
     /// with friction.
     pub(super) compliance: Vec<f64>,
     /// Change of the force in the linear system, `f − p0`: along the normals, or along the axes
     /// with friction, N.
     pub(super) change: Vec<f64>,
-    /// Compliance along the normals, m/N.
+    /// Compliance along the normals without the springs, m/N; column by column.
     pub(super) along: Vec<f64>,
-    pub(super) factor: Vec<f64>,
-    /// Compliance with the supports removed as far as possible, and scratch memory for it.
+    /// Compliance with the springs removed as far as possible, and scratch memory for it.
     pub(super) released: Vec<f64>,
     pub(super) spread: Vec<f64>,
-    is_active: [bool; MOST_CANDIDATES],
+    pub(super) factor: Vec<f64>,
+    pub(super) clusters: Clusters,
+    scratch: Scratch,
+}
+
+#[derive(Debug)]
+struct Scratch {
+    order: Vec<usize>,
+    order_of_newton: Vec<usize>,
+    /// Row of each candidate in the system, or `usize::MAX`; and the candidates of the rows.
+    row_of: Vec<usize>,
+    rows: Vec<usize>,
+    /// Displacements along the normals without changes of the forces, m.
+    rest: Vec<f64>,
+    slides: Vec<f64>,
+    /// Forces at the start, in the present iteration, and in a trial, N.
+    start: Vec<f64>,
+    forces: Vec<f64>,
+    trial: Vec<f64>,
+    laws: Vec<f64>,
+    right: Vec<f64>,
+    solution: Vec<f64>,
+    friction_before: Vec<Vec3>,
+    moved: Vec<Vec3>,
+    /// Entries of the law's stiffness: row, column, N/m per m, and per area.
+    stiffness: Vec<(u16, u16, f64, f64)>,
 }
 
 impl ContactProblem {
@@ -68,14 +100,34 @@ impl ContactProblem {
         let n = MOST_CANDIDATES;
         Self {
             candidates: Vec::with_capacity(n),
+            points: Vec::with_capacity(super::MOST_POINTS),
+            tools_before: Vec::with_capacity(8),
             has_friction: false,
+            is_settled: true,
             compliance: vec![0.0; 9 * n * n],
             change: vec![0.0; 3 * n],
             along: vec![0.0; n * n],
-            factor: vec![0.0; n * n],
             released: vec![0.0; 9 * n * n],
             spread: vec![0.0; 3 * n * n],
-            is_active: [false; MOST_CANDIDATES],
+            factor: vec![0.0; n * n],
+            clusters: Clusters::new(),
+            scratch: Scratch {
+                order: vec![0; n],
+                order_of_newton: vec![0; n],
+                row_of: vec![usize::MAX; n],
+                rows: Vec::with_capacity(n),
+                rest: vec![0.0; n],
+                slides: vec![0.0; n],
+                start: vec![0.0; n],
+                forces: vec![0.0; n],
+                trial: vec![0.0; n],
+                laws: vec![0.0; n],
+                right: vec![0.0; n],
+                solution: vec![0.0; n],
+                friction_before: vec![Vec3::zeros(); n],
+                moved: vec![Vec3::zeros(); n],
+                stiffness: Vec::with_capacity(9 * super::MOST_POINTS),
+            },
         }
     }
 
@@ -90,11 +142,19 @@ impl ContactProblem {
         Mat3::from_fn(|r, c| self.compliance[3 * i + r + n * (3 * j + c)])
     }
 
-    /// Finds forces and displacements. Cost: proportional to n³ for n pressing vertices; with
-    /// friction, also n² for n candidates in each sweep.
+    /// Finds forces and displacements. Cost: proportional to n³ for n vertices of pressing triangles;
+    /// with friction, also n² for n candidates in each sweep.
     pub(super) fn solve(&mut self, tools: &[PosedTool]) {
         let (n, has_friction) = (self.candidates.len(), self.has_friction);
         self.change.fill(0.0);
+        for i in 0..n {
+            let candidate = &self.candidates[i];
+            self.scratch.start[i] = candidate.pressure;
+            self.scratch.forces[i] = candidate.pressure;
+            self.scratch.rest[i] = candidate.displacement.dot(&candidate.normal);
+            self.scratch.friction_before[i] = candidate.friction;
+            self.scratch.moved[i] = candidate.displacement;
+        }
         for j in 0..n {
             for i in 0..n {
                 self.along[i + n * j] = if has_friction {
@@ -105,205 +165,384 @@ impl ContactProblem {
                 };
             }
         }
-        let start: [f64; MOST_CANDIDATES] =
-            std::array::from_fn(|i| self.candidates.get(i).map_or(0.0, |c| c.pressure));
-        self.press(&start);
-        if !has_friction {
+        if !self.remove_springs() {
+            self.is_settled = false;
             return;
         }
-        let before: [Vec3; MOST_CANDIDATES] =
-            std::array::from_fn(|i| self.candidates.get(i).map_or(Vec3::zeros(), |c| c.friction));
-        // The pressures were found along the normals. Their effect across the normals is not yet in
-        // the displacements.
-        self.respond();
-        self.rub(tools, &start, &before);
-    }
-
-    /// Normal force in the linear system: the pressure plus the support's share.
-    fn taken(candidate: &Candidate) -> f64 {
-        candidate.pressure + candidate.support * candidate.displacement.dot(&candidate.normal)
-    }
-
-    /// Finds the pressures that leave no gap negative, by an active set.
-    fn press(&mut self, start: &[f64; MOST_CANDIDATES]) {
-        let n = self.candidates.len();
-        let mut rest = [0.0; MOST_CANDIDATES];
-        for i in 0..n {
-            let candidate = &self.candidates[i];
-            self.is_active[i] = candidate.pressure > 0.0;
-            rest[i] = candidate.displacement.dot(&candidate.normal);
+        self.is_settled = self.press();
+        if !has_friction {
+            for i in 0..n {
+                self.keep(i);
+                self.change[i] = self.taken(i) - self.scratch.start[i];
+            }
+            self.turn_aside();
+            return;
         }
-        // Candidates in the system: those that press, or whose support must be removed.
-        let mut rows = [0_usize; MOST_CANDIDATES];
-        let mut taken = [0.0; MOST_CANDIDATES];
-        let mut slides = rest;
-        for _ in 0..MOST_CHANGES {
-            let mut m = 0;
-            for i in 0..n {
-                if self.is_active[i] || self.candidates[i].support > 0.0 {
-                    rows[m] = i;
-                    m += 1;
-                }
-            }
-            // The forces at the start act until they are changed.
-            let mut right = [0.0; MOST_CANDIDATES];
-            for (right, &i) in right.iter_mut().zip(&rows[..m]) {
-                let released: f64 = (0..n)
-                    .filter(|j| !rows[..m].contains(j) && start[*j] != 0.0)
-                    .map(|j| self.along[i + n * j] * start[j])
-                    .sum();
-                let gap = if self.is_active[i] {
-                    self.candidates[i].gap
-                } else {
-                    0.0
-                };
-                *right = released - rest[i] - gap;
-            }
-            let candidates = &self.candidates;
-            let (is_active, along) = (&self.is_active, &self.along);
-            let entry = |r: usize, c: usize| {
-                let (i, j) = (rows[r], rows[c]);
-                let own = if r == c && !is_active[i] {
-                    1.0 / candidates[i].support
-                } else {
-                    0.0
-                };
-                along[i + n * j] - own
-            };
-            // Change from the start for the rows of the system.
-            let offset: [f64; MOST_CANDIDATES] = std::array::from_fn(|r| {
-                if r < m && !is_active[rows[r]] {
-                    start[rows[r]] / candidates[rows[r]].support
-                } else {
-                    0.0
-                }
-            });
-            for r in 0..m {
-                right[r] += offset[r];
-            }
-            if !factor_symmetric(m, entry, &mut self.factor) {
-                return;
-            }
-            substitute_symmetric(m, &self.factor, &mut right[..m]);
-            let mut change = [0.0; MOST_CANDIDATES];
-            for j in 0..n {
-                change[j] = -start[j];
-            }
-            for (&i, x) in rows[..m].iter().zip(&right) {
-                change[i] = *x;
-            }
-            for i in 0..n {
-                taken[i] = start[i] + change[i];
-                let sum: f64 = (0..n).map(|j| self.along[i + n * j] * change[j]).sum();
-                slides[i] = rest[i] + sum;
-            }
-            let mut is_settled = true;
-            for i in 0..n {
-                let candidate = &self.candidates[i];
-                let pressure = taken[i] - candidate.support * slides[i];
-                if self.is_active[i] && pressure < 0.0 {
-                    self.is_active[i] = false;
-                    is_settled = false;
-                } else if !self.is_active[i] && candidate.gap + slides[i] < -NO_GAP {
-                    self.is_active[i] = true;
-                    is_settled = false;
-                }
-            }
-            if is_settled {
+        for turn in 0.. {
+            let before: f64 = self.scratch.forces[..n].iter().sum();
+            self.keep_all();
+            let has_moved = self.rub(tools);
+            self.springs_after_friction();
+            let is_settled = self.press();
+            let after = &self.scratch.forces[..n];
+            let change: f64 = (after.iter().zip(&self.candidates))
+                .map(|(new, candidate)| (new - candidate.pressure).abs())
+                .sum();
+            let share = change / before.max(f64::MIN_POSITIVE);
+            if share <= SETTLED_TURN || (turn > 0 && !has_moved) || turn == MOST_TURNS {
+                self.is_settled = is_settled && (before == 0.0 || share <= UNSETTLED);
                 break;
             }
         }
-        for i in 0..n {
-            let candidate = &mut self.candidates[i];
-            candidate.pressure = if self.is_active[i] {
-                (taken[i] - candidate.support * slides[i]).max(0.0)
-            } else {
-                0.0
-            };
-            candidate.displacement += candidate.normal * (slides[i] - rest[i]);
-            self.change[i] = taken[i] - start[i];
-        }
+        self.keep_all();
+        self.turn_aside();
     }
 
-    /// Adds the effect of the pressure changes across the normals, which the frictionless solution
-    /// leaves out.
-    fn respond(&mut self) {
-        let n = self.candidates.len();
-        for i in 0..n {
-            let mut response = Vec3::zeros();
-            for j in 0..n {
-                response += self.block(i, j) * (self.candidates[j].normal * self.change[j]);
+    /// What the pressures at the points, as they are now, add across the normals of the candidates.
+    fn turn_aside(&mut self) {
+        for candidate in &mut self.candidates {
+            candidate.aside = Vec3::zeros();
+        }
+        for point in &self.points {
+            let spot = &point.spot;
+            let corners = point.corners.map(usize::from);
+            let (mut pressure, mut moved) = (0.0, Vec3::zeros());
+            for (&i, share) in corners.iter().zip(&spot.shares) {
+                let candidate = &self.candidates[i];
+                pressure += share * candidate.pressure / candidate.area;
+                moved += candidate.displacement * *share;
             }
-            let normal = self.candidates[i].normal;
-            self.candidates[i].displacement += response - normal * normal.dot(&response);
+            let gap = spot.gap + spot.normal.dot(&moved);
+            let force = (pressure - spot.stiffness * gap).max(0.0) * spot.area;
+            if force == 0.0 {
+                continue;
+            }
+            // The normal there after the displacement.
+            let normal = (spot.normal + spot.curvature * moved).normalize();
+            for (&i, share) in corners.iter().zip(&spot.shares) {
+                let candidate = &mut self.candidates[i];
+                let along = candidate.normal;
+                candidate.aside += (normal - along * along.dot(&normal)) * (force * share);
+            }
         }
     }
 
-    /// Sweeps with friction; the result is in `change`, along the axes.
-    fn rub(
-        &mut self,
-        tools: &[PosedTool],
-        start: &[f64; MOST_CANDIDATES],
-        before: &[Vec3; MOST_CANDIDATES],
-    ) {
+    /// Removes the springs from the compliance along the normals, and from the displacements without
+    /// changes of the forces: `(1 − w κ)⁻¹ w`. Returns false if that is not possible.
+    fn remove_springs(&mut self) -> bool {
         let n = self.candidates.len();
-        let mut taken: [Vec3; MOST_CANDIDATES] = std::array::from_fn(|i| {
-            self.candidates
-                .get(i)
-                .map_or(Vec3::zeros(), |c| c.normal * Self::taken(c) + c.friction)
-        });
+        if self.candidates.iter().all(|c| c.support == 0.0) {
+            return true;
+        }
+        for r in 0..n {
+            for c in 0..n {
+                let unit = f64::from(u8::from(r == c));
+                self.factor[r * n + c] = unit - self.along[r + n * c] * self.candidates[c].support;
+            }
+        }
+        let scratch = &mut self.scratch;
+        if !dense::factor(n, &mut self.factor, &mut scratch.order) {
+            return false;
+        }
+        for j in 0..n {
+            dense::solve(
+                n,
+                &self.factor,
+                &scratch.order,
+                &mut self.along[n * j..n * (j + 1)],
+            );
+        }
+        dense::solve(n, &self.factor, &scratch.order, &mut scratch.rest[..n]);
+        true
+    }
+
+    /// Displacements along the normals before pressing forces change, with friction as it is now.
+    fn springs_after_friction(&mut self) {
+        let n = self.candidates.len();
+        for i in 0..n {
+            let normal = self.candidates[i].normal;
+            let mut sum = self.scratch.moved[i].dot(&normal);
+            for j in 0..n {
+                let by = self.candidates[j].friction - self.scratch.friction_before[j];
+                if by != Vec3::zeros() {
+                    sum += normal.dot(&(self.block(i, j) * by));
+                }
+            }
+            self.scratch.rest[i] = sum;
+        }
+        if self.candidates.iter().any(|c| c.support > 0.0) {
+            let scratch = &mut self.scratch;
+            dense::solve(n, &self.factor, &scratch.order, &mut scratch.rest[..n]);
+        }
+    }
+
+    /// Force of a candidate in the linear system: pressing force, and that of its spring, N.
+    fn taken(&self, i: usize) -> f64 {
+        self.scratch.forces[i] + self.candidates[i].support * self.scratch.slides[i]
+    }
+
+    /// Takes over the pressing force of a candidate, and its displacement along the normal.
+    fn keep(&mut self, i: usize) {
+        let (force, slide) = (self.scratch.forces[i], self.scratch.slides[i]);
+        let candidate = &mut self.candidates[i];
+        candidate.pressure = force;
+        let normal = candidate.normal;
+        candidate.displacement += normal * (slide - normal.dot(&candidate.displacement));
+    }
+
+    /// With friction: takes over the pressing forces, the change of the forces in the linear system,
+    /// and the displacements.
+    fn keep_all(&mut self) {
+        let n = self.candidates.len();
+        for i in 0..n {
+            let taken = self.taken(i) - self.scratch.start[i];
+            let candidate = &mut self.candidates[i];
+            candidate.pressure = self.scratch.forces[i];
+            let rubbed = candidate.friction - self.scratch.friction_before[i];
+            let change = candidate.normal * taken + rubbed;
+            self.change[3 * i..3 * i + 3].copy_from_slice(change.as_slice());
+        }
+        for i in 0..n {
+            let mut sum = self.scratch.moved[i];
+            for j in 0..n {
+                let change = Vec3::from_column_slice(&self.change[3 * j..3 * j + 3]);
+                if change != Vec3::zeros() {
+                    sum += self.block(i, j) * change;
+                }
+            }
+            self.candidates[i].displacement = sum;
+        }
+    }
+
+    /// Displacements along the normals under the forces in `trial`.
+    fn slide(&mut self) {
+        let n = self.candidates.len();
+        let scratch = &mut self.scratch;
+        scratch.slides[..n].copy_from_slice(&scratch.rest[..n]);
+        for j in 0..n {
+            let by = scratch.trial[j] - scratch.start[j];
+            if by != 0.0 {
+                let column = &self.along[n * j..n * (j + 1)];
+                for (slide, w) in scratch.slides[..n].iter_mut().zip(column) {
+                    *slide += w * by;
+                }
+            }
+        }
+    }
+
+    /// The forces that the law gives for those in `trial`, at the displacements in `slides`; their
+    /// error, N; and the stiffness of the law, if asked.
+    fn law(&mut self, with_stiffness: bool) -> f64 {
+        let n = self.candidates.len();
+        let Scratch {
+            trial,
+            slides,
+            laws,
+            stiffness,
+            ..
+        } = &mut self.scratch;
+        laws[..n].fill(0.0);
+        stiffness.clear();
+        for candidate in &mut self.candidates {
+            candidate.closed = 0.0;
+        }
+        for point in &self.points {
+            let (mut pressure, mut gap) = (0.0, point.spot.gap);
+            for k in 0..3 {
+                let (i, share) = (usize::from(point.corners[k]), point.spot.shares[k]);
+                pressure += share * trial[i] / self.candidates[i].area;
+                gap += share * point.cosines[k] * slides[i];
+            }
+            pressure -= point.spot.stiffness * gap;
+            if pressure <= 0.0 {
+                continue;
+            }
+            for k in 0..3 {
+                let i = usize::from(point.corners[k]);
+                let weight = point.spot.shares[k] * point.spot.area;
+                let weight = weight * point.cosines[k];
+                laws[i] += weight * pressure;
+                self.candidates[i].closed += weight;
+                if with_stiffness {
+                    for l in 0..3 {
+                        let share = weight * point.spot.shares[l];
+                        let spring = share * point.spot.stiffness * point.cosines[l];
+                        stiffness.push((point.corners[k], point.corners[l], spring, share));
+                    }
+                }
+            }
+        }
+        for candidate in &mut self.candidates {
+            candidate.closed /= candidate.area;
+        }
+        let errors = laws[..n].iter().zip(&trial[..n]);
+        errors
+            .map(|(law, force)| (law - force).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
+    /// Finds the pressing forces by Newton's method. Returns whether they satisfy the law.
+    fn press(&mut self) -> bool {
+        let n = self.candidates.len();
+        self.scratch.trial[..n].copy_from_slice(&self.scratch.forces[..n]);
+        self.slide();
+        let mut error = self.law(true);
+        let size = |forces: &[f64]| forces.iter().map(|f| f * f).sum::<f64>().sqrt();
+        for _ in 0..MOST_ITERATIONS {
+            let scale = size(&self.scratch.trial[..n]).max(size(&self.scratch.laws[..n]));
+            if error <= SETTLED * scale {
+                self.scratch.forces[..n].copy_from_slice(&self.scratch.trial[..n]);
+                return true;
+            }
+            self.scratch.forces[..n].copy_from_slice(&self.scratch.trial[..n]);
+            if !self.newton_step() {
+                return false;
+            }
+            let (mut share, before) = (1.0, error);
+            for halving in 0..=MOST_HALVINGS {
+                for i in 0..n {
+                    self.scratch.trial[i] = self.scratch.forces[i] + share * self.scratch.right[i];
+                }
+                self.slide();
+                error = self.law(true);
+                if error < before || halving == MOST_HALVINGS {
+                    break;
+                }
+                share *= 0.5;
+            }
+        }
+        let scale = size(&self.scratch.trial[..n]);
+        self.scratch.forces[..n].copy_from_slice(&self.scratch.trial[..n]);
+        error <= UNSETTLED * scale
+    }
+
+    /// The step of Newton's method from the forces in `forces`, in `right`. Returns false if its
+    /// matrix is singular.
+    fn newton_step(&mut self) -> bool {
+        let n = self.candidates.len();
+        let scratch = &mut self.scratch;
+        // Only vertices with a point that presses have unknown forces; the others lose theirs.
+        scratch.rows.clear();
+        for i in 0..n {
+            let is_open = self.candidates[i].closed == 0.0;
+            scratch.row_of[i] = if is_open {
+                usize::MAX
+            } else {
+                scratch.rows.len()
+            };
+            if !is_open {
+                scratch.rows.push(i);
+            }
+            scratch.right[i] = scratch.laws[i] - scratch.forces[i];
+        }
+        let m = scratch.rows.len();
+        let (matrix, springs) = self.spread.split_at_mut(m * m);
+        let springs = &mut springs[..m * m];
+        matrix.fill(0.0);
+        springs.fill(0.0);
+        for r in 0..m {
+            matrix[r * m + r] = 1.0;
+        }
+        // A corner of a point that presses has a row.
+        for &(row, column, spring, share) in &scratch.stiffness {
+            let (i, j) = (usize::from(row), usize::from(column));
+            let (r, c) = (scratch.row_of[i], scratch.row_of[j]);
+            matrix[r * m + c] -= share / self.candidates[j].area;
+            springs[r * m + c] += spring;
+        }
+        for (r, &i) in scratch.rows.iter().enumerate() {
+            let mut right = scratch.right[i];
+            for (c, &j) in scratch.rows.iter().enumerate() {
+                let spring = springs[r * m + c];
+                if spring == 0.0 {
+                    continue;
+                }
+                let along = &self.along[n * j..n * (j + 1)];
+                let row = &mut matrix[r * m..(r + 1) * m];
+                for (entry, &k) in row.iter_mut().zip(&scratch.rows) {
+                    *entry += spring * along[k];
+                }
+                // Forces that vanish move the others.
+                let lost = (0..n).filter(|&k| scratch.row_of[k] == usize::MAX);
+                let moved: f64 = lost.map(|k| along[k] * scratch.right[k]).sum();
+                right -= spring * moved;
+            }
+            scratch.solution[r] = right;
+        }
+        if !dense::factor(m, matrix, &mut scratch.order_of_newton) {
+            return false;
+        }
+        dense::solve(
+            m,
+            matrix,
+            &scratch.order_of_newton,
+            &mut scratch.solution[..m],
+        );
+        for (r, &i) in scratch.rows.iter().enumerate() {
+            scratch.right[i] = scratch.solution[r];
+        }
+        true
+    }
+
+    /// Sweeps over the friction of the candidates, for given pressing forces. Returns whether it
+    /// changed any.
+    fn rub(&mut self, tools: &[PosedTool]) -> bool {
+        let n = self.candidates.len();
+        let mut has_moved = false;
+        for i in 0..n {
+            let candidate = self.candidates[i];
+            if candidate.is_anchored || candidate.pressure == 0.0 {
+                continue;
+            }
+            let tool = &tools[candidate.tool as usize];
+            let before = self
+                .tools_before
+                .get(candidate.tool as usize)
+                .unwrap_or(tool);
+            let place = candidate.start + candidate.displacement;
+            self.candidates[i].anchor = first_touch(before, tool, &candidate.origin, &place).0;
+        }
         for _ in 0..SWEEPS {
             let (mut moved, mut size) = (0.0, 0.0);
             for i in 0..n {
                 let candidate = self.candidates[i];
+                size += candidate.pressure;
+                if candidate.pressure == 0.0 && candidate.friction == Vec3::zeros() {
+                    continue;
+                }
                 let PosedTool { tool, pose } = &tools[candidate.tool as usize];
                 let normal = candidate.normal;
                 let own = self.block(i, i);
-                let along = normal.dot(&(own * normal));
-                let across = 0.5 * (own.trace() - along);
-                let slide = candidate.displacement.dot(&normal);
-                let gap = candidate.gap + slide;
-                // The force that closes the gap; if that would pull, the force that removes the
-                // pressure.
-                let present = taken[i].dot(&normal) - candidate.support * slide;
-                let share = 1.0 - candidate.support * along;
-                let mut push = -gap / along;
-                if present + push * share < 0.0 {
-                    push = -present / share.max(0.1);
-                }
-                let pressure = (present + push * share).max(0.0);
+                let across = 0.5 * (own.trace() - normal.dot(&(own * normal)));
                 let x = candidate.start + candidate.displacement;
                 let slip = x - (pose * nalgebra::Point3::from(candidate.anchor)).coords;
                 let slip = slip - normal * normal.dot(&slip);
-                let friction = candidate.friction - slip / across;
-                let most = tool.friction() * pressure;
+                let friction = candidate.friction - normal * normal.dot(&candidate.friction);
+                let friction = friction - slip / across;
+                let most = tool.friction_limit(candidate.is_sliding) * candidate.pressure;
                 let norm = friction.norm();
                 let friction = if norm > most {
                     friction * (most / norm)
                 } else {
                     friction
                 };
-                let step = normal * push + friction - candidate.friction;
+                let step = friction - candidate.friction;
                 if step != Vec3::zeros() {
                     for j in 0..n {
                         let response = self.block(j, i) * step;
                         self.candidates[j].displacement += response;
                     }
                 }
-                taken[i] += step;
-                self.candidates[i].pressure = pressure;
                 self.candidates[i].friction = friction;
                 moved += step.norm();
-                size += pressure;
             }
-            if moved <= SETTLED * size {
+            has_moved |= moved > SETTLED_TURN * size;
+            if moved <= SETTLED_SWEEP * size {
                 break;
             }
         }
-        for i in 0..n {
-            let change = taken[i] - self.candidates[i].normal * start[i] - before[i];
-            self.change[3 * i..3 * i + 3].copy_from_slice(change.as_slice());
-        }
+        has_moved
     }
 }
 

@@ -71,12 +71,50 @@ impl LocalModel {
 /// If removing the supports leaves a pivot below this share of its own diagonal entry, the body
 /// counts as unstable.
 const LEAST_RELEASE: f64 = 0.05;
+/// Least share of a vertex's area that counts as pressing in the local model. A vertex with less gives
+/// way more than any neighbour, and presses hardly at all.
+const LEAST_CLOSED: f64 = 0.02;
+/// A vertex that does not press is taken to give way as if this share pressed, once the tool reaches
+/// it.
+const OPEN: f64 = 0.5;
+/// Growth of the cells in which neighbours are merged, from one attempt to the next, and the largest
+/// number of attempts.
+const CELL_GROWTH: f64 = 1.25;
+const MOST_CELLS: usize = 40;
 
-/// One or two candidates, and their share of the force.
-#[derive(Clone, Copy)]
-struct Cluster {
-    members: [usize; 2],
-    shares: [f64; 2],
+/// Candidates that are one contact of the local model.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Cluster {
+    /// Range of its members in [`Clusters::members`].
+    first: usize,
+    end: usize,
+    /// Number in every step.
+    number: u32,
+}
+
+/// The clusters, and the memory to find them.
+#[derive(Debug, Default)]
+pub(super) struct Clusters {
+    all: Vec<Cluster>,
+    /// Candidates, cluster by cluster, and their shares of the cluster's force.
+    members: Vec<u16>,
+    shares: Vec<f64>,
+    /// Cell and candidate.
+    cells: Vec<([i32; 3], u16)>,
+    /// A row of sums of the compliance.
+    sums: Vec<Mat3>,
+}
+
+impl Clusters {
+    pub(super) fn new() -> Self {
+        Self {
+            all: Vec::with_capacity(MOST_CANDIDATES),
+            members: Vec::with_capacity(MOST_CANDIDATES),
+            shares: Vec::with_capacity(MOST_CANDIDATES),
+            cells: Vec::with_capacity(MOST_CANDIDATES),
+            sums: Vec::with_capacity(MOST_CANDIDATES),
+        }
+    }
 }
 
 impl ContactProblem {
@@ -88,73 +126,18 @@ impl ContactProblem {
         most: usize,
         out: &mut LocalModel,
     ) {
-        let mut clusters = [Cluster {
-            members: [0; 2],
-            shares: [1.0, 0.0],
-        }; MOST_CANDIDATES];
-        let n = self.clusters(skin, most, &mut clusters);
-        let clusters = &clusters[..n];
+        let mut clusters = std::mem::take(&mut self.clusters);
+        self.gather(skin, most, &mut clusters);
         self.release();
         out.contacts.clear();
-        out.contacts.extend(clusters.iter().map(|cluster| {
-            let members = cluster.members.map(|m| &self.candidates[m]);
-            let share = cluster.shares;
-            let position = place(members[0]) * share[0] + place(members[1]) * share[1];
-            let force = if share[1] > 0.0 {
-                members[0].force() + members[1].force()
-            } else {
-                members[0].force()
-            };
-            let anchor = members[0].anchor * share[0] + members[1].anchor * share[1];
-            let PosedTool { tool, pose } = &tools[members[0].tool as usize];
-            let local = pose.inverse_transform_point(&position.into()).coords;
-            let distance = tool.shape().distance(&local);
-            // The midpoint of two points on a curved tool lies inside it; use the surface point and
-            // normal of both.
-            let (surface, normal) = if share[1] > 0.0 {
-                let mean = members[0].normal * share[0] + members[1].normal * share[1];
-                (
-                    local,
-                    pose.rotation.inverse_transform_vector(&mean.normalize()),
-                )
-            } else {
-                (local - distance.normal * distance.distance, distance.normal)
-            };
-            LocalContact {
-                vertex: if share[1] > 0.0 {
-                    number_of_pair(members[0].vertex, members[1].vertex)
-                } else {
-                    members[0].vertex
-                },
-                tool: members[0].tool as usize,
-                position,
-                force,
-                surface,
-                normal,
-                curvature: distance.curvature,
-                anchor,
-            }
-        }));
-        out.compliance.clear();
-        out.compliance.resize(9 * n * n, 0.0);
-        for (j, cj) in clusters.iter().enumerate() {
-            for (i, ci) in clusters.iter().enumerate() {
-                let mut block = Mat3::zeros();
-                for (a, &share_a) in ci.members.iter().zip(&ci.shares) {
-                    for (b, &share_b) in cj.members.iter().zip(&cj.shares) {
-                        let share = share_a * share_b;
-                        if share > 0.0 {
-                            block += self.full_block(*a, *b) * share;
-                        }
-                    }
-                }
-                for c in 0..3 {
-                    for r in 0..3 {
-                        out.compliance[3 * i + r + 3 * n * (3 * j + c)] = block[(r, c)];
-                    }
-                }
-            }
+        for cluster in &clusters.all {
+            let members = &clusters.members[cluster.first..cluster.end];
+            let shares = &clusters.shares[cluster.first..cluster.end];
+            out.contacts
+                .push(self.contact(tools, members, shares, cluster.number));
         }
+        self.comply(&mut clusters, &mut out.compliance);
+        self.clusters = clusters;
         out.tools.clear();
         for (t, tool) in tools.iter().enumerate() {
             let own = self.candidates.iter().filter(|c| c.tool as usize == t);
@@ -165,6 +148,98 @@ impl ContactProblem {
                 force,
                 stiffness: self.tool_stiffness(t),
             });
+        }
+    }
+
+    /// One contact of the local model.
+    fn contact(
+        &self,
+        tools: &[PosedTool],
+        members: &[u16],
+        shares: &[f64],
+        number: u32,
+    ) -> LocalContact {
+        let parts = || {
+            let members = members.iter().map(|&m| &self.candidates[usize::from(m)]);
+            members.zip(shares)
+        };
+        let tool = parts().next().map_or(0, |(c, _)| c.tool as usize);
+        let position: Vec3 = parts().map(|(c, share)| place(c) * *share).sum();
+        let anchor: Vec3 = parts().map(|(c, share)| c.anchor * *share).sum();
+        let push: Vec3 = parts().map(|(c, _)| c.push()).sum();
+        let mean = || parts().map(|(c, share)| c.normal * *share).sum::<Vec3>();
+        let normal = push
+            .try_normalize(0.0)
+            .unwrap_or_else(|| mean().normalize());
+        let gap: f64 = parts().map(|(c, share)| c.gap.max(0.0) * share).sum();
+        let is_pressing = parts().any(|(c, _)| c.pressure > 0.0);
+        let PosedTool { tool: shape, pose } = &tools[tool];
+        let local = pose.inverse_transform_point(&position.into()).coords;
+        let normal = pose.rotation.inverse_transform_vector(&normal);
+        // Where it presses, its points do on average, wherever the vertex itself is.
+        let gap = if is_pressing { 0.0 } else { gap };
+        LocalContact {
+            vertex: number,
+            tool,
+            position,
+            force: parts().map(|(c, _)| c.force()).sum(),
+            surface: local - normal * gap,
+            normal,
+            curvature: shape.shape().distance(&local).curvature,
+            anchor,
+        }
+    }
+
+    /// How far the law gives way under a candidate per force, in addition to the tissue, m/N.
+    fn give(candidate: &Candidate) -> f64 {
+        let closed = if candidate.pressure > 0.0 {
+            candidate.closed.clamp(LEAST_CLOSED, 1.0)
+        } else {
+            OPEN
+        };
+        (1.0 - closed) / (closed * candidate.yielding)
+    }
+
+    /// The compliance between clusters.
+    fn comply(&self, clusters: &mut Clusters, compliance: &mut Vec<f64>) {
+        let n = clusters.all.len();
+        compliance.clear();
+        compliance.resize(9 * n * n, 0.0);
+        let Clusters {
+            all,
+            members,
+            shares,
+            sums,
+            ..
+        } = clusters;
+        for (j, cj) in all.iter().enumerate() {
+            sums.clear();
+            sums.resize(self.candidates.len(), Mat3::zeros());
+            for (&b, &share) in members[cj.first..cj.end]
+                .iter()
+                .zip(&shares[cj.first..cj.end])
+            {
+                for &a in members.iter() {
+                    let (a, b) = (usize::from(a), usize::from(b));
+                    sums[a] += self.full_block(a, b) * share;
+                }
+                let candidate = &self.candidates[usize::from(b)];
+                let normal = candidate.normal;
+                let own = Self::give(candidate) * share;
+                sums[usize::from(b)] += normal * normal.transpose() * own;
+            }
+            for (i, ci) in all.iter().enumerate() {
+                let mut block = Mat3::zeros();
+                let range = ci.first..ci.end;
+                for (&a, &share) in members[range.clone()].iter().zip(&shares[range]) {
+                    block += sums[usize::from(a)] * share;
+                }
+                for c in 0..3 {
+                    for r in 0..3 {
+                        compliance[3 * i + r + 3 * n * (3 * j + c)] = block[(r, c)];
+                    }
+                }
+            }
         }
     }
 
@@ -192,7 +267,8 @@ impl ContactProblem {
             }
         }
         let rows = &rows[..m];
-        let (candidates, along) = (&self.candidates, &self.along);
+        let candidates = &self.candidates;
+        let mut factor = std::mem::take(&mut self.factor);
         let is_stable = SHARES.iter().any(|share| {
             let entry = |r: usize, c: usize| {
                 let own = if r == c {
@@ -200,11 +276,12 @@ impl ContactProblem {
                 } else {
                     0.0
                 };
-                own - along[rows[r] + n * rows[c]]
+                own - self.along_with_springs(rows[r], rows[c])
             };
-            factor_symmetric(m, entry, &mut self.factor)
-                && (0..m).all(|r| self.factor[r * m + r] > LEAST_RELEASE * entry(r, r))
+            factor_symmetric(m, entry, &mut factor)
+                && (0..m).all(|r| factor[r * m + r] > LEAST_RELEASE * entry(r, r))
         });
+        self.factor = factor;
         if !is_stable {
             return;
         }
@@ -237,6 +314,15 @@ impl ContactProblem {
         }
     }
 
+    /// Compliance along the normals in the step's matrix.
+    fn along_with_springs(&self, i: usize, j: usize) -> f64 {
+        if self.has_friction {
+            let (a, b) = (&self.candidates[i].normal, &self.candidates[j].normal);
+            return a.dot(&(self.block(i, j) * b));
+        }
+        self.compliance[i + self.candidates.len() * j]
+    }
+
     /// A block of the compliance without supports.
     fn full_block(&self, i: usize, j: usize) -> Mat3 {
         let n = self.candidates.len();
@@ -248,77 +334,93 @@ impl ContactProblem {
         self.candidates[i].normal * self.candidates[j].normal.transpose() * along
     }
 
-    /// Merges neighbouring pressing candidates until there are at most `most`, and leaves out the
-    /// farthest of the others.
-    fn clusters(&self, skin: &[Vec3], most: usize, out: &mut [Cluster; MOST_CANDIDATES]) -> usize {
+    /// Merges neighbouring pressing candidates until there are at most `most` contacts, and leaves
+    /// out the farthest of the others. Cells of the skin at rest decide which are merged, so that
+    /// they are the same in every step.
+    fn gather(&self, skin: &[Vec3], most: usize, out: &mut Clusters) {
         let n = self.candidates.len();
-        let mut partner = [usize::MAX; MOST_CANDIDATES];
         let pressing = |i: usize| self.candidates[i].pressure > 0.0;
-        let n_idle = (0..n).filter(|&i| !pressing(i)).count();
+        let n_pressing = (0..n).filter(|&i| pressing(i)).count();
+        let n_idle = n - n_pressing;
         // Of the candidates that do not press, a few of the nearest are enough.
-        let n_kept_idle = n_idle.min((most / 6).max(most.saturating_sub(n - n_idle)));
-        let mut n_over = (n - n_idle + n_kept_idle).saturating_sub(most);
-        while n_over > 0 {
-            let mut best = (f64::INFINITY, 0, 0);
-            for i in (0..n).filter(|&i| pressing(i) && partner[i] == usize::MAX) {
-                for j in (i + 1..n).filter(|&j| pressing(j) && partner[j] == usize::MAX) {
-                    let (a, b) = (&self.candidates[i], &self.candidates[j]);
-                    // Distances at rest, so that the same candidates are merged in every step.
-                    let points = [a, b].map(|c| skin[c.vertex as usize]);
-                    let distance = (points[0] - points[1]).norm_squared();
-                    if a.tool == b.tool && distance < best.0 {
-                        best = (distance, i, j);
-                    }
-                }
+        let n_kept_idle = n_idle.min((most / 6).max(most.saturating_sub(n_pressing)));
+        let (all, members, shares) = (&mut out.all, &mut out.members, &mut out.shares);
+        all.clear();
+        members.clear();
+        shares.clear();
+        let mut add = |group: &[([i32; 3], u16)], number: u32| {
+            let first = members.len();
+            let sum: f64 = group
+                .iter()
+                .map(|g| self.candidates[usize::from(g.1)].pressure)
+                .sum();
+            for &(_, i) in group {
+                members.push(i);
+                let own = self.candidates[usize::from(i)].pressure;
+                shares.push(if sum > 0.0 { own / sum } else { 1.0 });
             }
-            if best.0 == f64::INFINITY {
+            let end = members.len();
+            all.push(Cluster { first, end, number });
+        };
+        let room = most - n_kept_idle;
+        let mut size = self.least_cell();
+        let mut level = 0;
+        loop {
+            out.cells.clear();
+            for i in (0..n).filter(|&i| pressing(i)) {
+                let candidate = &self.candidates[i];
+                let cell = if n_pressing <= room {
+                    [candidate.vertex.cast_signed(), 0, 0]
+                } else {
+                    let at = skin[candidate.vertex as usize] / size;
+                    // Tools do not share a cluster.
+                    let by_tool = candidate.tool.cast_signed() * 0x0100_0000;
+                    [
+                        at.x.floor() as i32 + by_tool,
+                        at.y.floor() as i32,
+                        at.z.floor() as i32,
+                    ]
+                };
+                out.cells.push((cell, i as u16));
+            }
+            out.cells.sort_unstable();
+            let n_cells = out.cells.chunk_by(|a, b| a.0 == b.0).count();
+            if n_cells <= room || level == MOST_CELLS {
                 break;
             }
-            (partner[best.1], partner[best.2]) = (best.2, best.1);
-            n_over -= 1;
+            size *= CELL_GROWTH;
+            level += 1;
         }
-        let mut idle = [0; MOST_CANDIDATES];
-        let mut count = 0;
-        for i in (0..n).filter(|&i| !pressing(i)) {
-            idle[count] = i;
-            count += 1;
-        }
-        let gap = |i: &usize| self.candidates[*i].gap;
-        idle[..count].sort_unstable_by(|a, b| gap(a).total_cmp(&gap(b)).then(a.cmp(b)));
-        let mut kept = [false; MOST_CANDIDATES];
-        for &i in &idle[..n_kept_idle] {
-            kept[i] = true;
-        }
-        let mut filled = 0;
-        for i in 0..n {
-            let other = partner[i];
-            if filled == most || other < i || (!pressing(i) && !kept[i]) {
-                continue;
-            }
-            let alone = Cluster {
-                members: [i, i],
-                shares: [1.0, 0.0],
-            };
-            out[filled] = if other == usize::MAX {
-                alone
+        for group in out.cells.chunk_by(|a, b| a.0 == b.0).take(room) {
+            let vertex = self.candidates[usize::from(group[0].1)].vertex;
+            let number = if group.len() == 1 {
+                vertex
             } else {
-                let (p, q) = (self.candidates[i].pressure, self.candidates[other].pressure);
-                let share = p / (p + q);
-                if share >= 0.5 {
-                    Cluster {
-                        members: [i, other],
-                        shares: [share, 1.0 - share],
-                    }
-                } else {
-                    Cluster {
-                        members: [other, i],
-                        shares: [1.0 - share, share],
-                    }
-                }
+                number_of_cell(group[0].0, level)
             };
-            filled += 1;
+            add(group, number);
         }
-        filled
+        out.cells.clear();
+        out.cells
+            .extend((0..n).filter(|&i| !pressing(i)).map(|i| ([0; 3], i as u16)));
+        let gap = |i: &([i32; 3], u16)| self.candidates[usize::from(i.1)].gap;
+        out.cells
+            .sort_unstable_by(|a, b| gap(a).total_cmp(&gap(b)).then(a.1.cmp(&b.1)));
+        for idle in out.cells.iter().take(n_kept_idle) {
+            let vertex = self.candidates[usize::from(idle.1)].vertex;
+            add(&[*idle], vertex);
+        }
+    }
+
+    /// Edge of the first cells, m: of the size of the area of a candidate.
+    fn least_cell(&self) -> f64 {
+        let areas = self.pressing().map(|c| c.area);
+        let least = areas.fold(f64::INFINITY, f64::min);
+        if least.is_finite() {
+            least.sqrt()
+        } else {
+            1e-3
+        }
     }
 
     /// Stiffness of the pressing vertices against a displacement of their tool, along their
@@ -333,9 +435,18 @@ impl ContactProblem {
             }
         }
         let n = self.candidates.len();
-        let along = &self.along;
-        let entry = |r: usize, c: usize| along[rows[r] + n * rows[c]];
-        if m == 0 || !factor_symmetric(m, entry, &mut self.factor) {
+        let mut factor = std::mem::take(&mut self.factor);
+        let entry = |r: usize, c: usize| {
+            let own = if r == c {
+                Self::give(&self.candidates[rows[r]])
+            } else {
+                0.0
+            };
+            self.along[rows[r] + n * rows[c]] + own
+        };
+        let is_factored = m > 0 && factor_symmetric(m, entry, &mut factor);
+        self.factor = factor;
+        if !is_factored {
             return Mat3::zeros();
         }
         let mut stiffness = Mat3::zeros();
@@ -350,8 +461,7 @@ impl ContactProblem {
             for (x, &i) in x.iter().zip(&rows[..m]) {
                 let candidate = &self.candidates[i];
                 if candidate.tool as usize == tool {
-                    let taken = x - candidate.support * candidate.normal[axis];
-                    let column = stiffness.column(axis) + candidate.normal * taken;
+                    let column = stiffness.column(axis) + candidate.normal * *x;
                     stiffness.set_column(axis, &column);
                 }
             }
@@ -360,10 +470,16 @@ impl ContactProblem {
     }
 }
 
-/// A number for a merged pair of vertices, different from all vertex numbers.
-fn number_of_pair(a: u32, b: u32) -> u32 {
-    let (a, b) = (a.min(b), a.max(b));
-    a.wrapping_mul(0x9e37_79b1).wrapping_add(b) | 1 << 31
+/// A number for the vertices of a cell, different from all vertex numbers.
+fn number_of_cell(cell: [i32; 3], level: usize) -> u32 {
+    let mut number = level as u32;
+    for at in cell {
+        number = number
+            .wrapping_mul(0x9e37_79b1)
+            .wrapping_add(at.cast_unsigned());
+        number ^= number >> 15;
+    }
+    number | 1 << 31
 }
 
 /// Position of a candidate at the end of the iteration.

@@ -17,6 +17,7 @@
 
 mod candidate;
 mod contact_problem;
+mod dense;
 
 mod inside;
 
@@ -32,4 +33,6 @@ pub use live::{
 pub use local::{LocalContact, LocalModel, LocalTool};
 
 /// Largest number of contact candidates.
-pub const MOST_CANDIDATES: usize = 160;
+pub const MOST_CANDIDATES: usize = 400;
+/// Points of the skin that there is memory for.
+const MOST_POINTS: usize = 8192;

@@ -1,6 +1,6 @@
 //! The columns of a zone, and the elimination order of all columns.
 
-use palpa_mesh::Vec3;
+use palpa_mesh::{Vec3, closest_on_triangle};
 use palpa_sparse::fronts::Tree;
 use palpa_sparse::{Block, ColumnPattern, Singular, TooLarge};
 
@@ -31,13 +31,56 @@ impl From<Singular> for Trouble {
     }
 }
 
+/// Share of the radius within which all triangles belong to a zone as a whole, however large.
+const WHOLE: f64 = 0.5;
+/// Largest number of tools with a centre of their own; others share the last.
+const MOST_CENTRES: usize = 3;
+
+/// A point of the skin at rest for each tool, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Centres {
+    points: [Vec3; MOST_CENTRES],
+    n: usize,
+}
+
+impl Centres {
+    /// One for each of `n` tools; at least one.
+    pub(super) fn new(n: usize, point: impl Fn(usize) -> Vec3) -> Self {
+        let n = n.clamp(1, MOST_CENTRES);
+        let points = std::array::from_fn(|k| point(k.min(n - 1)));
+        Self { points, n }
+    }
+
+    /// That of a tool.
+    pub(super) fn of(&self, tool: usize) -> Vec3 {
+        self.points[tool.min(self.n - 1)]
+    }
+
+    fn all(&self) -> &[Vec3] {
+        &self.points[..self.n]
+    }
+
+    /// Largest distance of a tool's centre from that in `other`, m.
+    pub(super) fn farthest_from(&self, other: &Self) -> f64 {
+        let tools = 0..self.n.max(other.n);
+        let distances = tools.map(|tool| (self.of(tool) - other.of(tool)).norm());
+        distances.fold(0.0, f64::max)
+    }
+
+    /// Distance of a point from the nearest of them, m.
+    pub(super) fn distance(&self, point: &Vec3) -> f64 {
+        let distances = self.all().iter().map(|centre| (point - centre).norm());
+        distances.fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// The columns of a zone, and the elimination order of all columns.
 #[derive(Debug)]
 pub(super) struct Plan {
     /// Number of the zone, counted from 1.
     pub(super) id: u64,
-    /// Centre at rest, m.
-    pub(super) centre: Vec3,
+    /// Centres at rest, one for each tool, m.
+    pub(super) centres: Centres,
     /// Radius, m; infinite for the whole body.
     pub(super) radius: f64,
     /// Order of elimination: exterior, zone, ring.
@@ -46,6 +89,8 @@ pub(super) struct Plan {
     pub(super) is_inside: Vec<bool>,
     /// Skin vertices of the zone, ascending.
     pub(super) vertices: Vec<u32>,
+    /// Triangles of the skin that are in the zone as a whole and can move.
+    pub(super) triangles: Vec<u32>,
     /// Nodes with unknowns, each with the first of its three unknowns: nodes of the zone (ring
     /// included), of the ring, and of the exterior.
     pub(super) zone: Vec<[u32; 2]>,
@@ -54,20 +99,33 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// The zone of all columns whose skin vertex at rest is within `radius` of `centre`; all
-    /// columns if there is none.
+    /// The zone of all columns whose skin vertex at rest is within `radius` of one of `centres`, with
+    /// whole triangles near them.
     pub(super) fn new(
         model: &Model,
         pattern: &ColumnPattern,
         id: u64,
-        centre: Vec3,
+        centres: Centres,
         radius: f64,
     ) -> Result<Self, TooLarge> {
         let points = &model.body.skin.points;
         let mut is_inside: Vec<bool> = points
             .iter()
-            .map(|p| (p - centre).norm() <= radius)
+            .map(|p| centres.distance(p) <= radius)
             .collect();
+        let skin = &model.body.skin;
+        for (t, triangle) in skin.triangles.iter().enumerate() {
+            let corners = skin.corners(t);
+            let is_near = |centre: &Vec3| {
+                let nearest = closest_on_triangle(*centre, corners).0;
+                (nearest - centre).norm() <= WHOLE * radius
+            };
+            if centres.all().iter().any(is_near) {
+                for &v in triangle {
+                    is_inside[v as usize] = true;
+                }
+            }
+        }
         if !is_inside.contains(&true) {
             is_inside.fill(true);
         }
@@ -89,10 +147,17 @@ impl Plan {
         let exterior = nodes(&|v| !is_inside[v]);
         Ok(Self {
             id,
-            centre,
+            centres,
             radius,
             vertices: (0..points.len() as u32)
                 .filter(|&v| is_inside[v as usize])
+                .collect(),
+            triangles: (0..skin.triangles.len() as u32)
+                .filter(|&t| {
+                    let corners = skin.triangles[t as usize].iter();
+                    let is_held = |&v: &u32| model.supports[model.body.node(v as usize, 0)].n == 3;
+                    corners.clone().all(|&v| is_inside[v as usize]) && !corners.clone().all(is_held)
+                })
                 .collect(),
             zone,
             ring,

@@ -144,6 +144,16 @@ pub enum ShapeError {
         /// The value given.
         value: f64,
     },
+    /// A coefficient of kinetic friction that is none, or larger than the static one.
+    #[error(
+        "a kinetic friction coefficient of {value} is not possible; give 0 to {most}, the coefficient of a tool that sticks"
+    )]
+    KineticFriction {
+        /// The value given.
+        value: f64,
+        /// The largest that is possible.
+        most: f64,
+    },
 }
 
 /// The questions that every shape answers. All lengths in metres, in the shape's frame.

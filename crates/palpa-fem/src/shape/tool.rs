@@ -12,6 +12,7 @@ pub type Pose = nalgebra::Isometry3<f64>;
 pub struct Tool {
     shape: Shape,
     friction: f64,
+    kinetic: f64,
 }
 
 impl Tool {
@@ -26,7 +27,23 @@ impl Tool {
         Ok(Self {
             shape: shape.into(),
             friction,
+            kinetic: friction,
         })
+    }
+
+    /// The same tool with another coefficient of friction where it slides, at most that where it
+    /// sticks.
+    ///
+    /// # Errors
+    /// When the coefficient is negative, not finite, or larger.
+    pub fn with_kinetic_friction(self, kinetic: f64) -> Result<Self, ShapeError> {
+        if !(kinetic >= 0.0 && kinetic <= self.friction) {
+            return Err(ShapeError::KineticFriction {
+                value: kinetic,
+                most: self.friction,
+            });
+        }
+        Ok(Self { kinetic, ..self })
     }
 
     /// Its shape.
@@ -34,9 +51,23 @@ impl Tool {
         &self.shape
     }
 
-    /// Its coefficient of friction, 0 or more.
+    /// Its coefficient of friction, 0 or more: that of a vertex that sticks.
     pub fn friction(&self) -> f64 {
         self.friction
+    }
+
+    /// Its coefficient of friction where it slides.
+    pub fn kinetic_friction(&self) -> f64 {
+        self.kinetic
+    }
+
+    /// The coefficient that bounds friction on a vertex that slides, or sticks.
+    pub(crate) fn friction_limit(&self, is_sliding: bool) -> f64 {
+        if is_sliding {
+            self.kinetic
+        } else {
+            self.friction
+        }
     }
 
     /// The distance of the point `p_world` from the tool at `pose`; normal and curvature are in

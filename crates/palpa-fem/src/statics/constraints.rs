@@ -1,31 +1,33 @@
-//! Chooses the vertices in contact, and puts supports, loads and tools on the linear system.
+//! Puts supports, loads and contact on the linear system.
 
 use palpa_mesh::Vec3;
 
-use super::newton::{Imbalance, Newton};
+use super::newton::Newton;
 use super::workspace::Workspace;
-use crate::state::{State, Touch};
+use crate::state::State;
 
-/// From this iteration on, the active set changes only when forces have settled, so that it cannot
-/// oscillate.
-const SETTLE_AFTER: usize = 12;
-/// Share of the largest contact force below which a force counts as zero.
-const NO_FORCE: f64 = 1e-9;
+/// How far a state is from equilibrium.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Imbalance {
+    /// Norm of the forces in free directions, N.
+    pub(super) free: f64,
+    /// Norm of what the multipliers of contact lack, N.
+    pub(super) mismatch: f64,
+    /// Forces that hold the body, N.
+    pub(super) held: f64,
+}
 
-/// The forces that decide on contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ForcesBy {
-    /// Forces at the present displacements: correct in equilibrium. After a large step they may be
-    /// many times too large, or tensile.
-    Present,
-    /// Forces predicted by the linear system, as if they were unknowns of their own.
-    Predicted,
+impl Imbalance {
+    /// Norm of all that is to vanish, N.
+    pub(super) fn whole(&self) -> f64 {
+        self.free.hypot(self.mismatch)
+    }
 }
 
 impl Newton<'_> {
     /// Force below which the body counts as free of forces, N. The tolerance is relative to at
     /// least this force, which keeps it above rounding.
-    fn floor(&self) -> f64 {
+    pub(super) fn floor(&self) -> f64 {
         let stiffest = self
             .model
             .materials
@@ -36,76 +38,55 @@ impl Newton<'_> {
         1e-6 * stiffest * area / self.model.skin_areas.len() as f64
     }
 
-    /// Releases vertices under tension, and switches between sticking and sliding. Late in a solve
-    /// only one vertex changes, the one that violates the laws of contact by the largest force, so
-    /// that contact cannot oscillate. Returns the number of changes.
-    pub(super) fn revise(&self, state: &mut State, ws: &mut Workspace, by: ForcesBy) -> usize {
-        let forces = match by {
-            ForcesBy::Present => &ws.forces,
-            ForcesBy::Predicted => &ws.predicted,
-        };
-        let largest = ws
-            .contacts
-            .active
-            .iter()
-            .map(|c| forces[c.node].norm())
-            .fold(0.0, f64::max);
-        let least = NO_FORCE * largest.max(self.floor());
-        let changes = ws
-            .contacts
-            .active
-            .iter()
-            .enumerate()
-            .filter_map(|(i, contact)| {
-                let force = &forces[contact.node];
-                let (touch, doubt) = contact.revised(force, least)?;
-                Some((i, touch, doubt))
-            });
-        let mut changes: Vec<(usize, Touch, f64)> = changes.collect();
-        if self.iterations >= SETTLE_AFTER {
-            changes.sort_by(|a, b| b.2.total_cmp(&a.2));
-            changes.truncate(1);
-        }
-        for &(i, touch, _) in &changes {
-            let contact = &mut ws.contacts.active[i];
-            contact.touch = touch;
-            state.touches[contact.vertex] = touch;
-        }
-        ws.contacts.active.retain(|c| c.touch != Touch::Open);
-        changes.len()
+    /// Finds the contacts at the present displacements.
+    pub(super) fn touch(&self, state: &State, ws: &mut Workspace) {
+        ws.contacts.update(
+            self.model,
+            &state.displacements,
+            self.load.tools,
+            &ws.given,
+            (&state.touches, &ws.origin),
+        );
     }
 
-    /// Collects the held directions and the prescribed displacements along them; adds friction and
-    /// the tools' curvature to the system.
-    pub(super) fn put_constraints(
-        &mut self,
-        state: &State,
-        ws: &mut Workspace,
-        by: ForcesBy,
-    ) -> Imbalance {
-        // First remove the stiffness that contact has added since the last assembly.
-        for (block, stiffness) in ws.added.drain(..) {
-            ws.system.blocks[block] -= stiffness;
+    /// Forces that are not in balance, in `right_side`; and how far the state is from equilibrium.
+    pub(super) fn balance(&mut self, ws: &mut Workspace) -> Imbalance {
+        for (right, force) in ws.right_side.iter_mut().zip(&ws.forces) {
+            *right = -force;
         }
-        ws.holds.copy_from_slice(&ws.given);
-        ws.demand.fill(Vec3::zeros());
-        ws.right_side.copy_from_slice(&ws.forces);
-        ws.contact_forces.copy_from_slice(match by {
-            ForcesBy::Present => &ws.forces,
-            ForcesBy::Predicted => &ws.predicted,
-        });
-        let of_loads = self.demand_of_loads(state, ws);
-        let largest = self.constrain_contacts(ws, of_loads);
-        let (free, held) = self.norms(ws);
-        self.residual = free / held.max(self.floor());
+        for slot in &ws.contacts.slots {
+            ws.right_side[slot.node] += slot.force();
+        }
+        let imbalance = self.imbalance(ws);
+        self.residual = imbalance.free / imbalance.held;
+        self.mismatch = imbalance.mismatch / imbalance.held;
+        imbalance
+    }
+
+    /// How far `right_side` and the multipliers are from equilibrium.
+    pub(super) fn imbalance(&self, ws: &Workspace) -> Imbalance {
+        let (mut free_sq, mut held_sq) = (0.0, 0.0);
+        for (force, hold) in ws.right_side.iter().zip(&ws.given) {
+            let free = hold.free_part(force);
+            free_sq += free.norm_squared();
+            held_sq += (force - free).norm_squared();
+        }
+        let contact: f64 = (ws.contacts.slots.iter())
+            .map(|slot| slot.force().norm_squared())
+            .sum();
+        let loads: f64 = self.load.forces.iter().map(Vec3::norm_squared).sum();
+        let mismatch: f64 = ws.contacts.mismatches().map(|m| m.norm_squared()).sum();
         Imbalance {
-            free,
-            demand: largest,
+            free: free_sq.sqrt(),
+            mismatch: mismatch.sqrt(),
+            held: (held_sq + contact).max(loads).sqrt().max(self.floor()),
         }
     }
 
-    /// Displacements prescribed by holds and guides. Returns the largest, m.
-    fn demand_of_loads(&self, state: &State, ws: &mut Workspace) -> f64 {
+    /// Collects the held directions and the prescribed displacements along them. Returns the largest
+    /// of these, m.
+    pub(super) fn demand(&self, state: &State, ws: &mut Workspace) -> f64 {
+        ws.demand.fill(Vec3::zeros());
         let mut largest = 0.0_f64;
         for &(node, target) in self.load.held {
             let demand = target - state.displacements[node];
@@ -120,38 +101,57 @@ impl Newton<'_> {
         largest
     }
 
-    /// Holds, displacements, friction and stiffness of the vertices in contact. Returns the largest
-    /// prescribed displacement, m, or `largest`.
-    fn constrain_contacts(&self, ws: &mut Workspace, mut largest: f64) -> f64 {
-        for contact in &ws.contacts.active {
-            let node = contact.node;
-            let force = ws.contact_forces[node];
-            let (hold, demand) = contact.demand(ws.given[node], &force);
-            ws.holds[node] = hold;
-            ws.demand[node] = demand;
-            largest = largest.max(demand.norm());
-            let mut stiffness = contact.geometric(&force);
-            if let Touch::Slip { .. } = contact.touch {
-                let (friction, slope) = contact.friction(&force);
-                ws.right_side[node] -= friction;
-                stiffness += slope;
+    /// Adds the stiffness of contact to the blocks of the system.
+    pub(super) fn stiffen(&self, ws: &mut Workspace) {
+        ws.take_off();
+        let model = self.model;
+        let Workspace {
+            system,
+            contacts,
+            added,
+            ..
+        } = ws;
+        contacts.stiffness(|v, w, block| {
+            if let Some(place) = model.structure.skin_block(v, w) {
+                system.blocks[place] += block;
+                let nodes = [model.body.node(v, 0), model.body.node(w, 0)];
+                added.push((place, nodes, block));
             }
-            let block = self.model.structure.diagonal(node);
-            ws.system.blocks[block] += stiffness;
-            ws.added.push((block, stiffness));
-        }
-        largest
+        });
+        self.spring(ws, ws.spring);
     }
 
-    /// Norms of the forces in free and in held directions, N.
-    fn norms(&self, ws: &Workspace) -> (f64, f64) {
-        let (mut free_sq, mut held_sq) = (0.0, 0.0);
-        for ((force, whole), hold) in ws.right_side.iter().zip(&ws.forces).zip(&ws.holds) {
-            let free = hold.free_part(force);
-            free_sq += free.norm_squared();
-            held_sq += (whole - free).norm_squared();
+    /// Sets the stiffness of the springs that hold the pressed vertices in the factor, as a share of
+    /// the skin's own.
+    pub(super) fn spring(&self, ws: &mut Workspace, share: f64) {
+        for (place, _, spring) in ws.springs.drain(..) {
+            ws.system.blocks[place] -= spring;
         }
-        let loads: f64 = self.load.forces.iter().map(Vec3::norm_squared).sum();
-        (free_sq.sqrt(), held_sq.max(loads).sqrt())
+        ws.spring = share;
+        if share == 0.0 {
+            return;
+        }
+        for (vertex, spring) in ws.contacts.springs(self.model, share) {
+            let node = self.model.body.node(vertex, 0);
+            if let Some(place) = self.model.structure.skin_block(vertex, vertex) {
+                ws.system.blocks[place] += spring;
+                ws.springs.push((place, [node; 2], spring));
+            }
+        }
+    }
+}
+
+impl Workspace {
+    /// Forgets the stiffness that contact has added, which is no longer in the blocks.
+    pub(super) fn forget_added(&mut self) {
+        self.added.clear();
+        self.springs.clear();
+    }
+
+    /// Takes the stiffness that contact has added out of the blocks.
+    fn take_off(&mut self) {
+        for (place, _, block) in self.added.drain(..).chain(self.springs.drain(..)) {
+            self.system.blocks[place] -= block;
+        }
     }
 }

@@ -2,88 +2,78 @@
 
 use palpa_mesh::Vec3;
 
-use super::newton::{Imbalance, Newton};
+use super::constraints::Imbalance;
+use super::newton::Newton;
 use super::workspace::Workspace;
 use crate::assembly::{Inverted, energy};
 use crate::state::State;
 
 /// Number of halvings after which a Newton step has failed.
 const MOST_HALVINGS: usize = 8;
-/// Distance by which a sliding vertex may leave the tool's surface in an iteration, as a share of
-/// the surface's radius of curvature.
-const NEAR_SURFACE: f64 = 0.05;
+/// Growth of the imbalance that is let pass.
+const GROWTH: f64 = 1.000_1;
 
 impl Newton<'_> {
-    /// Moves along `δ` as far as no prism inverts and the forces do not grow. Returns the share of
-    /// `δ`.
+    /// Moves along the step as far as no prism inverts and the imbalance does not grow, or without
+    /// contact the energy falls. If it grows anyhow, takes the share with the least. Displacements that are still prescribed must be
+    /// reached, whatever the forces.
     pub(super) fn search(
-        &self,
+        &mut self,
         state: &mut State,
         ws: &mut Workspace,
         imbalance: Imbalance,
+        is_led: bool,
     ) -> Result<f64, Inverted> {
-        let mut share = 1.0;
+        let start = state.displacements.clone();
+        let multipliers = std::mem::take(&mut ws.multipliers);
+        let slots: Vec<_> = ws.contacts.slots.clone();
+        let touches = state.touches.clone();
+        let mut best: Option<(f64, f64)> = None;
         let mut last = None;
-        // While the skin still has to be moved to the tool, forces must grow.
-        let must_fall = imbalance.demand <= self.params.gap_tolerance.max(1e-6)
-            && ws.contacts.active.iter().all(|c| c.friction == 0.0);
+        let mut share = 1.0;
         for _ in 0..=MOST_HALVINGS {
-            for ((trial, u), delta) in ws.trial.iter_mut().zip(&state.displacements).zip(&ws.delta)
-            {
-                *trial = u + delta * share;
-            }
-            let result =
-                ws.assembler
-                    .forces(self.model, &ws.memory, &ws.trial, &mut ws.trial_forces);
-            last = result.err();
-            let is_good = last.is_none()
-                && self.keeps_touch(ws, share)
-                && (!must_fall || self.is_better(state, ws, imbalance.free));
-            if is_good {
-                std::mem::swap(&mut state.displacements, &mut ws.trial);
-                return Ok(share);
+            match self.try_share(state, ws, (&start, &touches), (&slots, &multipliers), share) {
+                Ok(whole) => {
+                    let is_good = whole <= imbalance.whole() * GROWTH
+                        || (slots.is_empty() && {
+                            let energy = |u: &[Vec3]| energy(self.model, &ws.memory, u);
+                            energy(&state.displacements) < energy(&start)
+                        });
+                    if is_led || is_good {
+                        return Ok(share);
+                    }
+                    if best.is_none_or(|best| whole < best.1) {
+                        best = Some((share, whole));
+                    }
+                }
+                Err(inverted) => last = Some(inverted),
             }
             share *= 0.5;
         }
-        if let Some(inverted) = last {
-            return Err(inverted);
-        }
-        // Due to rounding or a poor linear model: take the shortest move, and let the next
-        // iterations decide.
-        std::mem::swap(&mut state.displacements, &mut ws.trial);
-        Ok(2.0 * share)
+        let Some((share, _)) = best else {
+            return Err(last.unwrap_or(Inverted { at: Vec3::zeros() }));
+        };
+        self.try_share(state, ws, (&start, &touches), (&slots, &multipliers), share)?;
+        Ok(share)
     }
 
-    /// Whether sliding vertices stay near the tool's surface. The linear step ignores its
-    /// curvature.
-    fn keeps_touch(&self, ws: &Workspace, share: f64) -> bool {
-        ws.contacts.active.iter().all(|contact| {
-            let x = self.model.body.positions[contact.node] + ws.trial[contact.node];
-            let gap = contact.moved(self.load.tools, &x).gap.abs();
-            let radius = 1.0 / contact.sharpness().max(1.0);
-            gap <= ((1.0 - 0.5 * share) * contact.gap.abs()).max(NEAR_SURFACE * radius)
-        })
-    }
-
-    /// Whether the trial has less energy, or smaller free forces.
-    fn is_better(&self, state: &State, ws: &mut Workspace, free_before: f64) -> bool {
-        let mut forces = std::mem::take(&mut ws.trial_forces);
-        for (force, load) in forces.iter_mut().zip(self.load.forces) {
-            *force -= load;
+    /// Goes a share of the step from the start. Returns the imbalance there, N.
+    fn try_share(
+        &mut self,
+        state: &mut State,
+        ws: &mut Workspace,
+        (start, touches): (&[Vec3], &[crate::contact::Touch]),
+        (slots, multipliers): (&[super::contacts::Slot], &[Vec3]),
+        share: f64,
+    ) -> Result<f64, Inverted> {
+        for ((u, start), delta) in state.displacements.iter_mut().zip(start).zip(&ws.delta) {
+            *u = start + delta * share;
         }
-        if let Some(inertia) = &self.inertia {
-            inertia.add(self.model, &ws.trial, &mut forces, None);
-        }
-        let free_sq: f64 = forces
-            .iter()
-            .zip(&ws.holds)
-            .map(|(force, hold)| hold.free_part(force).norm_squared())
-            .sum();
-        ws.trial_forces = forces;
-        free_sq.sqrt() <= free_before * 1.000_1
-            || (ws.contacts.active.is_empty() && {
-                let energy = |u: &[Vec3]| energy(self.model, &ws.memory, u);
-                energy(&ws.trial) < energy(&state.displacements)
-            })
+        state.touches.copy_from_slice(touches);
+        super::contacts::move_multipliers(slots, multipliers, share, &mut state.touches);
+        (ws.assembler).forces(self.model, &ws.memory, &state.displacements, &mut ws.forces)?;
+        self.add_loads(state, ws, false);
+        self.touch(state, ws);
+        Ok(self.balance(ws).whole())
     }
 }

@@ -10,6 +10,9 @@ use crate::posed_tool::PosedTool;
 pub struct Load<'a> {
     /// Tools with their poses at the end.
     pub tools: &'a [PosedTool],
+    /// The same tools at the start, if they have friction: a vertex is held where it first touches on
+    /// their way. Empty if they have not moved.
+    pub tools_before: &'a [PosedTool],
     /// Nodes held in all directions, with their displacements at the end, m.
     pub held: &'a [(usize, Vec3)],
     /// Guided nodes: node, unit direction, and displacement along it at the end, m. They are free
@@ -28,7 +31,10 @@ pub struct Load<'a> {
 pub struct SolveParams {
     /// Tolerance of the norm of the unbalanced forces, relative to the forces that hold the body.
     pub tolerance: f64,
-    /// Largest gap of an active vertex, m.
+    /// Tolerance of what pressure and friction differ from the law of contact, relative to the same
+    /// forces.
+    pub contact_tolerance: f64,
+    /// Distance from a prescribed displacement, m.
     pub gap_tolerance: f64,
     /// Largest number of Newton iterations in one load step.
     pub max_iterations: usize,
@@ -44,6 +50,7 @@ impl Default for SolveParams {
     fn default() -> Self {
         Self {
             tolerance: 1e-7,
+            contact_tolerance: 1e-5,
             gap_tolerance: 1e-8,
             max_iterations: 40,
             keep_factor_from: 10_000,

@@ -15,6 +15,10 @@ use crate::state::State;
 const LEAST_SUBSTEP: f64 = 1.0 / 128.0;
 /// A failing step is given up after this multiple of the iterations of one solve.
 const MOST_SOLVES: usize = 10;
+/// A tool with friction goes at most this far in a substep, as a share of the radius of contact:
+/// towards the skin, since a vertex is held where it first touches, and along it.
+const TOWARDS: f64 = 0.06;
+const ALONG: f64 = 0.25;
 /// Number of Newton iterations up to which the next substep may be longer.
 const EASY: usize = 8;
 
@@ -24,7 +28,6 @@ struct Spent {
     iterations: usize,
     substeps: usize,
     shift: f64,
-    smoothing: f64,
 }
 
 impl Spent {
@@ -32,7 +35,6 @@ impl Spent {
         self.iterations += report.iterations;
         self.substeps += 1;
         self.shift = self.shift.max(report.shift);
-        self.smoothing = self.smoothing.max(report.friction_smoothing);
     }
 
     /// The report of the last substep, extended to the whole step.
@@ -41,7 +43,6 @@ impl Spent {
             iterations: self.iterations,
             substeps: self.substeps,
             shift: self.shift,
-            friction_smoothing: self.smoothing,
             ..last
         }
     }
@@ -60,11 +61,17 @@ pub fn advance(
     params: &SolveParams,
 ) -> StepReport {
     let start = state.clone();
+    let starts = starts(model, state, before.tools, load.tools);
+    let before = &Load {
+        tools: &starts,
+        ..before.clone()
+    };
     let (mut done, mut size) = (0.0_f64, 1.0_f64);
     let mut spent = Spent::default();
     loop {
-        let share = (done + size).min(1.0);
-        let saved = (size < 1.0).then(|| state.clone());
+        let longest = friction_limit(model, state, before, load, done);
+        let share = (done + size.min(longest)).min(1.0);
+        let saved = (done > 0.0).then(|| state.clone());
         let report = substep(
             model,
             state,
@@ -81,7 +88,7 @@ pub fn advance(
                 return spent.report(report);
             }
             if report.iterations <= EASY {
-                size *= 2.0;
+                size = (2.0 * size).min(1.0);
             }
         } else {
             // No equilibrium is found from here: go back to the last good state, and try half the
@@ -100,6 +107,79 @@ pub fn advance(
     }
 }
 
+/// The tools at the start of a step. A tool that was nowhere comes along its axis from where it first
+/// touches.
+fn starts(
+    model: &Model,
+    state: &State,
+    before: &[PosedTool],
+    after: &[PosedTool],
+) -> Vec<PosedTool> {
+    const MOST_SHIFTS: usize = 50;
+    let mut starts = before.to_vec();
+    for tool in after.iter().skip(before.len()) {
+        let mut start = *tool;
+        let axis = start.pose.rotation * Vec3::z();
+        for _ in 0..MOST_SHIFTS {
+            let gaps = (0..state.touches.len()).map(|v| {
+                let node = model.body.node(v, 0);
+                let x = model.body.positions[node] + state.displacements[node];
+                start.tool.distance_at(&start.pose, &x).distance
+            });
+            let least = gaps.fold(f64::INFINITY, f64::min);
+            if least >= 0.0 {
+                break;
+            }
+            start.pose.translation.vector -= axis * least.min(-1e-6);
+        }
+        starts.push(start);
+    }
+    starts
+}
+
+/// The share of a step that tools with friction may go in one substep.
+fn friction_limit(
+    model: &Model,
+    state: &State,
+    before: &Load<'_>,
+    load: &Load<'_>,
+    done: f64,
+) -> f64 {
+    let mut limit = f64::INFINITY;
+    for (k, (from, to)) in before.tools.iter().zip(load.tools).enumerate() {
+        if to.tool.friction() == 0.0 {
+            continue;
+        }
+        let now = &between(&[*from], &[*to], done)[0];
+        let (mut area, mut along, mut clearance) = (0.0, Vec3::zeros(), f64::INFINITY);
+        let mut least_area = f64::INFINITY;
+        for (v, touch) in state.touches.iter().enumerate() {
+            let node = model.body.node(v, 0);
+            let x = model.body.positions[node] + state.displacements[node];
+            let distance = now.tool.distance_at(&now.pose, &x);
+            if distance.distance < clearance {
+                clearance = distance.distance;
+                least_area = model.skin_areas[v];
+            }
+            if touch.tool() == Some(k) {
+                area += model.skin_areas[v];
+                along += distance.normal * (touch.pressure * model.skin_areas[v]);
+            }
+        }
+        let radius = (area.max(least_area) / std::f64::consts::PI).sqrt();
+        let way = to.pose.translation.vector - from.pose.translation.vector;
+        let turned = (from.pose.rotation.inverse() * to.pose.rotation).angle() * radius;
+        let towards = along
+            .try_normalize(0.0)
+            .map_or(way.norm(), |n| way.dot(&n).abs());
+        let aside = (way.norm_squared() - towards.powi(2)).max(0.0).sqrt() + turned;
+        let share = (TOWARDS * radius / towards).min(ALONG * radius / aside);
+        // Until it touches, it may go.
+        limit = limit.min(share + clearance.max(0.0) / way.norm().max(f64::MIN_POSITIVE));
+    }
+    limit.max(LEAST_SUBSTEP)
+}
+
 /// Solves one part of a step, given by its start and end as shares of the step.
 fn substep(
     model: &Model,
@@ -112,6 +192,7 @@ fn substep(
 ) -> StepReport {
     let part = Load {
         tools: &between(before.tools, load.tools, share),
+        tools_before: &between(before.tools, load.tools, done),
         held: &held_between(start, load.held, share),
         guided: &guided_between(start, load.guided, share),
         forces: &forces_between(before.forces, load.forces, share),

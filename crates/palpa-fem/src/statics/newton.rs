@@ -4,8 +4,6 @@ use std::ops::ControlFlow;
 
 use palpa_mesh::Vec3;
 
-use super::active_set::anchor_slides;
-use super::constraints::ForcesBy;
 use super::load::{Load, SolveParams};
 use super::report::{Outcome, StepReport};
 use super::workspace::Workspace;
@@ -15,8 +13,6 @@ use crate::model::Model;
 use crate::state::State;
 use crate::system::Hold;
 
-/// Residual below which contact uses present forces instead of predicted ones.
-const NEAR_EQUILIBRIUM: f64 = 1e-3;
 /// Number of iterations without progress after which a solve is given up, and the ratio to the best
 /// residual so far that counts as progress.
 const PATIENCE: usize = 12;
@@ -24,6 +20,12 @@ const PROGRESS: f64 = 0.7;
 /// Residual that is accepted if it falls no further: a body about to buckle can be factored only
 /// with a shift, and then converges ever more slowly.
 const STALLED: f64 = 1e-6;
+/// First stiffness of the springs that hold pressed vertices in a factor that is not positive definite
+/// without, as a share of the skin's own; growth factor; largest value. Each new factor tries softer
+/// ones.
+const FIRST_SPRING: f64 = 0.1;
+const SPRING_GROWTH: f64 = 4.0;
+const MOST_SPRING: f64 = 100.0;
 
 /// One solve, without dividing the step. The state is not restored if the solve fails.
 pub fn equilibrate(
@@ -45,20 +47,11 @@ fn equilibrate_in_pool(
     params: &SolveParams,
 ) -> StepReport {
     let mut newton = Newton::begin(model, state, ws, load, params);
-    let start =
-        (!load.tools.is_empty()).then(|| (state.displacements.clone(), state.touches.clone()));
-    let mut outcome = newton.run(state, ws);
-    if let Some((displacements, touches)) = start
-        && outcome != Outcome::Converged
-        && load.tools.iter().any(|t| t.tool.friction() > 0.0)
-    {
-        state.displacements = displacements;
-        state.touches = touches;
-        outcome = newton.run_smoothed(state, ws);
-    }
+    let outcome = newton.run(state, ws);
     if outcome == Outcome::Converged {
         ws.memory.commit(model, state);
-        anchor_slides(model, &state.displacements, load.tools, &mut state.touches);
+        let Workspace { contacts, .. } = ws;
+        contacts.end(model, &state.displacements, load.tools, &mut state.touches);
         if let Some(inertia) = &newton.inertia {
             inertia.commit(state);
         }
@@ -66,7 +59,7 @@ fn equilibrate_in_pool(
             state.time += load.duration;
         }
     }
-    newton.report(state, ws, outcome)
+    newton.report(ws, state, outcome)
 }
 
 /// The state of one solve.
@@ -81,15 +74,8 @@ pub(super) struct Newton<'a> {
     pub(super) shift: f64,
     /// Residual: unbalanced forces relative to the forces that hold the body.
     pub(super) residual: f64,
-}
-
-/// The distance of a state from equilibrium.
-#[derive(Clone, Copy)]
-pub(super) struct Imbalance {
-    /// Norm of the forces in free directions, N.
-    pub(super) free: f64,
-    /// Largest displacement still prescribed by holds, guides and tools, m.
-    pub(super) demand: f64,
+    /// What the multipliers of contact lack, relative to the same forces.
+    pub(super) mismatch: f64,
 }
 
 /// The smallest residual so far, and its iteration.
@@ -108,7 +94,6 @@ impl<'a> Newton<'a> {
         params: &'a SolveParams,
     ) -> Self {
         ws.memory.begin(model, state, load.duration);
-        ws.contacts.smoothing = 0.0;
         ws.assembler.begin(model, &ws.memory);
         let inertia = load
             .dynamics
@@ -123,6 +108,11 @@ impl<'a> Newton<'a> {
                 let dt = load.duration;
                 Inertia::new(model, memory, &dynamics, state, dt, assembler, system)
             });
+        ws.origin.tools.clear();
+        ws.origin.tools.extend_from_slice(load.tools_before);
+        ws.origin.displacements.clone_from(&state.displacements);
+        ws.origin.touches.clone_from(&state.touches);
+        ws.spring = 0.0;
         ws.given.clone_from(&model.supports);
         for &(node, _) in load.held {
             ws.given[node] = Hold::all();
@@ -138,6 +128,7 @@ impl<'a> Newton<'a> {
             iterations: 0,
             shift: 0.0,
             residual: f64::INFINITY,
+            mismatch: f64::INFINITY,
         }
     }
 }
@@ -163,45 +154,43 @@ impl Newton<'_> {
         ws: &mut Workspace,
         best: &mut Best,
     ) -> ControlFlow<Outcome> {
-        let n_new = self.linearise(state, ws)?;
-        let mut imbalance = self.constrain(state, ws, n_new);
-        if n_new == 0 && self.is_settled(imbalance, self.params.tolerance) {
-            // The forces are correct for these touches. Now check the touches against the forces.
-            if self.iterations == 0 || self.revise(state, ws, ForcesBy::Present) == 0 {
-                return ControlFlow::Break(Outcome::Converged);
-            }
-            imbalance = self.put_constraints(state, ws, ForcesBy::Present);
-            *best = Best {
-                residual: f64::INFINITY,
-                iteration: self.iterations,
-            };
+        self.linearise(state, ws)?;
+        let imbalance = self.balance(ws);
+        let demand = self.demand(state, ws);
+        let is_led = demand > self.params.gap_tolerance.max(1e-6);
+        let is_there = demand <= self.params.gap_tolerance;
+        if is_there && self.is_settled(self.params.tolerance) {
+            return ControlFlow::Break(Outcome::Converged);
         }
-        if self.iterations > 0 && self.residual < PROGRESS * best.residual {
+        let whole = self.residual.max(self.mismatch);
+        if self.iterations > 0 && whole < PROGRESS * best.residual {
             *best = Best {
-                residual: self.residual,
+                residual: whole,
                 iteration: self.iterations,
             };
         }
         let is_lost = self.iterations > best.iteration + PATIENCE;
         if is_lost || self.iterations == self.params.max_iterations {
-            return ControlFlow::Break(self.give_up(state, ws, imbalance, n_new));
+            let tolerance = self.params.tolerance.max(STALLED);
+            if is_there && self.is_settled(tolerance) {
+                return ControlFlow::Break(Outcome::Converged);
+            }
+            return ControlFlow::Break(Outcome::IterationLimit {
+                at: self.worst_node(ws).into(),
+            });
         }
         self.iterations += 1;
+        self.stiffen(ws);
         self.find_step(ws)?;
-        self.take_step(state, ws, imbalance)
+        match self.search(state, ws, imbalance, is_led) {
+            Ok(_) => ControlFlow::Continue(()),
+            Err(inverted) => ControlFlow::Break(inverted.into()),
+        }
     }
 
-    /// Finds the vertices in contact, and the forces and stiffness of the body. Returns the number
-    /// of new vertices.
-    fn linearise(&mut self, state: &mut State, ws: &mut Workspace) -> ControlFlow<Outcome, usize> {
-        let n_new = ws.contacts.update(
-            self.model,
-            &state.displacements,
-            self.load.tools,
-            &ws.given,
-            &mut state.touches,
-            self.params.gap_tolerance,
-        );
+    /// Finds the contacts, and the forces and stiffness of the body.
+    fn linearise(&mut self, state: &State, ws: &mut Workspace) -> ControlFlow<Outcome> {
+        self.touch(state, ws);
         let assembled = ws.assembler.stiffness(
             self.model,
             &ws.memory,
@@ -212,50 +201,14 @@ impl Newton<'_> {
         if let Err(inverted) = assembled {
             return ControlFlow::Break(inverted.into());
         }
-        ws.added.clear();
-        self.add_loads(state, ws);
-        ControlFlow::Continue(n_new)
+        ws.forget_added();
+        self.add_loads(state, ws, true);
+        ControlFlow::Continue(())
     }
 
-    /// Revises touches and puts constraints on the system, using predicted forces far from
-    /// equilibrium and present forces near it.
-    fn constrain(&mut self, state: &mut State, ws: &mut Workspace, n_new: usize) -> Imbalance {
-        if self.iterations > 0 && n_new == 0 {
-            self.revise(state, ws, ForcesBy::Predicted);
-        }
-        let was_far =
-            self.iterations > 0 && self.residual > NEAR_EQUILIBRIUM && ws.contacts.smoothing == 0.0;
-        let by = if was_far {
-            ForcesBy::Predicted
-        } else {
-            ForcesBy::Present
-        };
-        let imbalance = self.put_constraints(state, ws, by);
-        if was_far && self.residual <= NEAR_EQUILIBRIUM {
-            return self.put_constraints(state, ws, ForcesBy::Present);
-        }
-        imbalance
-    }
-
-    fn is_settled(&self, imbalance: Imbalance, tolerance: f64) -> bool {
-        self.residual <= tolerance && imbalance.demand <= self.params.gap_tolerance
-    }
-
-    /// The outcome of a solve without progress.
-    fn give_up(
-        &self,
-        state: &mut State,
-        ws: &mut Workspace,
-        imbalance: Imbalance,
-        n_new: usize,
-    ) -> Outcome {
-        let is_near = n_new == 0 && self.is_settled(imbalance, self.params.tolerance.max(STALLED));
-        if is_near && self.revise(state, ws, ForcesBy::Present) == 0 {
-            return Outcome::Converged;
-        }
-        Outcome::IterationLimit {
-            at: self.worst_node(ws).into(),
-        }
+    fn is_settled(&self, tolerance: f64) -> bool {
+        let looser = self.params.contact_tolerance.max(tolerance);
+        self.residual <= tolerance && self.mismatch <= looser
     }
 
     /// Solves the linear system, with as little of a new factor as works: with a new factor of the
@@ -270,12 +223,12 @@ impl Newton<'_> {
         // A shifted factor is a poor approximation.
         let is_near = self.params.is_near && ws.system.shift == 0.0;
         let is_kept = ws.system.is_factored && (is_large || is_near);
-        let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.holds);
+        let is_usable = is_kept || ws.system.refactor_region(&model.structure, &ws.given);
         if is_usable && self.solve(ws, true) {
             return ControlFlow::Continue(());
         }
         if self.params.is_near {
-            let is_definite = ws.system.factor_unshifted(&model.structure, &ws.holds);
+            let is_definite = ws.system.factor_unshifted(&model.structure, &ws.given);
             let is_solved = if is_definite {
                 self.solve(ws, false)
             } else {
@@ -285,12 +238,35 @@ impl Newton<'_> {
                 return ControlFlow::Continue(());
             }
         }
-        match ws.system.refactor(&model.structure, &ws.holds) {
-            Ok(shift) => self.shift = self.shift.max(shift),
-            Err(_) => return ControlFlow::Break(Outcome::Singular),
+        if !self.factor_with_springs(ws) {
+            match ws.system.refactor(&model.structure, &ws.given) {
+                Ok(shift) => self.shift = self.shift.max(shift),
+                Err(_) => return ControlFlow::Break(Outcome::Singular),
+            }
         }
         self.solve(ws, false);
         ControlFlow::Continue(())
+    }
+
+    /// Factors the system with the softest springs under the tools that make it positive definite.
+    /// Deep under a tool the free body is not stable, and only the tool holds it. Returns whether
+    /// any do.
+    fn factor_with_springs(&self, ws: &mut Workspace) -> bool {
+        if ws.contacts.slots.is_empty() {
+            return false;
+        }
+        let before = ws.spring / SPRING_GROWTH;
+        let softer = if before < FIRST_SPRING { 0.0 } else { before };
+        let mut share = softer;
+        while share <= MOST_SPRING {
+            self.spring(ws, share);
+            if ws.system.factor_unshifted(&self.model.structure, &ws.given) {
+                return true;
+            }
+            share = (share * SPRING_GROWTH).max(FIRST_SPRING);
+        }
+        self.spring(ws, softer);
+        false
     }
 
     /// Solves the linear system with the factor of the body at rest. Displacements that come from a
@@ -308,32 +284,13 @@ impl Newton<'_> {
             &mut ws.system,
         );
         let is_factored =
-            assembled.is_ok() && ws.system.factor_unshifted(&model.structure, &ws.holds);
+            assembled.is_ok() && ws.system.factor_unshifted(&model.structure, &ws.given);
         ws.system.blocks = present;
         is_factored && self.solve(ws, true)
     }
 
-    /// Takes the step as far as the line search allows, and keeps the forces that the linear system
-    /// predicts there.
-    fn take_step(
-        &self,
-        state: &mut State,
-        ws: &mut Workspace,
-        imbalance: Imbalance,
-    ) -> ControlFlow<Outcome> {
-        match self.search(state, ws, imbalance) {
-            Ok(share) => {
-                for (predicted, force) in ws.predicted.iter_mut().zip(&ws.forces) {
-                    *predicted = force + *predicted * share;
-                }
-                ControlFlow::Continue(())
-            }
-            Err(inverted) => ControlFlow::Break(inverted.into()),
-        }
-    }
-
     /// Subtracts loads from the forces, and adds forces and stiffness of inertia.
-    fn add_loads(&self, state: &State, ws: &mut Workspace) {
+    pub(super) fn add_loads(&self, state: &State, ws: &mut Workspace, with_stiffness: bool) {
         for (force, load) in ws.forces.iter_mut().zip(self.load.forces) {
             *force -= load;
         }
@@ -342,15 +299,15 @@ impl Newton<'_> {
                 self.model,
                 &state.displacements,
                 &mut ws.forces,
-                Some(&mut ws.system.blocks),
+                with_stiffness.then_some(&mut ws.system.blocks),
             );
         }
     }
 
     /// Position at rest of the node with the largest unbalanced force, m.
     fn worst_node(&self, ws: &Workspace) -> Vec3 {
-        let worst = (0..ws.holds.len()).max_by(|&a, &b| {
-            let size = |n: usize| ws.holds[n].free_part(&ws.right_side[n]).norm();
+        let worst = (0..ws.given.len()).max_by(|&a, &b| {
+            let size = |n: usize| ws.given[n].free_part(&ws.right_side[n]).norm();
             size(a).total_cmp(&size(b))
         });
         worst.map_or(Vec3::zeros(), |n| self.model.body.positions[n])

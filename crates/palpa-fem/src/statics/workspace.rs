@@ -2,7 +2,7 @@
 
 use palpa_mesh::Vec3;
 
-use super::active_set::ActiveSet;
+use super::contacts::{Contacts, Origin};
 use crate::Mat3;
 use crate::assembly::Assembler;
 use crate::model::Model;
@@ -21,27 +21,28 @@ pub struct Workspace {
     pub(crate) memory: Memory,
     /// Unbalanced forces at the present displacements, without those of contact, N. `[n_nodes]`
     pub(super) forces: Vec<Vec3>,
-    /// Unbalanced forces at the displacements of a trial, N. `[n_nodes]`
+    /// Scratch for forces, N. `[n_nodes]`
     pub(super) trial_forces: Vec<Vec3>,
-    /// Forces with friction, N. `[n_nodes]`
+    /// Forces that are not in balance, with those of contact, N. `[n_nodes]`
     pub(super) right_side: Vec<Vec3>,
-    /// Displacements prescribed by holds, guides and tools, m. `[n_nodes]`
+    /// Displacements prescribed by holds and guides, m. `[n_nodes]`
     pub(super) demand: Vec<Vec3>,
-    /// The linear system's solution, m. `[n_nodes]`
+    /// The linear system's solution: displacements, m, `[n_nodes]`, and multipliers of contact, N.
     pub(super) delta: Vec<Vec3>,
-    /// Forces on nodes as the linear system predicts them after the step, N. `[n_nodes]`
-    pub(super) predicted: Vec<Vec3>,
-    /// The forces, present or predicted, that determine pressure and friction, N. `[n_nodes]`
-    pub(super) contact_forces: Vec<Vec3>,
-    /// Displacements of a trial, m. `[n_nodes]`
+    pub(super) multipliers: Vec<Vec3>,
+    /// Scratch for displacements, m. `[n_nodes]`
     pub(super) trial: Vec<Vec3>,
     /// Directions held by supports and loads. `[n_nodes]`
     pub(super) given: Vec<Hold>,
-    /// Directions held by supports, loads and tools. `[n_nodes]`
-    pub(super) holds: Vec<Hold>,
-    pub(super) contacts: ActiveSet,
-    /// Stiffness that contact has added to the system's blocks: block, and stiffness, N/m.
-    pub(super) added: Vec<(usize, Mat3)>,
+    pub(super) contacts: Contacts,
+    /// Where the present solve began.
+    pub(super) origin: Origin,
+    /// Stiffness that contact, and springs in its place, have added to the system's blocks: block,
+    /// row and column node, and stiffness, N/m.
+    pub(super) added: Vec<(usize, [usize; 2], Mat3)>,
+    pub(super) springs: Vec<(usize, [usize; 2], Mat3)>,
+    /// Stiffness of the springs, as a share of the skin's own.
+    pub(super) spring: f64,
 }
 
 impl Workspace {
@@ -78,13 +79,14 @@ impl Workspace {
             right_side: zeros(),
             demand: zeros(),
             delta: zeros(),
-            predicted: zeros(),
-            contact_forces: zeros(),
+            multipliers: Vec::new(),
             trial: zeros(),
             given: model.supports.clone(),
-            holds: model.supports.clone(),
-            contacts: ActiveSet::default(),
+            contacts: Contacts::new(model),
+            origin: Origin::default(),
             added: Vec::new(),
+            springs: Vec::new(),
+            spring: 0.0,
         }
     }
 

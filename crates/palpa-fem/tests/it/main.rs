@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 #![expect(clippy::float_cmp, reason = "what is exact is compared exactly")]
 
+mod contact;
 mod jobs;
 mod law;
 mod lump;

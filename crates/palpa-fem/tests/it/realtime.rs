@@ -321,13 +321,14 @@ fn a_fine_mesh_moves_with_the_tool() {
             roaming.n_meshes()
         );
         // The memory of a linear exterior lags by a job, and a mesh takes two.
-        let bound = if prony.is_some() { 0.05 } else { 0.01 };
+        let bound = if prony.is_some() { 0.05 } else { 0.0125 };
         println!(
             "{friction} {}: {meshes} meshes, {worst:.4}, {jump:.4}",
             prony.is_some()
         );
         assert!(worst < bound, "{friction}: {worst}");
-        assert!(jump < 0.01, "{friction}: {jump}");
+        let bound = if prony.is_some() { 0.012 } else { 0.005 };
+        assert!(jump < bound, "{friction}: {jump}");
     }
 }
 
@@ -416,7 +417,7 @@ fn tissue_relaxes_under_a_tool_that_moves_and_holds() {
         expected.push(report.tool_forces[0].z);
     }
     assert!(
-        expected[99] < 0.8 * expected[60],
+        expected[99] < 0.85 * expected[60],
         "{} {}",
         expected[60],
         expected[99]
@@ -542,12 +543,13 @@ fn the_local_model_tells_the_force_of_a_small_further_press() {
         assert!(local.contacts.len() <= most && !local.contacts.is_empty());
         let sum: Vec3 = local.contacts.iter().map(|c| c.force).sum();
         assert!((sum + force).norm() < 0.01 * force.norm(), "{sum} {force}");
-        // Every contact that presses lies on the tool.
+        // Every contact that presses has no gap.
         for contact in local.contacts.iter().filter(|c| c.force != Vec3::zeros()) {
-            let distance = tool
-                .distance_at(&local.tools[0].pose, &contact.position)
-                .distance;
-            assert!(distance.abs() < 0.1e-3, "{distance}");
+            let place = local.tools[0]
+                .pose
+                .inverse_transform_point(&contact.position.into());
+            let gap = (place.coords - contact.surface).dot(&contact.normal);
+            assert!(gap.abs() < 1e-9, "{gap}");
         }
         for i in 0..local.contacts.len() {
             for j in 0..local.contacts.len() {

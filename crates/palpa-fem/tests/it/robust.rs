@@ -248,11 +248,7 @@ fn press(scene: &Scene) -> Result<bool, TestCaseError> {
                         .iter()
                         .all(|u| u.iter().all(|x| x.is_finite()))
                 );
-                prop_assert!(
-                    report.contact.penetration < 1e-6 && report.contact.gap < 1e-6,
-                    "{:?}",
-                    report.contact
-                );
+                prop_assert!(report.contact.mismatch < 1e-4, "{:?}", report.contact);
                 let fields = prism_fields(&model, &state, &ws);
                 prop_assert!(
                     fields

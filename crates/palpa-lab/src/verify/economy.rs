@@ -110,12 +110,12 @@ static DISC: [Rung; 3] = [
     },
 ];
 
-const HOMOGENEOUS: [LevelHeights; 2] = [&[(1.5e-3, 0.5)], &[(0.8e-3, 0.35)]];
+const HOMOGENEOUS: [LevelHeights; 2] = [&[(1e-3, 0.4)], &[(0.6e-3, 0.3)]];
 
 static SPHERE: [Rung; 3] = [
     Rung {
-        spacing: 1.25e-3,
-        growth: 0.5,
+        spacing: 0.95e-3,
+        growth: 0.4,
         inner_growth: 0.0,
         variants: &[
             regular(HOMOGENEOUS[0]),
@@ -126,8 +126,8 @@ static SPHERE: [Rung; 3] = [
         tolerances: [ECONOMY; 2],
     },
     Rung {
-        spacing: 1e-3,
-        growth: 0.5,
+        spacing: 0.8e-3,
+        growth: 0.4,
         inner_growth: 0.0,
         variants: &[
             beside(regular(HOMOGENEOUS[0])),
@@ -136,8 +136,8 @@ static SPHERE: [Rung; 3] = [
         tolerances: [ECONOMY; 2],
     },
     Rung {
-        spacing: 0.8e-3,
-        growth: 0.3,
+        spacing: 0.6e-3,
+        growth: 0.25,
         inner_growth: 0.0,
         variants: &[
             beside(regular(HOMOGENEOUS[1])),

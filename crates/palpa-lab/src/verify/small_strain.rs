@@ -21,7 +21,7 @@ pub(crate) const TOUCHED: f64 = 0.9;
 /// matters.
 const RIM: usize = 16;
 /// Edges per radius of the disc under spheres.
-const INSIDE: usize = 10;
+const INSIDE: usize = 12;
 /// Edges per radius of the disc where displacements around it are measured.
 const AROUND: usize = 8;
 /// Edge lengths of the meshes in the error study, relative to the mesh of the quoted results.

@@ -35,8 +35,12 @@ pub const BLOCK_LUMP: f64 = 0.15;
 pub const PROFILE: f64 = 0.05;
 /// Force that a lump inside one coarse prism adds.
 pub const SMALL_LUMP: f64 = 0.15;
-/// Penetration at active points, m.
-pub const PENETRATION: f64 = 1e-6;
+/// Error of the law of contact, relative to the force.
+pub const MISMATCH: f64 = 2e-4;
+/// Penetration of a vertex of the skin, as a share of an edge.
+pub const PENETRATION: f64 = 0.15;
+/// Force with friction with different load steps.
+pub const FRICTION_STEPS: f64 = 0.01;
 /// Elastic force with different load steps.
 pub const LOAD_STEPS: f64 = 0.001;
 

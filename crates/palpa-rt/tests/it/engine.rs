@@ -242,16 +242,17 @@ fn a_replay_finds_what_was_changed() {
         "{said}"
     );
 
-    // A job that was installed one step later: its patches differ.
-    let alone = |p: &[StepRecord]| p[0].installed && !p[0].job_taken && !p[1].installed;
-    let later = |k: usize| {
+    // A job that was installed one step later or earlier: its patches differ. No other job may be
+    // taken or installed between.
+    let alone = |p: &[StepRecord]| p[0].installed != p[1].installed && !p[0].job_taken;
+    let swapped = |k: usize| {
         let mut other = log.clone();
-        other.steps[k].installed = false;
-        other.steps[k + 1].installed = true;
+        let [a, b] = [k, k + 1].map(|k| log.steps[k].installed);
+        (other.steps[k].installed, other.steps[k + 1].installed) = (b, a);
         replay(&other, Bed::new(), &params)
     };
     let pairs = log.steps.windows(2).enumerate();
-    let mut moved = (pairs.filter(|(_, pair)| alone(pair))).map(|(k, _)| (k, later(k)));
+    let mut moved = (pairs.filter(|(_, pair)| alone(pair))).map(|(k, _)| (k, swapped(k)));
     // In the air, and where the hand rests, a job gives what the one before gave.
     let found = moved.find(|(_, report)| report.verdict != Verdict::Same);
     let (k, report) = found.expect("a job that changes a patch");

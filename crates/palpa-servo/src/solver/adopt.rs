@@ -1,6 +1,7 @@
-//! Taking over a new patch: vertices of the previous patch keep their forces and anchors.
+//! Taking over a new patch: vertices of the previous patch keep their forces. The tissue decides what
+//! sticks and where, so the anchors are those of the patch.
 
-use super::{ContactSolver, add_columns, tool_of};
+use super::{ContactSolver, add_columns};
 use crate::{Candidate, ContactPatch, MAX_CONTACTS, Vec3};
 
 /// Identity of a contact from patch to patch.
@@ -29,12 +30,11 @@ impl Key {
 struct Known {
     key: Key,
     force: Vec3,
-    anchor: Vec3,
 }
 
 impl ContactSolver {
-    /// Takes over a patch. Vertices of the previous patch keep their forces and anchors; the others
-    /// start with those of the new patch.
+    /// Takes over a patch. Vertices of the previous patch keep their forces; the others start with
+    /// those of the new patch.
     pub(crate) fn adopt(&mut self, patch: &ContactPatch) {
         self.carry_over(patch);
         for (i, own) in self.own.iter_mut().enumerate().take(self.n) {
@@ -47,19 +47,12 @@ impl ContactSolver {
         let mut known = [Known {
             key: Key::NONE,
             force: Vec3::zeros(),
-            anchor: Vec3::zeros(),
         }; MAX_CONTACTS];
         let n_known = self.n;
-        for (((known, key), force), anchor) in known
-            .iter_mut()
-            .zip(&self.key)
-            .zip(&self.force)
-            .zip(&self.anchor)
-        {
+        for ((known, key), force) in known.iter_mut().zip(&self.key).zip(&self.force) {
             *known = Known {
                 key: *key,
                 force: *force,
-                anchor: *anchor,
             };
         }
         let known = known.get(..n_known).unwrap_or_default();
@@ -72,7 +65,6 @@ impl ContactSolver {
             .take(self.n)
             .enumerate()
         {
-            let is_bonded = tool_of(patch, candidate.tool).is_some_and(|tool| tool.is_bonded);
             // The order mostly stays the same from patch to patch, so the search starts at the same
             // index.
             let (before, after) = known.split_at(i.min(known.len()));
@@ -80,11 +72,8 @@ impl ContactSolver {
                 .iter()
                 .chain(before)
                 .find(|k| k.key == Key::of(candidate));
-            (*force, *anchor) = match found {
-                Some(found) if is_bonded => (found.force, candidate.anchor),
-                Some(found) => (found.force, found.anchor),
-                None => (candidate.force, candidate.anchor),
-            };
+            *force = found.map_or(candidate.force, |found| found.force);
+            *anchor = candidate.anchor;
         }
         for (key, candidate) in self.key.iter_mut().zip(&patch.contacts) {
             *key = Key::of(candidate);

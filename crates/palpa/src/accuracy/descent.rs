@@ -141,14 +141,13 @@ impl Stops {
 /// The deformed body of a mesh with this skin, carried to another mesh of the same body.
 fn carried(from: &LayeredBody, skin: &Skin, deformed: &Deformed, to: &LayeredBody) -> Deformed {
     let mut displacements = Vec::with_capacity(to.n_nodes());
-    let mut is_touching = vec![false; to.n_vertices()];
+    let mut pressures = vec![0.0; to.n_vertices()];
     for (v, p) in to.skin.points.iter().enumerate() {
         let Some(point) = skin.nearest(*p) else {
             displacements.extend(vec![Vec3::zeros(); to.n_levels]);
             continue;
         };
-        let touching = point.mean(|v| Vec3::repeat(f64::from(deformed.is_touching[v])));
-        is_touching[v] = touching.x > 0.5;
+        pressures[v] = point.mean(|v| Vec3::repeat(deformed.pressures[v])).x;
         let mean = |field: &[Vec3], l: usize| point.mean(|v| field[from.node(v, l)]);
         let mut old = vec![0.0; from.n_levels];
         for l in 1..from.n_levels {
@@ -166,6 +165,6 @@ fn carried(from: &LayeredBody, skin: &Skin, deformed: &Deformed, to: &LayeredBod
     }
     Deformed {
         displacements,
-        is_touching,
+        pressures,
     }
 }

@@ -2,7 +2,7 @@
 
 use palpa_fem::pairing::Pair;
 use palpa_fem::{
-    Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, assume_touches,
+    Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, assume_pressures,
     equilibrate,
 };
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
@@ -298,9 +298,8 @@ impl Probe {
             held: &held,
             ..Load::default()
         };
-        let is_touching = part.take(&deformed.is_touching, 1);
-        let body = self.model.body();
-        let is_touching = carried_marks(&self.carry, &is_touching, part, body, 0.5 - 1e-9);
+        let pressures = part.take(&deformed.pressures, 1);
+        let pressures = carried_field(&self.carry, &pressures, part, self.model.body());
         let params = SolveParams {
             tolerance: TOLERANCE,
             ..press.near_params()
@@ -315,7 +314,7 @@ impl Probe {
             for &(node, u) in &held {
                 state.displacements[node] = u;
             }
-            assume_touches(&self.model, &mut state, &tools, &is_touching);
+            assume_pressures(&self.model, &mut state, &tools, &pressures);
             let report = equilibrate(&self.model, &mut state, &mut self.workspace, &load, &params);
             if report.outcome == Outcome::Converged {
                 let displacements = state.displacements.iter().zip(&guess);
@@ -397,11 +396,17 @@ fn carried_marks(
     body: &LayeredBody,
     share: f64,
 ) -> Vec<bool> {
-    let as_field = |&mark: &bool| vec![Vec3::repeat(f64::from(mark)); part.body.n_levels];
-    let carried = carry(&marks.iter().flat_map(as_field).collect::<Vec<Vec3>>());
-    (0..body.n_vertices())
-        .map(|v| carried[body.node(v, 0)].x > share)
-        .collect()
+    let marks: Vec<f64> = marks.iter().map(|&mark| f64::from(mark)).collect();
+    let carried = carried_field(carry, &marks, part, body);
+    carried.into_iter().map(|x| x > share).collect()
+}
+
+/// A field on the part's vertices, carried to a finer mesh of it.
+fn carried_field(carry: &Carry, field: &[f64], part: &Part, body: &LayeredBody) -> Vec<f64> {
+    let on_nodes = |&x: &f64| vec![Vec3::repeat(x); part.body.n_levels];
+    let carried = carry(&field.iter().flat_map(on_nodes).collect::<Vec<Vec3>>());
+    let at = |v: usize| carried[body.node(v, 0)].x;
+    (0..body.n_vertices()).map(at).collect()
 }
 
 type Carry = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;

@@ -2,7 +2,9 @@
 
 use super::Watch;
 use palpa_fem::PosedTool;
-use palpa_fem::realtime::{Live, LiveReport, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome};
+use palpa_fem::realtime::{
+    Live, LiveReport, LocalContact, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome,
+};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
 use palpa_servo::{
@@ -95,6 +97,16 @@ impl LiveTissue {
             }));
     }
 
+    /// The point of the tool, in its frame, that holds a contact with the friction of the step: where
+    /// the contact is. What the tissue has slipped before is in that friction already.
+    fn held_at(&self, contact: &LocalContact) -> Vec3 {
+        let tool = self.local.tools.get(contact.tool);
+        tool.map_or(contact.anchor, |tool| {
+            let place = contact.position.into();
+            tool.pose.inverse_transform_point(&place).coords
+        })
+    }
+
     /// Writes the local model into the patch, in the device's frame.
     fn fill(&self, patch: &mut ContactPatch) {
         let frame = &self.scene_from_device;
@@ -126,7 +138,7 @@ impl LiveTissue {
                 surface: contact.surface,
                 normal: contact.normal,
                 curvature: contact.curvature,
-                anchor: contact.anchor,
+                anchor: self.held_at(contact),
             };
         }
         for j in 0..n {
@@ -165,9 +177,11 @@ impl Tissue for LiveTissue {
         if let Some(watch) = &mut self.watch {
             watch.look(input.step, input.now, &self.body, self.posed.first());
         }
+        // Triangles left out bear nothing, so the force is too small.
+        let is_finished = report.residual <= self.tolerance && report.n_left_out == 0;
         TissueStep {
             status: match report.outcome {
-                StepOutcome::Arrived if report.residual <= self.tolerance => StepStatus::Converged,
+                StepOutcome::Arrived if is_finished => StepStatus::Converged,
                 StepOutcome::Arrived => StepStatus::Unfinished,
                 StepOutcome::Behind => StepStatus::Behind,
                 StepOutcome::BackedOff => StepStatus::Settling,

@@ -101,19 +101,6 @@ fn a_failed_step_is_noted_and_its_sample_does_not_count() {
 }
 
 #[test]
-fn smoothed_friction_is_noted_with_its_largest_slip() {
-    let press = indentation(&gel().disc(8.0));
-    let sample = press.start(0).advance().unwrap();
-    let slip = |um: f64| move |s: &mut Sample| s.friction_smoothing_um = um;
-    let record = changed(&press, &sample, &[&slip(0.0), &slip(3.0), &slip(2.0)]);
-    let [Note::FrictionSmoothed { n, n_all, slip }] = record.notes()[..] else {
-        panic!("{:?}", record.notes());
-    };
-    assert_eq!((n, n_all), (2, 3));
-    assert!((slip - 3e-6).abs() < 1e-18);
-}
-
-#[test]
 fn hysteresis_is_the_share_of_each_cycles_loading_work_that_is_lost() {
     let press = indentation(&gel().disc(8.0));
     let sample = press.start(0).advance().unwrap();

@@ -21,6 +21,20 @@ pub(super) struct Carry {
     wedges: Vec<[(u32, u8); 2]>,
 }
 
+/// Contact of a vertex, carried over.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Carried {
+    /// Pa.
+    pub(super) pressure: f64,
+    /// N.
+    pub(super) push: Vec3,
+    pub(super) friction: Vec3,
+    /// In the tool's frame, m.
+    pub(super) anchor: Vec3,
+    pub(super) is_anchored: bool,
+    pub(super) is_sliding: bool,
+}
+
 /// The state of a body, to continue from on another mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Come {
@@ -135,11 +149,14 @@ impl Carry {
         }
         let mut out = Come::rest(new, &displacements);
         for v in 0..self.parts.len() {
-            if let Some(u) = self.same[v] {
-                out.skin.pressures[v] = come.skin.pressures[u as usize];
-                out.skin.frictions[v] = come.skin.frictions[u as usize];
-                out.skin.anchors[v] = come.skin.anchors[u as usize];
-            }
+            let touch = self.touch(v, &come.skin, [old, new]);
+            let skin = &mut out.skin;
+            skin.pressures[v] = touch.pressure;
+            skin.pushes[v] = touch.push;
+            skin.frictions[v] = touch.friction;
+            skin.anchors[v] = touch.anchor;
+            skin.is_anchored[v] = touch.is_anchored;
+            skin.is_sliding[v] = touch.is_sliding;
         }
         if new.has_memory {
             self.carry_memory(old, come, new, &mut out);
@@ -178,9 +195,27 @@ impl Carry {
             .sum()
     }
 
-    /// The old vertex at the place of a new one.
-    pub(super) fn same(&self, v: usize) -> Option<usize> {
-        self.same[v].map(|u| u as usize)
+    /// Contact at the place of a new vertex, interpolated in the old mesh: pressure, friction per
+    /// area, and the anchor if all corners have one.
+    pub(super) fn touch(&self, v: usize, skin: &SkinForces, [old, new]: [&Model; 2]) -> Carried {
+        let mut out = Carried {
+            is_anchored: true,
+            ..Carried::default()
+        };
+        for &(u, weight) in &self.parts[v] {
+            let u = u as usize;
+            if weight <= 0.0 {
+                continue;
+            }
+            let by = weight * new.skin_areas[v] / old.skin_areas[u];
+            out.pressure += weight * skin.pressures[u];
+            out.push += skin.pushes[u] * by;
+            out.friction += skin.frictions[u] * by;
+            out.anchor += skin.anchors[u] * weight;
+            out.is_anchored &= skin.is_anchored[u];
+            out.is_sliding |= skin.is_sliding[u];
+        }
+        out
     }
 
     /// Memory of the pairs in lanes.

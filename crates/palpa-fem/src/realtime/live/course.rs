@@ -77,13 +77,17 @@ impl Live {
     /// reached the edge of the zone, beyond which there are no candidates. `None` if there is room.
     fn held_direction(&self) -> Option<Vec3> {
         if self.plan.exterior.is_empty()
-            || self.contact_radius(self.plan.centre) < EDGE * self.plan.radius
+            || self.contact_radius(&self.plan.centres) < EDGE * self.plan.radius
         {
             return None;
         }
-        let pressed = self.pressed()?;
-        let out = pressed.middle - self.plan.centre;
-        let out = out - pressed.along * pressed.along.dot(&out);
+        // The tool that has gone farthest out.
+        let outs = (0..self.course.tools.len()).filter_map(|tool| {
+            let pressed = self.pressed_by(tool)?;
+            let out = pressed.middle - self.plan.centres.of(tool);
+            Some(out - pressed.along * pressed.along.dot(&out))
+        });
+        let out = outs.max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
         out.try_normalize(1e-9)
     }
 }

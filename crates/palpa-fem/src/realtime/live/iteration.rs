@@ -99,6 +99,8 @@ impl Live {
         let share = self.advance(report)?;
         self.accept_contact(share);
         report.n_candidates = self.problem.candidates.len();
+        report.n_left_out = self.search.n_left_out;
+        report.is_contact_settled = self.problem.is_settled;
         report.n_active = self.problem.pressing().count();
         report.residual = self.residual();
         Ok(())

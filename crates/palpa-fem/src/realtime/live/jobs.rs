@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 
+use super::super::plan::Centres;
 use super::pressed::{Pressed, nearest_point};
 use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
 use super::{ExteriorMode, Live};
@@ -90,9 +91,9 @@ impl Jobs {
 
 /// A job that is due.
 struct Due {
-    /// Centre at rest (m) and radius (m) of a new zone; `None` for a new factor of the present
+    /// Centres at rest (m) and radius (m) of a new zone; `None` for a new factor of the present
     /// exterior.
-    zone: Option<(Vec3, f64)>,
+    zone: Option<(Centres, f64)>,
     /// Indentation, m.
     depth: f64,
 }
@@ -128,10 +129,14 @@ impl Live {
             self.jobs.age = 0;
             self.jobs.depth_at_factor = depth;
             job.id = self.jobs.n_asked;
-            job.target = zone.map(|(centre, radius)| {
+            job.target = zone.map(|(centres, radius)| {
                 self.jobs.n_zones += 1;
                 let id = self.jobs.n_zones;
-                Target { id, centre, radius }
+                Target {
+                    id,
+                    centres,
+                    radius,
+                }
             });
             job.old = self.exterior.origin(&self.outside);
             job.lag = self.exterior.lag();
@@ -174,8 +179,8 @@ impl Live {
             .pressing()
             .any(|c| self.plan.tree.first_dof(c.vertex as usize) >= ring);
         let radius = self.plan.radius;
-        let centre = self.next_centre();
-        let is_leaving = (centre - self.plan.centre).norm() > self.params.leave * radius;
+        let centres = self.next_centres();
+        let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
         let depth = self.depth();
         let is_stale = (depth - self.jobs.depth_at_factor).abs() > self.params.stale
             || self.exterior.lag() > self.jobs.longest_lag
@@ -187,20 +192,27 @@ impl Live {
             let mut radius = self
                 .params
                 .zone_radius
-                .max(ZONE_GROWTH * self.contact_radius(centre));
+                .max(ZONE_GROWTH * self.contact_radius(&centres));
             if reaches_ring && !is_leaving {
                 radius = radius.max(ZONE_GROWTH * self.plan.radius);
             }
-            (centre, radius)
+            (centres, radius)
         });
         Some(Due { zone, depth })
     }
 
-    /// Centre at rest of a zone requested now, m: the middle of the pressed vertices, moved ahead
-    /// by the distance that the tools will go until the zone is ready.
-    pub(super) fn next_centre(&self) -> Vec3 {
-        let Some(Pressed { middle, along }) = self.pressed() else {
-            let (displacements, tools) = (&self.state.displacements, &self.course.tools);
+    /// Centres at rest of a zone requested now, one for each tool, m.
+    pub(super) fn next_centres(&self) -> Centres {
+        Centres::new(self.course.tools.len(), |tool| self.next_centre(tool))
+    }
+
+    /// Centre at rest of a zone requested now, m: the middle of the vertices that a tool presses,
+    /// moved ahead by the distance that the tools will go until the zone is ready.
+    fn next_centre(&self, tool: usize) -> Vec3 {
+        let Some(Pressed { middle, along }) = self.pressed_by(tool) else {
+            let displacements = &self.state.displacements;
+            let tools = &self.course.tools;
+            let tools = tools.get(tool..=tool).unwrap_or(&[]);
             let zone = Some(&*self.plan.vertices);
             let near = nearest_point(&self.model, displacements, tools, zone);
             if near.0 < self.plan.radius {

@@ -7,7 +7,7 @@
 //! | `step` | one step from begin to end: iterations, verdict, memory, jobs |
 //! | `iteration` | one Newton iteration |
 //! | `springs` | the zone's factor, and the springs that make it possible deep under a tool |
-//! | `candidates` | vertices near the tools, and the contact forces on the skin |
+//! | `candidates` | triangles near the tools, and the contact forces on the skin |
 //! | `course` | how far the tools may go in a step |
 //! | `pressed` | where the tools press, how deep and how wide |
 //! | `exterior` | the body outside the zone |
@@ -56,13 +56,13 @@ use super::contact_problem::ContactProblem;
 use super::inside::Inside;
 use super::local::LocalModel;
 use super::outside::{Follower, Outside};
-use super::plan::{Plan, Trouble};
+use super::plan::{Centres, Plan, Trouble};
 use crate::batch::{History, Tangent};
 use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 use crate::state::{Memory, State};
-use candidates::SkinForces;
+use candidates::{Search, SkinForces};
 use carry::Come;
 use course::Course;
 use exterior::ExteriorState;
@@ -108,6 +108,7 @@ pub struct Live {
     jobs: Jobs,
     /// The contact candidates with their forces, and the compliance used to find them.
     problem: ContactProblem,
+    search: Search,
     ws: Scratch,
 }
 
@@ -122,18 +123,21 @@ impl Live {
         params: LiveParams,
     ) -> Result<Self, FemError> {
         let rest = rest::displacements(&model)?;
-        let centre = nearest_point(&model, &rest, tools, None).1;
+        let centres = Centres::new(tools.len(), |tool| {
+            let tools = tools.get(tool..=tool).unwrap_or(&[]);
+            nearest_point(&model, &rest, tools, None).1
+        });
         let come = Come::rest(&model, &rest);
-        Self::at(model, tools, params, centre, come, rest, 0)
+        Self::at(model, tools, params, centres, come, rest, 0)
     }
 
-    /// A body in a given state, with its first zone around a point of the skin at rest. Without a
+    /// A body in a given state, with its first zone around points of the skin at rest. Without a
     /// history it has relaxed. Zones are numbered from `n_before` on.
     fn at(
         model: Arc<Model>,
         tools: &[PosedTool],
         params: LiveParams,
-        centre: Vec3,
+        centres: Centres,
         come: Come,
         rest: Arc<[Vec3]>,
         n_before: u64,
@@ -142,7 +146,7 @@ impl Live {
         let mut state = come.state;
         let mut memory = Memory::new(&model);
         let n_zones = n_before + 1;
-        let plan = Plan::new(&model, &pattern, n_zones, centre, params.zone_radius)?;
+        let plan = Plan::new(&model, &pattern, n_zones, centres, params.zone_radius)?;
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
         let mut room = Room::new(&model, &pattern, &plan, come.history.as_ref());
         let shop = &mut room.shop;
@@ -187,7 +191,9 @@ impl Live {
         )
         .map_err(|trouble| match trouble {
             Trouble::Inverted(at) => FemError::NoRest { at: at.into() },
-            Trouble::Singular => FemError::NoRest { at: centre.into() },
+            Trouble::Singular => FemError::NoRest {
+                at: centres.of(0).into(),
+            },
         })?;
         let kept = (model.has_memory && !is_followed).then(|| {
             let mut kept = History::new(&model);
@@ -200,7 +206,7 @@ impl Live {
             outside: Arc::new(outside),
             exterior: ExteriorState::new(follower),
             rest,
-            recovery: Recovery::new(&state.displacements, &come.skin.pressures, tools),
+            recovery: Recovery::new(&state.displacements, &come.skin, tools),
             skin: come.skin,
             singles,
             known: Known::Nothing,
@@ -208,6 +214,7 @@ impl Live {
             springs: Springs::NONE,
             jobs: Jobs::new(&model, room, kept, n_before, n_zones),
             problem: ContactProblem::new(),
+            search: Search::new(&model),
             ws: Scratch::new(&model),
             model,
             pattern,

@@ -2,6 +2,8 @@
 
 use palpa_mesh::Vec3;
 
+use super::super::candidate::Candidate;
+use super::super::plan::Centres;
 use super::Live;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -20,9 +22,18 @@ pub(super) struct Pressed {
 impl Live {
     /// The place where tools press; `None` without contact.
     pub(super) fn pressed(&self) -> Option<Pressed> {
+        self.pressed_where(|_| true)
+    }
+
+    /// The place where a tool presses; `None` without contact.
+    pub(super) fn pressed_by(&self, tool: usize) -> Option<Pressed> {
+        self.pressed_where(|candidate| candidate.tool as usize == tool)
+    }
+
+    fn pressed_where(&self, keep: impl Fn(&Candidate) -> bool) -> Option<Pressed> {
         let points = &self.model.body.skin.points;
         let (mut force, mut middle, mut along) = (0.0, Vec3::zeros(), Vec3::zeros());
-        for candidate in &self.problem.candidates {
+        for candidate in self.problem.candidates.iter().filter(|c| keep(c)) {
             force += candidate.pressure;
             middle += points[candidate.vertex as usize] * candidate.pressure;
             along += candidate.normal * candidate.pressure;
@@ -33,12 +44,12 @@ impl Live {
         })
     }
 
-    /// Largest distance of a pressing vertex from a point of the skin at rest, m.
-    pub(super) fn contact_radius(&self, centre: Vec3) -> f64 {
+    /// Largest distance of a pressing vertex from the centre of its tool, m.
+    pub(super) fn contact_radius(&self, centres: &Centres) -> f64 {
         let points = &self.model.body.skin.points;
         self.problem
             .pressing()
-            .map(|c| (points[c.vertex as usize] - centre).norm())
+            .map(|c| (points[c.vertex as usize] - centres.of(c.tool as usize)).norm())
             .fold(0.0, f64::max)
     }
 

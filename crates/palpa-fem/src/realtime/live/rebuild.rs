@@ -8,7 +8,7 @@ use palpa_sparse::fronts::{Half, SolveScratch, fronts_above};
 
 use super::super::inside::Inside;
 use super::super::outside::{Follower, Outside, Workshop};
-use super::super::plan::{Plan, Trouble};
+use super::super::plan::{Centres, Plan, Trouble};
 use crate::batch::{History, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
@@ -43,8 +43,8 @@ pub struct Rebuild {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Target {
     pub(super) id: u64,
-    /// Its centre at rest, m.
-    pub(super) centre: Vec3,
+    /// Its centres at rest, m.
+    pub(super) centres: Centres,
     /// Its radius, m.
     pub(super) radius: f64,
 }
@@ -198,8 +198,12 @@ impl Rebuild {
         let Retired { outside, kept, .. } = std::mem::take(&mut room.retired);
         let plan = match self.target {
             None => Arc::clone(&self.plan),
-            Some(Target { id, centre, radius }) => {
-                let plan = Plan::new(&model, &pattern, id, centre, radius);
+            Some(Target {
+                id,
+                centres,
+                radius,
+            }) => {
+                let plan = Plan::new(&model, &pattern, id, centres, radius);
                 Arc::new(
                     plan.expect("a body that could be factored with one zone can be with another"),
                 )

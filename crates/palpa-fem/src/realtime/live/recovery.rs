@@ -3,6 +3,7 @@
 use palpa_mesh::Vec3;
 
 use super::Live;
+use super::candidates::SkinForces;
 use super::pressed::nearest_vertex;
 use crate::posed_tool::PosedTool;
 
@@ -21,8 +22,8 @@ pub(super) struct Recovery {
     /// Displacements of the last state near equilibrium, m; up to date in the zone, and everywhere
     /// if the exterior is followed. `[n_nodes]`
     displacements: Vec<Vec3>,
-    /// Pressing forces of that state, N. `[n_vertices]`
-    pressures: Vec<f64>,
+    /// Contact forces of that state.
+    skin: SkinForces,
     /// Tools of that state.
     tools: Vec<PosedTool>,
     /// Limit of a step's move, as a share of the longest move, 1/64 to 1.
@@ -32,10 +33,10 @@ pub(super) struct Recovery {
 }
 
 impl Recovery {
-    pub(super) fn new(displacements: &[Vec3], pressures: &[f64], tools: &[PosedTool]) -> Self {
+    pub(super) fn new(displacements: &[Vec3], skin: &SkinForces, tools: &[PosedTool]) -> Self {
         Self {
             displacements: displacements.to_vec(),
-            pressures: pressures.to_vec(),
+            skin: skin.clone(),
             tools: tools.to_vec(),
             pace: 1.0,
             n_failed: 0,
@@ -68,7 +69,7 @@ impl Live {
             }
         }
         for &v in &self.plan.vertices {
-            good.pressures[v as usize] = self.skin.pressures[v as usize];
+            good.skin.copy(v as usize, &self.skin);
         }
         good.tools.copy_from_slice(&self.course.tools);
     }
@@ -98,8 +99,7 @@ impl Live {
             }
         }
         for &v in &self.plan.vertices {
-            self.skin.pressures[v as usize] = good.pressures[v as usize];
-            self.skin.frictions[v as usize] = Vec3::zeros();
+            self.skin.copy(v as usize, &good.skin);
         }
         self.course.tools.copy_from_slice(&good.tools);
         self.course.clearance = 0.0;
@@ -112,8 +112,7 @@ impl Live {
     fn start_again(&mut self) {
         self.recovery.n_failed = 0;
         self.lie_down();
-        self.skin.pressures.fill(0.0);
-        self.skin.frictions.fill(Vec3::zeros());
+        self.skin.clear_all();
         self.springs.take_off();
         self.forget_forces();
         self.jobs.ask_for_factor();

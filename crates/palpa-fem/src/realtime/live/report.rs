@@ -32,6 +32,11 @@ pub struct LiveReport {
     pub n_active: usize,
     /// Number of contact candidates.
     pub n_candidates: usize,
+    /// Number of triangles under a tool for which there was no room among the candidates: they bear
+    /// nothing, so the force is too small.
+    pub n_left_out: usize,
+    /// Whether the contact forces satisfy the law of contact.
+    pub is_contact_settled: bool,
     /// Shift of the diagonal that the zone's stiffness needed, as a share of the diagonal.
     pub shift: f32,
     /// Stiffness of the springs that held the vertices under the tools during the solve, relative

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use palpa_mesh::Vec3;
 
+use super::super::plan::Centres;
 use super::carry::{Carry, Come};
 use super::pressed::{Pressed, nearest_point};
 use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome, rest};
@@ -105,7 +106,7 @@ struct Move {
     rest: Arc<[Vec3]>,
     tools: Vec<PosedTool>,
     params: LiveParams,
-    centre: Vec3,
+    centres: Centres,
     lag: f64,
     n_before: u64,
 }
@@ -143,7 +144,7 @@ impl Move {
         let come = carry.onto(&self.old, &self.come, &self.new, [&self.rest, &rest]);
         let model = Arc::clone(&self.new);
         let (params, n) = (self.params, self.n_before);
-        let live = Live::at(model, &self.tools, params, self.centre, come, rest, n).ok()?;
+        let live = Live::at(model, &self.tools, params, self.centres, come, rest, n).ok()?;
         let mut live = Box::new(live);
         live.exterior.set_lag(self.lag);
         for round in 0..MOST_SETTLING {
@@ -190,7 +191,7 @@ impl Move {
         let model = Arc::clone(&self.new);
         let rest: Arc<[Vec3]> = carry.displacements(&model, &self.rest).into();
         let come = Come::rest(&model, &rest);
-        let mut live = Live::at(model, &[], self.params, self.centre, come, rest, 0).ok()?;
+        let mut live = Live::at(model, &[], self.params, self.centres, come, rest, 0).ok()?;
         let mut before = live.state.displacements.clone();
         for _ in 0..REST_STEPS {
             live.jobs.ask_for_factor();
@@ -230,14 +231,21 @@ impl Moved {
                 let by = |u: &[Vec3]| self.carry.displacement(v, l, &model, u);
                 live.state.displacements[model.body.node(v, l)] += by(now) - by(then);
             }
-            let Some(u) = self.carry.same(v) else {
-                continue;
-            };
-            let (skin, now, then) = (&mut live.skin, &old.skin, &self.then.skin);
-            let more = now.pressures[u] - then.pressures[u];
+            let models = [&*old.model, &*model];
+            let now = self.carry.touch(v, &old.skin, models);
+            let before = self.carry.touch(v, &self.then.skin, models);
+            let skin = &mut live.skin;
+            let more = now.pressure - before.pressure;
             skin.pressures[v] = (skin.pressures[v] + more).max(0.0);
-            skin.frictions[v] += now.frictions[u] - then.frictions[u];
-            skin.anchors[v] = now.anchors[u];
+            skin.pushes[v] += now.push - before.push;
+            skin.frictions[v] += now.friction - before.friction;
+            skin.anchors[v] = now.anchor;
+            if skin.pressures[v] == 0.0 {
+                skin.clear(v);
+                continue;
+            }
+            skin.is_anchored[v] = now.is_anchored;
+            skin.is_sliding[v] = now.is_sliding;
         }
         if model.has_memory {
             let mut change = History::new(&old.model);
@@ -339,7 +347,8 @@ impl Roaming {
         let (Some(bodies), Some(pressed)) = (&self.bodies, self.live.pressed()) else {
             return false;
         };
-        let reach = self.live.contact_radius(pressed.middle);
+        let middle = Centres::new(1, |_| pressed.middle);
+        let reach = self.live.contact_radius(&middle);
         (pressed.middle - self.place).norm() + reach > bodies.radius()
     }
 
@@ -375,7 +384,7 @@ impl Roaming {
                 rest: Arc::clone(&self.live.rest),
                 tools: self.live.course.tools.clone(),
                 params: self.params,
-                centre: self.live.next_centre(),
+                centres: self.live.next_centres(),
                 lag: self.live.exterior.lag(),
                 n_before: self.live.jobs.n_zones.max(self.live.jobs.n_asked),
             })));

@@ -27,7 +27,11 @@ impl Live {
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.begin_step(tools, dt);
         self.iterations(dt, &mut report);
-        match self.judge(&mut report) {
+        let verdict = self.judge(&mut report);
+        if verdict != Verdict::Lost {
+            self.end_contact();
+        }
+        match verdict {
             Verdict::Good => {
                 self.recovery.speed_up();
                 self.keep_good();
@@ -53,6 +57,11 @@ impl Live {
 
     /// Moves the tools, and updates viscous materials for the duration of the step.
     fn begin_step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
+        self.problem.tools_before.clear();
+        self.problem
+            .tools_before
+            .extend_from_slice(&self.course.tools);
+        self.note_origins();
         let is_short = self.move_tools(tools);
         self.jobs.grow_older();
         self.problem.has_friction = tools.iter().any(|t| t.tool.friction() > 0.0);
@@ -75,6 +84,8 @@ impl Live {
             outside: 0.0,
             n_active: 0,
             n_candidates: 0,
+            n_left_out: 0,
+            is_contact_settled: true,
             shift: 0.0,
             spring: 0.0,
             zone: self.plan.id,
@@ -118,7 +129,8 @@ impl Live {
         if has_failed || is_lost(report.outside) {
             return Verdict::Lost;
         }
-        if report.residual.max(report.outside) > ROUGH || report.shift > 0.0 {
+        let is_far = report.residual.max(report.outside) > ROUGH;
+        if is_far || report.shift > 0.0 || !report.is_contact_settled {
             Verdict::Rough
         } else {
             Verdict::Good

@@ -10,11 +10,10 @@ use std::sync::Arc;
 
 use palpa_fem::{
     Dynamics, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
-    assume_touches, equilibrate,
+    assume_pressures, equilibrate, pressures_at,
 };
 use palpa_mesh::Vec3;
 
-use self::notes::note_friction;
 pub(crate) use self::notes::{note_mesh, note_tension};
 pub use self::record::{Deepest, Record, TurnedPrisms};
 pub use self::result::{LargestErrors, LayerResult, RunResult};
@@ -34,9 +33,6 @@ const FIRST_HOLD: f64 = 0.01;
 /// Distance from the tool's footprint, in addition to the depth, within which the stiffness is
 /// computed anew in every iteration, m.
 const REGION_MARGIN: f64 = 0.01;
-
-/// A gap below which a vertex of an equilibrium touches the tool, m.
-const TOUCHING: f64 = 1e-6;
 
 /// Number of iterations after which a start was not near enough to the equilibrium.
 const NEAR_ITERATIONS: usize = 20;
@@ -73,19 +69,19 @@ pub struct Indentation {
     dynamics: Option<Dynamics>,
 }
 
-/// A deformed body in an equilibrium or near one: displacements, and which vertices touch the tool.
+/// A deformed body in an equilibrium or near one: displacements, and the tool's pressure.
 #[derive(Debug, Clone)]
 pub(crate) struct Deformed {
     /// Displacements of the nodes, m. `[n_nodes]`
     pub displacements: Vec<Vec3>,
-    /// Whether each vertex of the skin touches the tool. `[n_vertices]`
-    pub is_touching: Vec<bool>,
+    /// Pressure of the tool, Pa. `[n_vertices]`
+    pub pressures: Vec<f64>,
 }
 
 impl Deformed {
     /// Number of skin vertices that touch the tool.
     pub(crate) fn n_touching(&self) -> usize {
-        self.is_touching.iter().filter(|&&is| is).count()
+        self.pressures.iter().filter(|&&p| p > 0.0).count()
     }
 }
 
@@ -128,7 +124,6 @@ impl Indentation {
         if speeds.len() > 1 && !is_viscous && dynamics.is_none() {
             notes.push(Note::SpeedsAlike);
         }
-        note_friction(scene, &mut notes);
         Ok(Self {
             borders: borders(&prepared.mesh.body.interval_layer),
             model,
@@ -271,15 +266,9 @@ impl Indentation {
 
     /// The body with these displacements in an equilibrium, with the tool at a depth, m.
     pub(crate) fn deformed(&self, displacements: &[Vec3], depth: f64) -> Deformed {
-        let body = &self.mesh().body;
-        let tool = self.tool_at(depth);
-        let is_touching = |v: usize| {
-            let node = body.node(v, 0);
-            let x = body.positions[node] + displacements[node];
-            tool.is_some_and(|t| t.tool.distance_at(&t.pose, &x).distance < TOUCHING)
-        };
+        let tools: Vec<PosedTool> = self.tool_at(depth).into_iter().collect();
         Deformed {
-            is_touching: (0..body.n_vertices()).map(is_touching).collect(),
+            pressures: pressures_at(&self.model, displacements, &tools),
             displacements: displacements.to_vec(),
         }
     }
@@ -340,7 +329,7 @@ impl Indentation {
             .map(|held| held.0)
             .collect();
         let deformed = Deformed {
-            is_touching: state.touches.iter().map(|t| t.tool().is_some()).collect(),
+            pressures: state.touches.iter().map(|t| t.pressure).collect(),
             displacements: state.displacements.clone(),
         };
         (self.force_of(report, &bonded, ws), deformed)
@@ -356,7 +345,7 @@ impl Indentation {
     ) -> StepReport {
         let acting = self.acting(depth);
         state.displacements.clone_from(&guess.displacements);
-        assume_touches(&self.model, state, &acting.tools, &guess.is_touching);
+        assume_pressures(&self.model, state, &acting.tools, &guess.pressures);
         let load = acting.load(0.0, None);
         let params = SolveParams {
             tolerance: ELASTIC_TOLERANCE,
@@ -419,15 +408,8 @@ impl Indentation {
                 }
             }
             Grip::Contact(_) => {
-                let areas = self.model.skin_areas();
-                for (v, touch) in run.state.touches.iter().enumerate() {
-                    let Some(tool) = touch.tool().and_then(|k| run.before.tools.get(k)) else {
-                        continue;
-                    };
-                    let node = body.node(v, 0);
-                    let x = body.positions[node] + run.state.displacements[node];
-                    let normal = tool.tool.distance_at(&tool.pose, &x).normal;
-                    pressure[v] = reactions[node].dot(&normal) / areas[v];
+                for (into, touch) in pressure.iter_mut().zip(&run.state.touches) {
+                    *into = touch.pressure;
                 }
             }
         }

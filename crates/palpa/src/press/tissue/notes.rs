@@ -7,16 +7,12 @@ use palpa_scene::{CutFaces, Scene};
 use super::{Record, Sample};
 use crate::note::Note;
 use crate::press::mesh::PressedBody;
-use crate::press::n_steps;
 
 /// A contact whose radius is fewer edges than this gets a note: its force is off by more than about
 /// 5 %.
 const FEWEST_EDGES: f64 = 3.0;
 /// If more than this share of the skin triangles has no partner, there is a note.
 const FEW_SINGLES: f64 = 0.01;
-/// With friction, a step longer than this share of the contact radius gets a note: its force is off
-/// by more than about 0.5 %.
-const LONGEST_STEP: f64 = 0.05;
 
 /// Adds a note where the mesh is known to be too coarse.
 pub(crate) fn note_mesh(model: &Model, mesh: &PressedBody, scene: &Scene, notes: &mut Vec<Note>) {
@@ -55,20 +51,6 @@ pub(crate) fn note_tension(body: &LayeredBody, scene: &Scene, notes: &mut Vec<No
     }
 }
 
-/// Adds a note if steps are too long for friction, which depends on the path of the slip.
-pub(crate) fn note_friction(scene: &Scene, notes: &mut Vec<Note>) {
-    let press = &scene.press;
-    let step = press.depth / n_steps(press) as f64;
-    let longest = LONGEST_STEP * scene.tool.contact_radius();
-    let has_friction = scene.tool.contact().is_some_and(|tool| tool.friction > 0.0);
-    if has_friction && step > longest {
-        notes.push(Note::LongFrictionSteps {
-            step,
-            enough: longest,
-        });
-    }
-}
-
 impl Record<'_> {
     /// Notes on the samples. Those on the scene and its mesh are in [`Indentation::notes`].
     ///
@@ -89,23 +71,11 @@ impl Record<'_> {
                 at: turned.at.into(),
             });
         }
-        notes.extend(note_smoothing(&good));
         if !self.indentation.is_bonded() {
             notes.extend(note_touching(&good, self.indentation.mesh().mesh_size));
         }
         notes
     }
-}
-
-/// A note if friction was smoothed in any of these samples.
-fn note_smoothing(samples: &[&Sample]) -> Option<Note> {
-    let slips = || samples.iter().map(|s| s.friction_smoothing_um);
-    let n = slips().filter(|&slip| slip > 0.0).count();
-    (n > 0).then(|| Note::FrictionSmoothed {
-        n,
-        n_all: samples.len(),
-        slip: slips().fold(0.0, f64::max) * 1e-6,
-    })
 }
 
 /// A note if the largest contact of these samples is small for the skin's edges, of length `edge`

@@ -44,18 +44,11 @@ pub struct LayerResult {
 /// The largest errors of the converged samples; [`Sample`] explains each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LargestErrors {
-    /// Largest gap at a vertex in contact, µm.
-    pub gap_um: f64,
-    /// Deepest penetration at a vertex that is not in contact, µm.
+    /// Deepest penetration of a vertex of the skin into the tool, µm.
     pub penetration_um: f64,
-    /// Largest tensile force at a vertex in contact, N.
-    pub tension_n: f64,
-    /// Largest friction force in excess of Coulomb's cone, N.
-    pub cone_n: f64,
-    /// Largest share of a friction force that does not oppose the slip.
-    pub slip: f64,
-    /// Largest slip over which friction was smoothed, µm.
-    pub friction_smoothing_um: f64,
+    /// Largest forces by which pressure and friction differ from the law of contact, relative to the
+    /// forces that hold the body.
+    pub contact_mismatch: f64,
     /// Largest residual. It excludes the body at rest before the press, which may have no forces to
     /// compare with.
     pub residual: f64,
@@ -106,12 +99,8 @@ impl Record<'_> {
         let good = self.converged();
         let largest = |of: fn(&Sample) -> f64| good.iter().map(|s| of(s)).fold(0.0, f64::max);
         LargestErrors {
-            gap_um: largest(|s| s.gap_um),
             penetration_um: largest(|s| s.penetration_um),
-            tension_n: largest(|s| s.tension_n),
-            cone_n: largest(|s| s.cone_n),
-            slip: largest(|s| s.slip),
-            friction_smoothing_um: largest(|s| s.friction_smoothing_um),
+            contact_mismatch: largest(|s| s.contact_mismatch),
             residual: largest(|s| if is_unloaded(s) { 0.0 } else { s.residual }),
             volume_ratio_min: (good.iter().map(|s| s.volume_ratio_min))
                 .fold(f64::INFINITY, f64::min),

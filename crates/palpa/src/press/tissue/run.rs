@@ -167,7 +167,10 @@ impl Run<'_> {
             }
             self.state = saved;
         }
-        let guess = (self.earlier.guess(waypoint.phase)).filter(|_| indentation.dynamics.is_none());
+        // Friction remembers the way, and so does inertia.
+        let remembers = indentation.dynamics.is_some()
+            || acting.tools.iter().any(|tool| tool.tool.friction() > 0.0);
+        let guess = (self.earlier.guess(waypoint.phase)).filter(|_| !remembers);
         if let Some(guess) = guess {
             let saved = self.state.clone();
             self.state.displacements = guess;
@@ -220,12 +223,8 @@ impl Run<'_> {
             contact_area_mm2: area * 1e6 + 0.0,
             max_pressure_kpa: max_pressure.map(|p| p * 1e-3),
             n_touching,
-            gap_um: contact.gap * 1e6,
             penetration_um: contact.penetration * 1e6,
-            tension_n: contact.tension,
-            cone_n: contact.cone,
-            slip: contact.slip,
-            friction_smoothing_um: report.friction_smoothing * 1e6,
+            contact_mismatch: contact.mismatch,
             residual: report.residual,
             iterations: report.iterations,
             substeps: report.substeps,

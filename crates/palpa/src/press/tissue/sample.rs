@@ -30,25 +30,18 @@ pub struct Sample {
     pub force_z_n: f64,
     /// Area at rest of the skin that touches the tool or is bonded to it, mm².
     pub contact_area_mm2: f64,
-    /// Largest force on a vertex divided by the skin area that it stands for, kPa. `None` for a
+    /// Largest mean pressure over the skin area that a vertex stands for, kPa. `None` for a
     /// single node. At the edge of a bonded disc the pressure has no limit, so there it grows with
     /// refinement.
     pub max_pressure_kpa: Option<f64>,
     /// Number of skin vertices that touch the tool or are bonded to it.
     pub n_touching: usize,
-    /// Largest gap at a vertex in contact, µm.
-    pub gap_um: f64,
-    /// Deepest penetration at a vertex that is not in contact, µm.
+    /// Deepest penetration of a vertex of the skin into the tool, µm. The law of contact holds on
+    /// average over the skin's triangles, so it falls with their size.
     pub penetration_um: f64,
-    /// Largest tensile force at a vertex in contact, N.
-    pub tension_n: f64,
-    /// Largest friction force in excess of Coulomb's cone, N.
-    pub cone_n: f64,
-    /// Largest share of a friction force that does not oppose the slip.
-    pub slip: f64,
-    /// Slip over which friction had to be smoothed, µm: vertices that would stick creep by about
-    /// this much. 0 for Coulomb's exact law, which nearly every step satisfies.
-    pub friction_smoothing_um: f64,
+    /// Forces by which pressure and friction differ from the law of contact, relative to the forces
+    /// that hold the body.
+    pub contact_mismatch: f64,
     /// Residual: the unbalanced forces relative to the forces that hold the body.
     pub residual: f64,
     /// Newton iterations.

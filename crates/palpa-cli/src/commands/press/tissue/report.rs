@@ -159,11 +159,9 @@ pub(super) fn conclude(
     let w = &r.worst;
     if !indentation.is_bonded() {
         context.say(format!(
-            "contact: gaps up to {} µm, penetration {} µm, pull {} N, beyond the friction cone {} N",
-            scientific(w.gap_um),
+            "contact: skin up to {} µm inside the tool, law of contact missed by {} of the force",
             scientific(w.penetration_um),
-            scientific(w.tension_n),
-            scientific(w.cone_n)
+            scientific(w.contact_mismatch)
         ))?;
     }
     context.say(format!(
