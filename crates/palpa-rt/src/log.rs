@@ -3,6 +3,7 @@
 use crate::{
     event::Level,
     layout::Record,
+    machine::Machine,
     record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
     recorder::{
         EventRow, FORMAT, TOPIC_DEVICE, TOPIC_EVENT, TOPIC_HEADER, TOPIC_SERVO, TOPIC_SPEC,
@@ -45,6 +46,29 @@ pub enum LogError {
         /// What is damaged.
         reason: String,
     },
+    /// The log was written in a layout that this version does not read.
+    #[error(
+        "{}: {palpa} wrote it with {layout}; this version (palpa {}) can neither replay nor export it, the \
+         version that wrote it can",
+        path.display(),
+        env!("CARGO_PKG_VERSION")
+    )]
+    Layout {
+        /// The file.
+        path: PathBuf,
+        /// The difference, in words.
+        layout: String,
+        /// The version of Palpa that wrote it, as far as the log says.
+        palpa: String,
+    },
+    /// A part with which every log begins is missing.
+    #[error("{}: {what} is missing at its beginning, so it can be neither replayed nor exported", path.display())]
+    Partial {
+        /// The file.
+        path: PathBuf,
+        /// The missing part.
+        what: String,
+    },
 }
 
 /// A row of a log.
@@ -69,13 +93,12 @@ pub enum Row {
 /// Header of a log.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Header {
-    /// Version of palpa.
-    pub palpa: String,
-    /// Features of the processor. On a processor with other features, a replay may differ in the
-    /// last bits.
-    pub cpu: String,
+    /// The machine and the program that made the log. On another, a replay may differ.
+    pub machine: Machine,
     /// Period of the loop, s.
     pub period: f64,
+    /// Number of devices.
+    pub n_devices: usize,
     /// The scene, as text.
     pub scene: String,
     /// Notes by name.
@@ -87,9 +110,31 @@ pub struct Rows {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    topics: BTreeMap<u16, Topic>,
+    start: Start,
     ending: Ending,
     is_over: bool,
+}
+
+/// The beginning of a log, as far as it was read.
+#[derive(Default)]
+struct Start {
+    schemas: BTreeMap<u16, (String, Vec<u8>)>,
+    topics: BTreeMap<u16, Topic>,
+    /// A record whose fields are not those of this version.
+    foreign: Option<String>,
+    /// The version of Palpa that wrote the log, in words.
+    palpa: String,
+    /// Number of devices, once the header was read.
+    n_devices: Option<usize>,
+    n_specs: usize,
+    has_servo: bool,
+}
+
+/// Why a row cannot be given.
+enum Refusal {
+    Broken(String),
+    Layout { layout: String, palpa: String },
+    Partial(String),
 }
 
 /// How a log ends.
@@ -201,7 +246,7 @@ impl Rows {
             path,
             file,
             reader: LinearReader::new_with_options(options),
-            topics: BTreeMap::new(),
+            start: Start::default(),
             ending: Ending::CutOff,
             is_over: false,
         })
@@ -219,6 +264,19 @@ impl Rows {
         }
     }
 
+    fn refused(&self, refusal: Refusal) -> LogError {
+        let path = self.path.clone();
+        match refusal {
+            Refusal::Broken(reason) => self.broken(reason),
+            Refusal::Layout { layout, palpa } => LogError::Layout {
+                path,
+                layout,
+                palpa,
+            },
+            Refusal::Partial(what) => LogError::Partial { path, what },
+        }
+    }
+
     fn read_on(&mut self) -> Result<Option<Row>, LogError> {
         loop {
             let row = match self.reader.next_event() {
@@ -228,7 +286,7 @@ impl Rows {
                 }
                 Some(Err(McapError::UnexpectedEof)) => return self.end_early(),
                 Some(Err(error)) => {
-                    if self.topics.is_empty() {
+                    if self.start.topics.is_empty() {
                         return Err(self.broken(error.to_string()));
                     }
                     // The rows before the damage are good.
@@ -246,19 +304,19 @@ impl Rows {
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
                     let record = parse_record(opcode, data).map_err(|e| e.to_string());
-                    row_of(&mut self.topics, record)
+                    self.start.row(record)
                 }
             };
             match row {
                 Ok(Some(row)) => return Ok(Some(row)),
                 Ok(None) => {}
-                Err(reason) => return Err(self.broken(reason)),
+                Err(refusal) => return Err(self.refused(refusal)),
             }
         }
     }
 
     fn end_early(&self) -> Result<Option<Row>, LogError> {
-        if self.topics.is_empty() {
+        if self.start.topics.is_empty() {
             return Err(self.broken("it ends before its first channel"));
         }
         Ok(None)
@@ -286,30 +344,135 @@ impl Iterator for Rows {
     }
 }
 
-fn row_of(
-    topics: &mut BTreeMap<u16, Topic>,
-    record: Result<Mcap<'_>, String>,
-) -> Result<Option<Row>, String> {
-    match record? {
-        Mcap::Channel(channel) => {
-            topics.insert(channel.id, topic_of(&channel.topic));
-            Ok(None)
+impl Start {
+    fn row(&mut self, record: Result<Mcap<'_>, String>) -> Result<Option<Row>, Refusal> {
+        match record.map_err(Refusal::Broken)? {
+            Mcap::Schema { header, data } => {
+                self.schemas
+                    .insert(header.id, (header.name, data.into_owned()));
+                Ok(None)
+            }
+            Mcap::Channel(channel) => {
+                let topic = topic_of(&channel.topic);
+                let of_log = self.schemas.get(&channel.schema_id);
+                if let Some((name, fields)) = schema_of(topic)
+                    && of_log.is_none_or(|(n, f)| n != name || *f != fields.as_bytes())
+                {
+                    self.foreign.get_or_insert(channel.topic);
+                }
+                self.topics.insert(channel.id, topic);
+                Ok(None)
+            }
+            Mcap::Message { header, data } => {
+                let topic = *self.topics.get(&header.channel_id).unwrap_or(&Topic::Other);
+                let short = || {
+                    let number = header.sequence;
+                    Refusal::Broken(format!("message {number} on {topic:?} is too short"))
+                };
+                self.check(topic)?;
+                Ok(Some(match topic {
+                    Topic::Header => Row::Header(self.header(&data)?),
+                    Topic::Spec => {
+                        self.n_specs += 1;
+                        Row::Spec(Record::decode(&data).ok_or_else(short)?)
+                    }
+                    Topic::Servo => {
+                        self.has_servo = true;
+                        Row::Servo(Record::decode(&data).ok_or_else(short)?)
+                    }
+                    Topic::Tick => Row::Tick(Record::decode(&data).ok_or_else(short)?),
+                    Topic::Device(k) => Row::Device(k, Record::decode(&data).ok_or_else(short)?),
+                    Topic::Step => Row::Step(Record::decode(&data).ok_or_else(short)?),
+                    Topic::Event => Row::Event(event_of(&data).ok_or_else(short)?),
+                    Topic::Other => return Ok(None),
+                }))
+            }
+            _ => Ok(None),
         }
-        Mcap::Message { header, data } => {
-            let topic = *topics.get(&header.channel_id).unwrap_or(&Topic::Other);
-            let short = || format!("message {} on {topic:?} is too short", header.sequence);
-            Ok(Some(match topic {
-                Topic::Header => Row::Header(header_of(&data)?),
-                Topic::Spec => Row::Spec(Record::decode(&data).ok_or_else(short)?),
-                Topic::Servo => Row::Servo(Record::decode(&data).ok_or_else(short)?),
-                Topic::Tick => Row::Tick(Record::decode(&data).ok_or_else(short)?),
-                Topic::Device(k) => Row::Device(k, Record::decode(&data).ok_or_else(short)?),
-                Topic::Step => Row::Step(Record::decode(&data).ok_or_else(short)?),
-                Topic::Event => Row::Event(event_of(&data).ok_or_else(short)?),
-                Topic::Other => return Ok(None),
-            }))
+    }
+
+    /// Refuses a row before the parts that it needs.
+    fn check(&self, topic: Topic) -> Result<(), Refusal> {
+        let missing = |what: &str| Err(Refusal::Partial(what.to_owned()));
+        if matches!(topic, Topic::Header | Topic::Other) {
+            return Ok(());
         }
-        _ => Ok(None),
+        let Some(n_devices) = self.n_devices else {
+            return missing("the header");
+        };
+        if let Some(topic) = &self.foreign {
+            return Err(Refusal::Layout {
+                layout: format!("other fields in {topic}"),
+                palpa: self.palpa.clone(),
+            });
+        }
+        if matches!(topic, Topic::Spec | Topic::Servo) {
+            return Ok(());
+        }
+        if self.n_specs < n_devices {
+            return missing(&format!("the limits of device {}", self.n_specs));
+        }
+        if !self.has_servo {
+            return missing("the settings of the law");
+        }
+        Ok(())
+    }
+
+    fn header(&mut self, bytes: &[u8]) -> Result<Header, Refusal> {
+        let json: serde_json::Value = serde_json::from_slice(bytes)
+            .map_err(|e| Refusal::Broken(format!("its header: {e}")))?;
+        let machine = Machine::from_json(&json["machine"]);
+        // Older layouts have the version outside of the machine.
+        let version = match machine.palpa.as_str() {
+            "" => json["palpa"].as_str().unwrap_or("of an unknown version"),
+            version => version,
+        };
+        self.palpa = format!("palpa {version}");
+        let layout = match json["format"].as_u64() {
+            Some(FORMAT) => None,
+            Some(format) => Some(format!("layout {format} of logs instead of {FORMAT}")),
+            None => Some(format!("no number of a layout instead of {FORMAT}")),
+        };
+        if let Some(layout) = layout {
+            return Err(Refusal::Layout {
+                layout,
+                palpa: self.palpa.clone(),
+            });
+        }
+        let missing = |key: &str| Refusal::Partial(format!("{key} of its header"));
+        let period = (json["period"].as_f64())
+            .filter(|period| *period > 0.0)
+            .ok_or_else(|| missing("the period"))?;
+        let n_devices = (json["n_devices"].as_u64())
+            .filter(|n| *n <= MAX_TOOLS as u64)
+            .ok_or_else(|| missing("the number of devices"))? as usize;
+        let scene = (json["scene"].as_str()).ok_or_else(|| missing("the scene"))?;
+        self.n_devices = Some(n_devices);
+        let notes = json["notes"].as_object().into_iter().flatten();
+        Ok(Header {
+            machine,
+            period,
+            n_devices,
+            scene: scene.to_owned(),
+            notes: notes
+                .map(|(k, v)| (k.clone(), v.as_str().unwrap_or_default().to_owned()))
+                .collect(),
+        })
+    }
+}
+
+/// Name and fields of the records on a topic, in this version.
+fn schema_of(topic: Topic) -> Option<(&'static str, String)> {
+    fn of<R: Record>() -> Option<(&'static str, String)> {
+        Some((R::NAME, R::schema()))
+    }
+    match topic {
+        Topic::Spec => of::<SpecRecord>(),
+        Topic::Servo => of::<ServoRecord>(),
+        Topic::Tick => of::<TickRecord>(),
+        Topic::Device(_) => of::<DeviceRecord>(),
+        Topic::Step => of::<StepRecord>(),
+        Topic::Header | Topic::Event | Topic::Other => None,
     }
 }
 
@@ -326,28 +489,6 @@ fn topic_of(name: &str) -> Topic {
             .filter(|k| *k < MAX_TOOLS)
             .map_or(Topic::Other, Topic::Device),
     }
-}
-
-fn header_of(bytes: &[u8]) -> Result<Header, String> {
-    let json: serde_json::Value =
-        serde_json::from_slice(bytes).map_err(|e| format!("header: {e}"))?;
-    let format = json["format"].as_u64().unwrap_or(0);
-    if format != FORMAT {
-        return Err(format!(
-            "header: layout {format}, this version reads {FORMAT}"
-        ));
-    }
-    let text = |key: &str| json[key].as_str().unwrap_or_default().to_owned();
-    let notes = json["notes"].as_object().into_iter().flatten();
-    Ok(Header {
-        palpa: text("palpa"),
-        cpu: text("cpu"),
-        period: json["period"].as_f64().unwrap_or_default(),
-        scene: text("scene"),
-        notes: notes
-            .map(|(k, v)| (k.clone(), v.as_str().unwrap_or_default().to_owned()))
-            .collect(),
-    })
 }
 
 fn event_of(mut bytes: &[u8]) -> Option<EventRow> {

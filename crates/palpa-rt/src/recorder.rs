@@ -9,6 +9,7 @@ use crate::{
     event::{Event, Happening, Level, RecordKind},
     findings::Board,
     layout::Record,
+    machine::Machine,
     record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
     servo_loop::TickEntry,
     smoothness::ForceStats,
@@ -41,7 +42,7 @@ const DRAIN_EVERY: Duration = Duration::from_millis(10);
 const MAX_EVENTS: usize = 10_000;
 
 /// The file of a recording, and its header.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct RecorderParams {
     /// The file. With `None` nothing is recorded, but statistics and events are still kept.
     pub path: Option<PathBuf>,
@@ -49,6 +50,20 @@ pub struct RecorderParams {
     pub scene: String,
     /// Notes by name, for a replay or a reader.
     pub notes: BTreeMap<String, String>,
+    /// The machine and the program.
+    pub machine: Machine,
+}
+
+impl Default for RecorderParams {
+    /// No file; the machine as far as this crate knows it.
+    fn default() -> Self {
+        Self {
+            path: None,
+            scene: String::new(),
+            notes: BTreeMap::new(),
+            machine: Machine::here(),
+        }
+    }
 }
 
 /// An event of a log, in words.
@@ -225,10 +240,8 @@ impl LogFile {
         };
         let header = json!({
             "format": FORMAT,
-            "palpa": env!("CARGO_PKG_VERSION"),
             "started_unix_ns": origin,
-            "cpu": cpu_features(),
-            "arch": std::env::consts::ARCH,
+            "machine": params.machine.to_json(),
             "os": std::env::consts::OS,
             "period": servo.period,
             "n_devices": specs.len(),
@@ -323,31 +336,5 @@ impl SpecRecord {
             max_stiffness: self.max_stiffness,
             max_damping: self.max_damping,
         }
-    }
-}
-
-/// Features of this machine's processor that results may depend on.
-pub fn cpu_features() -> String {
-    #[cfg(target_arch = "x86_64")]
-    {
-        let all = [
-            ("sse4.1", std::arch::is_x86_feature_detected!("sse4.1")),
-            ("avx", std::arch::is_x86_feature_detected!("avx")),
-            ("avx2", std::arch::is_x86_feature_detected!("avx2")),
-            ("fma", std::arch::is_x86_feature_detected!("fma")),
-            ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
-            ("avx512dq", std::arch::is_x86_feature_detected!("avx512dq")),
-            ("avx512vl", std::arch::is_x86_feature_detected!("avx512vl")),
-        ];
-        let have: Vec<_> = all
-            .iter()
-            .filter(|(_, has)| *has)
-            .map(|(name, _)| *name)
-            .collect();
-        format!("x86_64 {}", have.join(" "))
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        std::env::consts::ARCH.to_owned()
     }
 }

@@ -3,8 +3,8 @@
 
 use crate::{
     log::Log,
+    machine::{Difference, Effect, Machine},
     record::{DeviceRecord, StepRecord},
-    recorder::cpu_features,
     servo_loop::TickEntry,
     tissue::{Tissue, TissueInput, empty_patch},
     tissue_thread::{spoil, stamp, step_record},
@@ -13,18 +13,23 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use palpa_servo::{ContactPatch, DeviceState, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo};
 
 /// Settings of the comparison in a replay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ReplayParams {
-    /// Largest accepted difference of a force on another processor, N. On the same processor no
-    /// difference is accepted.
+    /// Largest accepted difference of a force where machine or program differ in a part that can
+    /// change it, N. Otherwise no difference is accepted.
     pub tolerance: f64,
+    /// This machine and program, to be compared with those of the log.
+    pub machine: Machine,
 }
 
 impl Default for ReplayParams {
     fn default() -> Self {
         // A thousandth of the smallest force that a hand can feel. Other instructions round
         // differently, and contact amplifies the difference.
-        Self { tolerance: 1e-4 }
+        Self {
+            tolerance: 1e-4,
+            machine: Machine::here(),
+        }
     }
 }
 
@@ -33,7 +38,8 @@ impl Default for ReplayParams {
 pub enum Verdict {
     /// Every force and every patch is equal bit for bit.
     Same,
-    /// The log was made on a processor with other features; forces agree within the tolerance.
+    /// The log was made on another machine or by another program; forces agree within the
+    /// tolerance.
     WithinTolerance,
     /// Forces or patches differ.
     Different,
@@ -46,8 +52,8 @@ pub enum Verdict {
 pub struct ReplayReport {
     /// The outcome.
     pub verdict: Verdict,
-    /// Whether the log was made on a processor with the same features.
-    pub is_same_cpu: bool,
+    /// The differences between the machine and program of the log and these.
+    pub differences: Vec<Difference>,
     /// Ticks run and compared.
     pub ticks: u64,
     /// Steps of the tissue run and compared.
@@ -64,6 +70,13 @@ pub struct ReplayReport {
     pub patches_differing: u64,
     /// Where and why the replay had to stop before the log's end.
     pub stopped: Option<String>,
+}
+
+impl ReplayReport {
+    /// Whether every bit must be the same: nothing differs that can change one.
+    fn must_be_same(&self) -> bool {
+        self.differences.iter().all(|d| d.effect == Effect::None)
+    }
 }
 
 /// A force that differs from the logged one.
@@ -106,7 +119,7 @@ pub fn replay_watched<T: Tissue>(
         commands: [ForceCommand::ZERO; MAX_TOOLS],
         report: ReplayReport {
             verdict: Verdict::Same,
-            is_same_cpu: log.header.cpu == cpu_features(),
+            differences: log.header.machine.differences(&params.machine),
             ticks: 0,
             steps: 0,
             jobs: 0,
@@ -123,7 +136,7 @@ pub fn replay_watched<T: Tissue>(
     report.stopped = result.err();
     let differs = report.first_force.is_some() || report.first_patch.is_some();
     let is_within = report.max_force_difference <= params.tolerance;
-    report.verdict = if differs && (report.is_same_cpu || !is_within) {
+    report.verdict = if differs && (report.must_be_same() || !is_within) {
         Verdict::Different
     } else if report.stopped.is_some() {
         Verdict::Incomplete

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use anyhow::{Context as _, bail};
-use palpa::live::notes_of;
+use palpa::live::{machine, notes_of};
 use palpa::one_paragraph;
 use palpa_rt::RecorderParams;
 use palpa_scene::Scene;
@@ -282,6 +282,7 @@ impl Desk {
             path: Some(log.clone()),
             scene: text,
             notes,
+            machine: machine(),
         })?;
         self.tape.begin(log);
         Ok(())

@@ -16,6 +16,13 @@ pub use blocks::{Block, ColumnPattern};
 pub use cholesky::{Factor, Pattern};
 pub use order::minimum_degree;
 
+/// Sizes of the data caches of levels 1 to 3, as the library of matrix products sees them, B. On
+/// processors without AVX2 and FMA the last bits of factors depend on them.
+pub fn cache_sizes() -> [usize; 3] {
+    let caches: &[_; 3] = &gemm_common::cache::CACHE_INFO;
+    caches.map(|cache| cache.cache_bytes)
+}
+
 /// The nodes that have unknowns, in the order of elimination. Each entry is a node and its
 /// neighbours that come later in that order.
 pub type NodePattern = Vec<(usize, Vec<usize>)>;

@@ -9,14 +9,15 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{FileState, LiveScene, SpringScene, changed_files, scene_of};
+use palpa::live::{FileState, LiveScene, SpringScene, changed_files, machine, scene_of};
 
 /// Run a log again and compare the forces, or export it as tables
 ///
 /// Builds the body from the scene in the log. Then runs the steps of the tissue and the 1 kHz law
 /// again in one thread, from the logged inputs, and compares all forces and patches. They must be
-/// equal bit for bit on the same kind of processor, and within a tolerance on another. Exit code 1
-/// if they differ.
+/// equal bit for bit. Where the log was made on another kind of processor or by another version, a
+/// note names each difference and what it can change, and forces must be equal within 0.0001 N.
+/// Exit code 1 if they differ by more.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log (MCAP), as `palpa loop-report` writes it
@@ -42,7 +43,8 @@ enum Format {
 #[derive(Debug, Serialize)]
 struct Found {
     verdict: &'static str,
-    is_same_cpu: bool,
+    /// Differences between the machine and program of the log and these.
+    differences: Vec<Differs>,
     ticks: u64,
     steps: u64,
     jobs: u64,
@@ -58,6 +60,17 @@ struct Found {
     changed_files: Vec<String>,
 }
 
+/// A difference between the machine and program of the log and these.
+#[derive(Debug, Serialize)]
+struct Differs {
+    what: String,
+    /// `null` if the log does not say.
+    logged: Option<String>,
+    now: Option<String>,
+    /// What it can change: `computation`, `last_bits` or `none`.
+    effect: &'static str,
+}
+
 /// Content of the `--json` output with `--export`.
 #[derive(Debug, Serialize)]
 struct Tables {
@@ -70,7 +83,11 @@ struct Tables {
 fn again(log: &Log, tissue: impl Tissue, context: &Context) -> ReplayReport {
     context.begin_recording();
     let bar = context.progress(log.ticks.len(), "ticks run again");
-    let report = replay_watched(log, tissue, &ReplayParams::default(), |tick| {
+    let params = ReplayParams {
+        machine: machine(),
+        ..ReplayParams::default()
+    };
+    let report = replay_watched(log, tissue, &params, |tick| {
         if tick.is_multiple_of(100) {
             bar.set_position(tick as u64);
         }
@@ -100,6 +117,9 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     };
     for file in &changed {
         context.note(format!("{}: {}", file.path.display(), file.problem));
+    }
+    for difference in log.header.machine.differences(&machine()) {
+        context.note(&difference);
     }
     let of_log = || "the body of the log";
     let report = match scene.model.kind {
@@ -132,7 +152,14 @@ fn found_of(report: &ReplayReport, ending: &Ending, changed: &[FileState]) -> Fo
             Verdict::Different => "different",
             Verdict::Incomplete => "incomplete",
         },
-        is_same_cpu: report.is_same_cpu,
+        differences: (report.differences.iter())
+            .map(|d| Differs {
+                what: d.what.clone(),
+                logged: known(&d.logged),
+                now: known(&d.now),
+                effect: d.effect.word(),
+            })
+            .collect(),
         ticks: report.ticks,
         steps: report.steps,
         jobs: report.jobs,
@@ -150,6 +177,10 @@ fn found_of(report: &ReplayReport, ending: &Ending, changed: &[FileState]) -> Fo
     }
 }
 
+fn known(text: &str) -> Option<String> {
+    (!text.is_empty()).then(|| text.to_owned())
+}
+
 /// Prints what was run again, and whether it was the same.
 fn say_report(report: &ReplayReport, ending: &Ending, context: &Context) -> anyhow::Result<()> {
     context.say(format!(
@@ -164,7 +195,7 @@ fn say_report(report: &ReplayReport, ending: &Ending, context: &Context) -> anyh
             "every force and every patch that could be read is the same bit for bit".to_owned()
         }
         Verdict::WithinTolerance => format!(
-            "made on another kind of processor; forces differ by {:.2e} N at most, which is within the tolerance",
+            "made on another machine or by another program, see the notes above; forces differ by {:.2e} N at most, which is within the tolerance",
             report.max_force_difference
         ),
         Verdict::Different => format!(

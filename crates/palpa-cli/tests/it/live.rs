@@ -66,6 +66,23 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
     // The log has the ramp down at the end, too.
     assert!(found["ticks"].as_u64().unwrap() >= ticks);
     assert!(found["steps"].as_u64().unwrap() > 10);
+    // Threads of the pool change no bit, and are named where they differ.
+    let threads = ["1", "3"].map(|n| {
+        let mut replay = bench.command(&["replay", "live/log.mcap", "--json"]);
+        let output = replay.env("RAYON_NUM_THREADS", n).output().unwrap();
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(found["verdict"], "same", "{found}");
+        let said = String::from_utf8(output.stderr).unwrap();
+        let differences = found["differences"].as_array().unwrap().clone();
+        assert!(differences.iter().all(|d| d["effect"] == "none"), "{found}");
+        assert_eq!(
+            said.contains("this changes no force"),
+            !differences.is_empty(),
+            "{said}"
+        );
+        differences.len()
+    });
+    assert!(threads.contains(&1), "{threads:?}");
     let export = [
         "replay",
         "live/log.mcap",

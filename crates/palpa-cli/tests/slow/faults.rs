@@ -193,6 +193,7 @@ fn faults_while_real_tissue_is_pressed() {
         path: Some(path.clone()),
         scene: scene.to_toml(),
         notes: palpa::live::notes_of(&scene).unwrap(),
+        ..RecorderParams::default()
     };
     let engine = Engine::start(
         live.tissue().unwrap(),

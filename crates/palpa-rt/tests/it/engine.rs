@@ -6,7 +6,7 @@ use crate::{
 };
 use palpa_device::{DeviceModel, Grip, Path as Path3, SimulatedDevice};
 use palpa_rt::{
-    Ending, Engine, EngineParams, Log, RecorderParams, ReplayParams, Report, StartError,
+    Ending, Engine, EngineParams, Log, Machine, RecorderParams, ReplayParams, Report, StartError,
     StepRecord, Verdict, replay,
 };
 use palpa_servo::Vec3;
@@ -25,6 +25,7 @@ pub(crate) fn recorder(path: &Path) -> RecorderParams {
         path: Some(path.to_owned()),
         scene: "[tool]\nshape = \"sphere\"\n".to_owned(),
         notes: [("made by".to_owned(), "a test".to_owned())].into(),
+        ..RecorderParams::default()
     }
 }
 
@@ -126,7 +127,7 @@ fn two_thousand_ticks_are_recorded_whole_and_replayed_to_the_bit() {
     let again = replay(&log, Bed::new(), &ReplayParams::default());
     assert_eq!(again.verdict, Verdict::Same, "{again:?}");
     assert_eq!((again.ticks, again.steps), (report.ticks, report.steps));
-    assert!(again.jobs > 5 && again.is_same_cpu);
+    assert!(again.jobs > 5 && again.differences.is_empty());
 }
 
 #[test]
@@ -207,12 +208,38 @@ fn a_replay_finds_what_was_changed() {
     assert_eq!(report.first_patch, None);
     assert!(report.max_force_difference > 0.0 && report.max_force_difference < 1e-6);
 
-    // The same log from a processor with other features: that is within the tolerance.
-    other.header.cpu = "another".to_owned();
-    let report = replay(&other, Bed::new(), &params);
-    assert_eq!(
-        (report.verdict, report.is_same_cpu),
-        (Verdict::WithinTolerance, false)
+    // The same log from another machine or program: within the tolerance where that can change a
+    // bit, and still different where it cannot.
+    let mut again_on = |change: &dyn Fn(&mut Machine)| {
+        other.header.machine = log.header.machine.clone();
+        change(&mut other.header.machine);
+        let report = replay(&other, Bed::new(), &params);
+        let said: Vec<_> = report.differences.iter().map(ToString::to_string).collect();
+        (report.verdict, said.join("\n"))
+    };
+    let (verdict, said) = again_on(&|m| m.cpu = "another".to_owned());
+    assert_eq!(verdict, Verdict::WithinTolerance);
+    assert!(
+        said.starts_with("features of the processor: another in the log, "),
+        "{said}"
+    );
+    let (verdict, said) = again_on(&|m| m.palpa = "0.0.9".to_owned());
+    assert_eq!(verdict, Verdict::WithinTolerance);
+    assert!(
+        said.contains("version of Palpa: 0.0.9 in the log, "),
+        "{said}"
+    );
+    let (verdict, said) = again_on(&|m| m.threads = "64".to_owned());
+    assert_eq!(verdict, Verdict::Different);
+    assert!(
+        said.contains("64 in the log") && said.contains("changes no force"),
+        "{said}"
+    );
+    let (verdict, said) = again_on(&|m| *m = Machine::default());
+    assert_eq!(verdict, Verdict::WithinTolerance);
+    assert!(
+        said.contains("version of Palpa: not recorded in the log"),
+        "{said}"
     );
 
     // A job that was installed one step later: its patches differ.

@@ -5,8 +5,9 @@ use crate::{
     engine::{go_on, run},
     toy::Bed,
 };
-use palpa_rt::{Ending, Engine, Log, ReplayParams, Table, Verdict, export, replay};
-use std::{fs, path::Path};
+use mcap::records::MessageHeader;
+use palpa_rt::{Ending, Engine, Log, Machine, ReplayParams, Table, Verdict, export, replay};
+use std::{collections::BTreeMap, fs, path::Path};
 
 /// Runs until the log has grown so often on disk, as the recorder hands chunks to the system.
 fn until_grown(engine: &mut Engine, path: &Path, times: usize) {
@@ -128,6 +129,153 @@ fn what_was_flushed_is_there_while_the_engine_runs() {
             });
         }
     });
+}
+
+/// A copy of a log in which `change` alters, or leaves out, messages and the fields of records.
+fn rewritten(
+    log: &[u8],
+    path: &Path,
+    fields: impl Fn(&str, String) -> String,
+    change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>,
+) {
+    let file = fs::File::create(path).unwrap();
+    let mut writer = mcap::WriteOptions::new()
+        .compression(None)
+        .create(file)
+        .unwrap();
+    let mut channels = BTreeMap::new();
+    for message in mcap::MessageStream::new(log).unwrap() {
+        let message = message.unwrap();
+        let topic = message.channel.topic.clone();
+        let id = *channels.entry(topic.clone()).or_insert_with(|| {
+            let schema = message.channel.schema.as_ref().map_or(0, |schema| {
+                let text = String::from_utf8(schema.data.to_vec()).unwrap();
+                let text = fields(&topic, text);
+                (writer.add_schema(&schema.name, &schema.encoding, text.as_bytes())).unwrap()
+            });
+            let encoding = &message.channel.message_encoding;
+            (writer.add_channel(schema, &topic, encoding, &BTreeMap::new())).unwrap()
+        });
+        let Some(data) = change(&topic, message.data.to_vec()) else {
+            continue;
+        };
+        let header = MessageHeader {
+            channel_id: id,
+            sequence: message.sequence,
+            log_time: message.log_time,
+            publish_time: message.publish_time,
+        };
+        writer.write_to_known_channel(&header, &data).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// A change of the header alone.
+fn header(change: impl Fn(&mut serde_json::Value)) -> impl Fn(&str, Vec<u8>) -> Option<Vec<u8>> {
+    move |topic, data| {
+        if topic != "/header" {
+            return Some(data);
+        }
+        let mut json = serde_json::from_slice(&data).unwrap();
+        change(&mut json);
+        Some(json.to_string().into_bytes())
+    }
+}
+
+#[test]
+fn logs_of_other_layouts_and_partial_logs_are_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run(&path, Bed::new(), |engine, _| go_on(engine, 50, 5, 0));
+    let bytes = fs::read(&path).unwrap();
+    let other = folder.path().join("other.mcap");
+    let as_is = |_: &str, text: String| text;
+    let refused = || {
+        let why = Log::open(&other).unwrap_err().to_string();
+        let tables = export(&other, folder.path().join("csv"), Table::Csv);
+        assert_eq!(tables.unwrap_err().to_string(), why);
+        why
+    };
+
+    // An older layout has the version in another place.
+    let old = header(|json| {
+        *json = serde_json::json!({ "format": 2, "palpa": "0.0.9", "cpu": "x86_64 avx" });
+    });
+    rewritten(&bytes, &other, as_is, old);
+    let why = refused();
+    assert!(
+        why.contains("palpa 0.0.9 wrote it with layout 2 of logs instead of 3"),
+        "{why}"
+    );
+    assert!(why.contains("can neither replay nor export it"), "{why}");
+    rewritten(
+        &bytes,
+        &other,
+        as_is,
+        header(|json| *json = serde_json::json!({})),
+    );
+    let why = refused();
+    assert!(
+        why.contains("palpa of an unknown version wrote it with no number of a layout"),
+        "{why}"
+    );
+    // The same number, but a record has one field less: it is not read with the others shifted.
+    let fewer = |topic: &str, text: String| match topic {
+        "/tissue/step" => text
+            .lines()
+            .skip(1)
+            .fold(String::new(), |t, line| t + line + "\n"),
+        _ => text,
+    };
+    rewritten(&bytes, &other, fewer, |_, data| Some(data));
+    let why = refused();
+    assert!(why.contains("other fields in /tissue/step"), "{why}");
+
+    // Parts that are missing.
+    for (gone, said) in [
+        ("/header", "the header is missing"),
+        ("/spec", "the limits of device 0 is missing"),
+        ("/servo", "the settings of the law is missing"),
+    ] {
+        rewritten(&bytes, &other, as_is, |topic, data| {
+            (topic != gone).then_some(data)
+        });
+        let why = refused();
+        assert!(why.contains(said), "{why}");
+    }
+    for (key, said) in [
+        ("period", "the period of its header is missing"),
+        (
+            "n_devices",
+            "the number of devices of its header is missing",
+        ),
+        ("scene", "the scene of its header is missing"),
+    ] {
+        let without = header(|json| {
+            json.as_object_mut().unwrap().remove(key);
+        });
+        rewritten(&bytes, &other, as_is, without);
+        let why = refused();
+        assert!(why.contains(said), "{why}");
+    }
+
+    // A log that does not tell its machine is replayed, and that is said.
+    let without = header(|json| {
+        json.as_object_mut().unwrap().remove("machine");
+    });
+    rewritten(&bytes, &other, as_is, without);
+    let log = Log::open(&other).unwrap();
+    assert_eq!(log.header.machine, Machine::default());
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same);
+    let unknown = again.differences.iter().filter(|d| d.logged.is_empty());
+    assert_eq!(unknown.count(), 3, "{:?}", again.differences);
+    // Written out and read back as it is, it stays what it was.
+    rewritten(&bytes, &other, as_is, |_, data| Some(data));
+    assert_eq!(
+        Log::open(&other).unwrap().header,
+        Log::open(&path).unwrap().header
+    );
 }
 
 #[test]

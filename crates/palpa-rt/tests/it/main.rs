@@ -9,5 +9,6 @@ mod devices;
 mod engine;
 mod faults;
 mod logs;
+mod machine;
 mod realtime;
 mod toy;

@@ -11,6 +11,7 @@
 mod error_bar;
 mod fine;
 mod hand;
+mod machine;
 mod moving;
 mod prober;
 mod record;
@@ -21,6 +22,7 @@ mod watch;
 pub use error_bar::{LiveBar, Moment, NoBar, probe};
 pub use fine::FineScene;
 pub use hand::{across, device_model, grip, once_from, open_device, path, servo_params};
+pub use machine::machine;
 pub use moving::LiveTissue;
 pub use prober::Prober;
 pub use record::{FileState, changed_files, notes_of, scene_of};

@@ -6,6 +6,7 @@
 mod accuracy;
 mod error_bar;
 mod live;
+mod machine;
 mod notes;
 mod panics;
 mod place;

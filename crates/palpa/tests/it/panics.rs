@@ -80,6 +80,7 @@ fn stroke(live: &LiveScene, path: &Path, panics: u32) -> (f64, [u64; 2], Report)
         path: Some(path.to_owned()),
         scene: scene.to_toml(),
         notes: notes_of(scene).unwrap(),
+        ..RecorderParams::default()
     };
     let params = EngineParams {
         lock_memory: false,

@@ -17,7 +17,7 @@ use self::figures::Figures;
 use self::guarantees::broken;
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{LiveScene, Watch, notes_of, open_device, path, servo_params};
+use palpa::live::{LiveScene, Watch, machine, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
 /// The scene that is used if none is given.
@@ -164,6 +164,7 @@ fn run_engine(
         path: Some(log),
         scene: scene.to_toml(),
         notes: notes_of(scene)?,
+        machine: machine(),
     };
     context.begin_recording();
     let bar = context.progress(args.seconds.ceil() as usize, "real time");
