@@ -37,6 +37,10 @@ pub const PROFILE: f64 = 0.05;
 pub const SMALL_LUMP: f64 = 0.15;
 /// Penetration at active points, m.
 pub const PENETRATION: f64 = 1e-6;
+/// Tangential force of a sphere that slips in part, as a share of the friction.
+pub const PARTIAL_SLIP: f64 = 0.03;
+/// Force of a sphere with friction, relative to that without.
+pub const FRICTION_STIFFENS: f64 = 0.005;
 /// Elastic force with different load steps.
 pub const LOAD_STEPS: f64 = 0.001;
 
