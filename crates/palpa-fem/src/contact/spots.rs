@@ -75,6 +75,12 @@ pub(crate) fn nearest_tool(tools: &[PosedTool], x: &Vec3) -> Option<(usize, f64)
     all.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
+/// The largest gap, m, at which pressures (Pa) at the corners of a triangle keep a point pressed.
+pub(crate) fn kept_gap(pressures: [f64; 3], stiffness: [f64; 3]) -> f64 {
+    let softest = stiffness.into_iter().fold(f64::INFINITY, f64::min);
+    pressures.into_iter().fold(0.0, f64::max) / softest.max(f64::MIN_POSITIVE)
+}
+
 /// Visits the points of a triangle: middles of equal parts, given by the shares of its corners, and
 /// the number of parts.
 fn for_each_point(parts: usize, mut visit: impl FnMut([f64; 3])) {

@@ -5,7 +5,9 @@ use palpa_mesh::Vec3;
 
 use crate::Mat3;
 use crate::assembly::Assembler;
-use crate::contact::{Fineness, Spot, Touch, anchor_at, first_touch, nearest_tool, spots_of};
+use crate::contact::{
+    Fineness, Spot, Touch, anchor_at, first_touch, kept_gap, nearest_tool, spots_of,
+};
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 use crate::state::{Memory, State};
@@ -170,9 +172,7 @@ impl Contacts {
             }
             let epsilons = corners.map(|v| stiffness.normal[v]);
             // A pressure as in the last step keeps points pressed up to this gap.
-            let pressure = corners.map(|v| touches[v].pressure).into_iter();
-            let softest = epsilons.into_iter().fold(f64::INFINITY, f64::min);
-            let reach = pressure.fold(0.0, f64::max) / softest.max(f64::MIN_POSITIVE);
+            let reach = kept_gap(corners.map(|v| touches[v].pressure), epsilons);
             let nearest = corners.map(|v| self.distances[v]).into_iter();
             let at = triangle.map(place);
             let edge = (at[0] - at[1]).norm().max((at[2] - at[1]).norm());
@@ -215,7 +215,7 @@ impl Contacts {
         }
         for spot in &self.spots {
             let of = |v: u32| {
-                let slot = &self.slots[self.slot_of[v as usize] as usize];
+                let slot = &self.slots[self.slot(v)];
                 slot.multiplier.dot(&slot.normal) / slot.area
             };
             let pressure = (spot.mean(of) - spot.stiffness * spot.gap).max(0.0);

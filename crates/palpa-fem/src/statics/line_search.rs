@@ -3,9 +3,11 @@
 use palpa_mesh::Vec3;
 
 use super::constraints::Imbalance;
+use super::contacts::{Slot, move_multipliers};
 use super::newton::Newton;
 use super::workspace::Workspace;
 use crate::assembly::{Inverted, energy};
+use crate::contact::Touch;
 use crate::state::State;
 
 /// Number of halvings after which a Newton step has failed.
@@ -15,8 +17,8 @@ const GROWTH: f64 = 1.000_1;
 
 impl Newton<'_> {
     /// Moves along the step as far as no prism inverts and the imbalance does not grow, or without
-    /// contact the energy falls. If it grows anyhow, takes the share with the least. Displacements that are still prescribed must be
-    /// reached, whatever the forces.
+    /// contact the energy falls. If it grows anyhow, takes the share with the least. Displacements that
+    /// are still prescribed must be reached, whatever the forces.
     pub(super) fn search(
         &mut self,
         state: &mut State,
@@ -62,15 +64,15 @@ impl Newton<'_> {
         &mut self,
         state: &mut State,
         ws: &mut Workspace,
-        (start, touches): (&[Vec3], &[crate::contact::Touch]),
-        (slots, multipliers): (&[super::contacts::Slot], &[Vec3]),
+        (start, touches): (&[Vec3], &[Touch]),
+        (slots, multipliers): (&[Slot], &[Vec3]),
         share: f64,
     ) -> Result<f64, Inverted> {
         for ((u, start), delta) in state.displacements.iter_mut().zip(start).zip(&ws.delta) {
             *u = start + delta * share;
         }
         state.touches.copy_from_slice(touches);
-        super::contacts::move_multipliers(slots, multipliers, share, &mut state.touches);
+        move_multipliers(slots, multipliers, share, &mut state.touches);
         (ws.assembler).forces(self.model, &ws.memory, &state.displacements, &mut ws.forces)?;
         self.add_loads(state, ws, false);
         self.touch(state, ws);

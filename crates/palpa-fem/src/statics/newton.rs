@@ -50,8 +50,7 @@ fn equilibrate_in_pool(
     let outcome = newton.run(state, ws);
     if outcome == Outcome::Converged {
         ws.memory.commit(model, state);
-        let Workspace { contacts, .. } = ws;
-        contacts.end(model, &state.displacements, load.tools, &mut state.touches);
+        (ws.contacts).end(model, &state.displacements, load.tools, &mut state.touches);
         if let Some(inertia) = &newton.inertia {
             inertia.commit(state);
         }

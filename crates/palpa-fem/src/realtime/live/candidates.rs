@@ -6,7 +6,7 @@ use palpa_mesh::Vec3;
 use super::super::candidate::{Candidate, Point};
 use super::super::{MOST_CANDIDATES, MOST_POINTS};
 use super::Live;
-use crate::contact::{Fineness, Spot, anchor_at, nearest_tool, spots_of};
+use crate::contact::{Fineness, Spot, anchor_at, kept_gap, nearest_tool, spots_of};
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 
@@ -174,8 +174,7 @@ impl Live {
             let epsilons = corners.map(|v| model.skin_stiffness.normal[v]);
             let pressures = corners.map(|v| self.skin.pressures[v]);
             let largest = pressures.into_iter().fold(0.0, f64::max);
-            let softest = epsilons.into_iter().fold(f64::INFINITY, f64::min);
-            let kept = reach + largest / softest.max(f64::MIN_POSITIVE);
+            let kept = reach + kept_gap(pressures, epsilons);
             // No point of a triangle is nearer than its nearest corner by more than an edge.
             clearance = clearance
                 .min((least - 0.6 * edge).max(0.0))
