@@ -38,6 +38,8 @@ pub(super) struct Candidate {
     pub(super) is_anchored: bool,
     /// Whether it slides.
     pub(super) is_sliding: bool,
+    /// Whether it is outside the zone.
+    pub(super) is_far: bool,
     /// Its place at the start of the step, m.
     pub(super) origin: Vec3,
     /// Displacement of the iteration, m: first with the forces of the start, then with those found.

@@ -2,15 +2,16 @@
 
 use palpa_mesh::Vec3;
 use palpa_sparse::fronts::{
-    Compliance, FactorScratch, Half, Push, SolveScratch, Zone, back_substitute, substitute,
+    Compliance, FactorScratch, FarCompliance, Half, Push, SolveScratch, Zone, back_substitute,
+    substitute,
 };
 use palpa_sparse::{Block, ColumnPattern};
 
-use super::MOST_CANDIDATES;
 use super::candidate::Candidate;
 use super::contact_problem::ContactProblem;
 use super::outside::Outside;
 use super::plan::{Plan, Trouble};
+use super::{MOST_CANDIDATES, MOST_FAR};
 use crate::batch::{Batches, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
@@ -28,8 +29,9 @@ pub(super) struct Inside {
     blocks: Vec<Block<f32>>,
     factor: Zone<f32>,
     scratch: FactorScratch<f32>,
-    solve: SolveScratch<f32>,
+    pub(super) solve: SolveScratch<f32>,
     compliance: Compliance<f32>,
+    far: FarCompliance<f32>,
     pushes: Vec<Push<f32>>,
     w: Vec<f32>,
     moves: Vec<f32>,
@@ -57,6 +59,7 @@ impl Inside {
             scratch: FactorScratch::new(tree, Half::Zone),
             solve: SolveScratch::new(tree),
             compliance: Compliance::new(tree, most),
+            far: FarCompliance::new(tree, 3 * MOST_FAR),
             pushes: Vec::with_capacity(most),
             w: vec![0.0; most * most],
             moves: vec![0.0; most],
@@ -177,7 +180,7 @@ impl Inside {
     }
 
     /// Fills in the compliance of a contact problem.
-    pub(super) fn comply(&mut self, plan: &Plan, problem: &mut ContactProblem) {
+    pub(super) fn comply(&mut self, plan: &Plan, outside: &Outside, problem: &mut ContactProblem) {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         self.pushes.clear();
         for candidate in &problem.candidates {
@@ -194,8 +197,17 @@ impl Inside {
             }));
         }
         let n = self.pushes.len();
-        self.compliance
-            .compute(&plan.tree, &self.factor, &self.pushes, &mut self.w[..n * n]);
+        let has_far = problem.candidates.iter().any(|c| c.is_far);
+        if has_far {
+            self.far.compute(&plan.tree, &outside.factor, &self.pushes);
+        }
+        self.compliance.compute(
+            &plan.tree,
+            &self.factor,
+            has_far.then_some(&self.far),
+            &self.pushes,
+            &mut self.w[..n * n],
+        );
         for (out, w) in problem.compliance.iter_mut().zip(&self.w[..n * n]) {
             *out = f64::from(*w);
         }

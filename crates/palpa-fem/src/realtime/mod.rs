@@ -34,5 +34,7 @@ pub use local::{LocalContact, LocalModel, LocalTool};
 
 /// Largest number of contact candidates.
 pub const MOST_CANDIDATES: usize = 400;
+/// Largest number of contact candidates outside the zone.
+const MOST_FAR: usize = 24;
 /// Points of the skin that there is memory for.
 const MOST_POINTS: usize = 8192;

@@ -67,13 +67,18 @@ impl Outside {
     }
 
     /// Updates the displacements of the exterior to follow those of the ring; `only` those of some
-    /// columns, given with the fronts above them. Cost: a substitution through the exterior, or
-    /// through those fronts.
+    /// columns, given with the fronts above them; under a `load` on the exterior (see
+    /// [`Self::take_load`]). Cost: a substitution through the exterior, or through those fronts.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a model, its zone, what is wanted, and arrays to work in"
+    )]
     pub(super) fn settle(
         &self,
         model: &Model,
         plan: &Plan,
         only: Option<(&[u32], &[bool])>,
+        load: Option<&[f32]>,
         displacements: &mut [Vec3],
         x: &mut [f32],
         scratch: &mut SolveScratch<f32>,
@@ -83,6 +88,9 @@ impl Outside {
         }
         let n = plan.tree.first_zone_dof();
         x[..n].copy_from_slice(&self.right[..n]);
+        if let Some(load) = load {
+            x[..n].iter_mut().zip(load).for_each(|(x, load)| *x += load);
+        }
         x[n..].fill(0.0);
         for &[node, dof] in &plan.ring {
             let change = displacements[node as usize] - self.at[node as usize];
@@ -105,6 +113,24 @@ impl Outside {
             }),
             None => (plan.exterior.iter()).for_each(|&[n, dof]| put(n as usize, dof as usize)),
         }
+    }
+
+    /// Forces on nodes of the exterior (N, with the first unknown of each), as a right side after
+    /// elimination: on the exterior itself, and what is left on the ring. Cost: a substitution.
+    pub(super) fn take_load(
+        &self,
+        plan: &Plan,
+        forces: impl Iterator<Item = (usize, Vec3)>,
+        load: &mut [f32],
+        scratch: &mut SolveScratch<f32>,
+    ) {
+        load.fill(0.0);
+        for (dof, force) in forces {
+            for c in 0..3 {
+                load[dof + c] += force[c] as f32;
+            }
+        }
+        substitute(&plan.tree, Half::Exterior, &self.factor, load, scratch);
     }
 
     /// Assembles and factors the exterior's stiffness at these displacements, and linearises about

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use palpa_fem::law::NeoHookean;
-use palpa_fem::realtime::{Live, LiveParams, LocalModel, StepOutcome};
+use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LocalModel, StepOutcome};
 use palpa_fem::shape::{FlatPunch, Pose, Shape, Sphere, Tool};
 use palpa_fem::{
     Load, Material, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State,
@@ -166,6 +166,69 @@ fn a_second_tool_far_away_presses_too() {
         left > 0.05 && (right / left - 1.0).abs() < 0.05,
         "{left} {right}"
     );
+}
+
+/// A tool that comes down outside the zone is felt before any background job is done, and without a
+/// jump when the zone has come.
+#[test]
+fn a_touch_outside_the_zone_is_felt_at_once() {
+    let model = gel(3e-3, 30e-3, None);
+    let params = LiveParams {
+        zone_radius: 9e-3,
+        exterior: ExteriorMode::Linear,
+        ..LiveParams::default()
+    };
+    for friction in [0.0, 0.4] {
+        let tool = sphere(friction);
+        let depths = [1e-3, 2e-3, 3e-3, 4e-3];
+        let expected = forces(&model, tool, &depths.map(|depth| [15e-3, depth]));
+        let mut live = Live::new(Arc::clone(&model), &[at(tool, -15e-3, -5e-3)], params).unwrap();
+        let step = |live: &mut Live, x: f64, depth: f64| {
+            let report = live.step(&[at(tool, x, depth)], 0.002);
+            (report, live.tool_force(0))
+        };
+        for k in 0..=20 {
+            let (report, _) = step(&mut live, -15e-3 + 1.5e-3 * f64::from(k), -5e-3);
+            assert_eq!((report.outcome, report.n_far), (StepOutcome::Arrived, 0));
+        }
+        let (mut before, mut last) = (0.0, Vec3::zeros());
+        for k in -49..=40 {
+            let depth = 0.1e-3 * f64::from(k);
+            let (report, force) = step(&mut live, 15e-3, depth);
+            assert_eq!(report.outcome, StepOutcome::Arrived, "{depth}: {report:?}");
+            if depth > 0.1e-3 {
+                assert!(report.n_far > 0 && force.z > before, "{depth}: {force}");
+            }
+            before = force.z;
+            if let Some(i) = depths.iter().position(|d| (d - depth).abs() < 1e-9) {
+                let error = force.z / expected[i].z - 1.0;
+                println!("{friction}, {depth}: {force} {} {error:.3}", expected[i]);
+                assert!(error.abs() < 0.3, "{depth}: {error}");
+            }
+        }
+        // One job may be from the way there; then the zone comes.
+        let mut largest = 0.0_f64;
+        for k in 0..20 {
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+            let (report, force) = step(&mut live, 15e-3, 4e-3);
+            // The zone follows the tool to its depth in two steps.
+            let is_there = report.outcome == StepOutcome::Arrived;
+            assert!(
+                is_there || (k < 4 && report.outcome == StepOutcome::Behind),
+                "{k}: {report:?}"
+            );
+            assert!(report.n_far == 0 || k < 2, "{k}: {report:?}");
+            largest = largest.max(force.z);
+            last = force;
+        }
+        assert!(largest < 1.1 * expected[3].z, "{largest}");
+        let error = (last - expected[3]).norm() / expected[3].norm();
+        // Friction remembers that the last part of the way there was one step.
+        let bound = if friction > 0.0 { 0.04 } else { 0.01 };
+        assert!(error < bound, "{last} {}", expected[3]);
+    }
 }
 
 /// A step that fails leaves no trace in friction: the last good state has its own anchors.

@@ -19,7 +19,7 @@ mod factor;
 mod solve;
 mod tree;
 
-pub use compliance::{Compliance, Push};
+pub use compliance::{Compliance, FarCompliance, Push};
 pub use factor::{Exterior, FactorScratch, Zone, least_pivot};
 pub use solve::{SolveScratch, back_substitute, back_substitute_to, fronts_above, substitute};
 pub use tree::{Half, Tree};

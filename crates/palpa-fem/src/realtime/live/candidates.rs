@@ -4,7 +4,7 @@
 use palpa_mesh::Vec3;
 
 use super::super::candidate::{Candidate, Point};
-use super::super::{MOST_CANDIDATES, MOST_POINTS};
+use super::super::{MOST_CANDIDATES, MOST_FAR, MOST_POINTS};
 use super::Live;
 use crate::contact::{Fineness, Spot, anchor_at, kept_gap, nearest_tool, spots_of};
 use crate::model::Model;
@@ -61,6 +61,13 @@ impl SkinForces {
         self.is_sliding[v] = from.is_sliding[v];
     }
 
+    /// Multiplies the forces on a vertex.
+    pub(super) fn scale(&mut self, v: usize, by: f64) {
+        self.pushes[v] *= by;
+        self.pressures[v] *= by;
+        self.frictions[v] *= by;
+    }
+
     /// Removes the forces on a vertex.
     pub(super) fn clear(&mut self, v: usize) {
         self.pushes[v] = Vec3::zeros();
@@ -92,9 +99,9 @@ struct Near {
 /// Scratch of the search.
 #[derive(Debug)]
 pub(super) struct Search {
-    /// Places of the zone's vertices, m, and their distances from the tools, m. `[n_vertices]`
-    places: Vec<Vec3>,
-    distances: Vec<f64>,
+    /// Places of the zone's vertices and of those near tools beyond it, m, and their distances from the tools, m. `[n_vertices]`
+    pub(super) places: Vec<Vec3>,
+    pub(super) distances: Vec<f64>,
     /// Places at the start of the step, m. `[n_vertices]`
     pub(super) origins: Vec<Vec3>,
     spots: Vec<Spot>,
@@ -126,14 +133,14 @@ impl Search {
 impl Live {
     /// Notes where the skin is at the start of a step.
     pub(super) fn note_origins(&mut self) {
-        for &v in &self.plan.vertices {
-            let node = self.model.body.node(v as usize, 0);
-            let place = self.model.body.positions[node] + self.state.displacements[node];
-            self.search.origins[v as usize] = place;
+        for v in 0..self.model.body.n_vertices() {
+            let node = self.model.body.node(v, 0);
+            self.search.origins[v] =
+                self.model.body.positions[node] + self.state.displacements[node];
         }
     }
 
-    /// Finds the triangles of the zone that press or are near a tool, with their vertices, and the
+    /// Finds the triangles that press or are near a tool, with their vertices, and the
     /// tools' clearance. The candidates are sorted by vertex.
     pub(super) fn find_candidates(&mut self, dt: f64) {
         let reach = (FASTEST * 2.0 * dt).clamp(LEAST_REACH, self.params.reach);
@@ -163,8 +170,8 @@ impl Live {
         let fineness = Fineness::of(tools);
         search.spots.clear();
         search.near.clear();
-        let mut clearance = f64::INFINITY;
-        for &t in &self.plan.triangles {
+        let mut clearance = self.beyond.clearance;
+        for &t in self.plan.triangles.iter().chain(&self.beyond.triangles) {
             let triangle = model.body.skin.triangles[t as usize];
             let corners = triangle.map(|v| v as usize);
             let at = corners.map(|v| search.places[v]);
@@ -226,15 +233,17 @@ impl Live {
         search
             .near
             .sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap).then(a.triangle.cmp(&b.triangle)));
-        let mut n_pressing = 0;
+        let (mut n_pressing, mut n_far) = (0, 0);
         let mut chosen = 0;
+        let is_inside = &self.plan.is_inside;
         for k in 0..search.near.len() {
             let near = search.near[k];
             let vertices = model.body.skin.triangles[near.triangle as usize];
             let new = vertices
                 .iter()
                 .filter(|&&v| search.candidate_of[v as usize] == NONE);
-            let n = problem.candidates.len() + new.count();
+            let n = problem.candidates.len() + new.clone().count();
+            let more_far = new.filter(|&&v| !is_inside[v as usize]).count();
             let is_pressing =
                 near.gap < 0.0 || vertices.iter().any(|&v| skin.pressures[v as usize] > 0.0);
             let most = if is_pressing {
@@ -242,17 +251,23 @@ impl Live {
             } else {
                 (n_pressing + MOST_NEAR).clamp(LEAST_CANDIDATES, MOST_CANDIDATES)
             };
-            if n > most {
+            if n > most || n_far + more_far > MOST_FAR {
                 search.n_left_out += usize::from(is_pressing);
                 continue;
             }
             for v in vertices {
                 if search.candidate_of[v as usize] == NONE {
                     search.candidate_of[v as usize] = 0;
+                    let is_far = !is_inside[v as usize];
                     let candidate = skin.candidate(v, model, &self.course.tools, search);
+                    let candidate = candidate.map(|candidate| Candidate {
+                        is_far,
+                        ..candidate
+                    });
                     problem.candidates.extend(candidate);
                 }
             }
+            n_far += more_far;
             if is_pressing {
                 n_pressing = problem.candidates.len();
             }
@@ -273,9 +288,9 @@ impl Live {
                 });
             }
         }
-        for &v in &self.plan.vertices {
-            if search.candidate_of[v as usize] == NONE && skin.pushes[v as usize] != Vec3::zeros() {
-                skin.clear(v as usize);
+        for v in 0..search.candidate_of.len() {
+            if search.candidate_of[v] == NONE && skin.pushes[v] != Vec3::zeros() {
+                skin.clear(v);
             }
         }
         for candidate in &problem.candidates {
@@ -365,6 +380,12 @@ impl Live {
             skin.pushes[v] = push;
             skin.pressures[v] = candidate.pressure / candidate.area;
             skin.frictions[v] = candidate.friction;
+            if candidate.is_far {
+                // The exterior follows at the next iteration.
+                let node = self.model.body.node(v, 0);
+                let place = candidate.start + candidate.displacement * share;
+                self.state.displacements[node] = place - self.model.body.positions[node];
+            }
         }
     }
 
@@ -426,6 +447,7 @@ impl SkinForces {
             },
             is_anchored,
             is_sliding: self.is_sliding[v],
+            is_far: false,
             origin: search.origins[v],
             displacement: Vec3::zeros(),
         })

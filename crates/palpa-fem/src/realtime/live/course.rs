@@ -76,9 +76,7 @@ impl Live {
     /// The direction along the skin in which tools are not followed, because pressed vertices have
     /// reached the edge of the zone, beyond which there are no candidates. `None` if there is room.
     fn held_direction(&self) -> Option<Vec3> {
-        if self.plan.exterior.is_empty()
-            || self.contact_radius(&self.plan.centres) < EDGE * self.plan.radius
-        {
+        if self.plan.exterior.is_empty() || self.radius_inside() < EDGE * self.plan.radius {
             return None;
         }
         // The tool that has gone farthest out.

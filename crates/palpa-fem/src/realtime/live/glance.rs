@@ -20,6 +20,8 @@ pub struct Glance {
     /// The exterior that determines the displacements outside the zone; `None` if those are up to
     /// date.
     exterior: Option<(Arc<Plan>, Arc<Outside>)>,
+    /// The load on that exterior; empty for none.
+    load: Vec<f32>,
     displacements: Vec<Vec3>,
 }
 
@@ -36,7 +38,8 @@ impl Glance {
             let mut scratch = SolveScratch::new(&plan.tree);
             let mut x = vec![0.0; self.model.structure.n_dofs()];
             let into = &mut displacements;
-            outside.settle(&self.model, plan, None, into, &mut x, &mut scratch);
+            let load = (!self.load.is_empty()).then_some(&*self.load);
+            outside.settle(&self.model, plan, None, load, into, &mut x, &mut scratch);
         }
         displacements
     }
@@ -46,13 +49,17 @@ impl Live {
     /// Copies the displacements, reusing the memory of an older copy if given. Cost: a copy of the
     /// displacements.
     pub fn glance(&self, old: Option<Glance>) -> Glance {
-        let mut displacements = old.map_or_else(Vec::new, |old| old.displacements);
+        let (mut displacements, mut load) =
+            old.map_or_else(Default::default, |old| (old.displacements, old.load));
         displacements.clear();
         displacements.extend_from_slice(&self.state.displacements);
+        load.clear();
+        load.extend_from_slice(self.beyond.load().unwrap_or(&[]));
         Glance {
             model: Arc::clone(&self.model),
             exterior: (self.exterior.origin(&self.outside))
                 .map(|outside| (Arc::clone(&self.plan), outside)),
+            load,
             displacements,
         }
     }

@@ -75,6 +75,7 @@ impl Live {
     ) -> Result<(), Trouble> {
         let plan = Arc::clone(&self.plan);
         self.evaluate_forces(pass)?;
+        self.look_outside(pass);
         if pass == Pass::Near {
             self.measure_gaps();
         } else {
@@ -90,7 +91,7 @@ impl Live {
         let x = &mut self.ws.x;
         self.inside.substitute(&plan, x);
         if pass != Pass::Near {
-            self.inside.comply(&plan, &mut self.problem);
+            self.inside.comply(&plan, &self.outside, &mut self.problem);
         }
         self.inside.project(&plan, x, &mut self.problem);
         self.problem.solve(&self.course.tools);
@@ -100,6 +101,7 @@ impl Live {
         self.accept_contact(share);
         report.n_candidates = self.problem.candidates.len();
         report.n_left_out = self.search.n_left_out;
+        report.n_far = self.problem.pressing().filter(|c| c.is_far).count();
         report.is_contact_settled = self.problem.is_settled;
         report.n_active = self.problem.pressing().count();
         report.residual = self.residual();
@@ -177,7 +179,7 @@ impl Live {
                 x[dof as usize + c] = force[c] as f32;
             }
         }
-        for candidate in &self.problem.candidates {
+        for candidate in self.problem.candidates.iter().filter(|c| !c.is_far) {
             let vertex = candidate.vertex as usize;
             let force = candidate.force();
             let dof = self.plan.tree.first_dof(vertex);
@@ -190,6 +192,11 @@ impl Live {
         let displacements = &self.state.displacements;
         self.outside
             .push(&self.plan, displacements, x, &mut self.ws.moves);
+        if let Some(load) = self.beyond.load() {
+            let ring = x.len() - 3 * self.plan.ring.len();
+            let pairs = x[ring..].iter_mut().zip(&load[ring..]);
+            pairs.for_each(|(x, load)| *x += load);
+        }
     }
 
     /// Residual of the zone without its ring: unbalanced forces relative to the tools' force.

@@ -314,12 +314,16 @@ impl Live {
             (inside, follower) = (Some(zone.inside), zone.follower);
             room.retired.entering = zone.entering;
         }
+        if was_linear && inside.is_some() {
+            self.ease_beyond();
+        }
         if let (true, Some(entering)) = (was_linear, &mut room.retired.entering) {
             // Columns that enter the zone start at their positions in the old exterior.
             self.outside.settle(
                 &self.model,
                 &self.plan,
                 Some((&entering.columns, &entering.fronts)),
+                self.beyond.load(),
                 &mut self.state.displacements,
                 &mut self.ws.moves,
                 &mut entering.scratch,

@@ -11,6 +11,7 @@
 //! | `course` | how far the tools may go in a step |
 //! | `pressed` | where the tools press, how deep and how wide |
 //! | `exterior` | the body outside the zone |
+//! | `beyond` | contact outside the zone |
 //! | `rest` | the body at rest |
 //! | `recovery` | the last good state, the way back to it, and the start again at rest |
 //! | `rebuild` | a job for the background: a new zone, or a new factor of the exterior |
@@ -29,6 +30,7 @@
 //! Verdict        Good, Rough or Lost: how a step is judged, and so how fast the next may go
 //! ```
 
+mod beyond;
 mod candidates;
 mod carry;
 mod course;
@@ -62,6 +64,7 @@ use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 use crate::state::{Memory, State};
+use beyond::Beyond;
 use candidates::{Search, SkinForces};
 use carry::Come;
 use course::Course;
@@ -109,6 +112,7 @@ pub struct Live {
     /// The contact candidates with their forces, and the compliance used to find them.
     problem: ContactProblem,
     search: Search,
+    beyond: Beyond,
     ws: Scratch,
 }
 
@@ -215,6 +219,7 @@ impl Live {
             jobs: Jobs::new(&model, room, kept, n_before, n_zones),
             problem: ContactProblem::new(),
             search: Search::new(&model),
+            beyond: Beyond::new(&model, tools.len()),
             ws: Scratch::new(&model),
             model,
             pattern,

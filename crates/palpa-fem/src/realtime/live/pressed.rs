@@ -53,6 +53,22 @@ impl Live {
             .fold(0.0, f64::max)
     }
 
+    /// As [`Self::contact_radius`] in the present zone, without vertices outside it.
+    pub(super) fn radius_inside(&self) -> f64 {
+        let points = &self.model.body.skin.points;
+        let pressing = self.problem.pressing();
+        let pressing = pressing.filter(|c| self.plan.is_inside[c.vertex as usize]);
+        pressing
+            .map(|c| {
+                (
+                    points[c.vertex as usize],
+                    self.plan.centres.of(c.tool as usize),
+                )
+            })
+            .map(|(point, centre)| (point - centre).norm())
+            .fold(0.0, f64::max)
+    }
+
     /// Largest distance of a vertex that presses from its place at rest, m.
     pub(super) fn depth(&self) -> f64 {
         self.problem

@@ -265,6 +265,7 @@ impl Rebuild {
             &self.model,
             &self.plan,
             None,
+            None,
             displacements,
             x,
             &mut scratch,

@@ -68,8 +68,8 @@ impl Live {
                 good.displacements[node as usize] = self.state.displacements[node as usize];
             }
         }
-        for &v in &self.plan.vertices {
-            good.skin.copy(v as usize, &self.skin);
+        for v in 0..self.model.body.n_vertices() {
+            good.skin.copy(v, &self.skin);
         }
         good.tools.copy_from_slice(&self.course.tools);
     }
@@ -98,8 +98,8 @@ impl Live {
                 self.state.displacements[node as usize] = good.displacements[node as usize];
             }
         }
-        for &v in &self.plan.vertices {
-            self.skin.copy(v as usize, &good.skin);
+        for v in 0..self.model.body.n_vertices() {
+            self.skin.copy(v, &good.skin);
         }
         self.course.tools.copy_from_slice(&good.tools);
         self.course.clearance = 0.0;

@@ -35,6 +35,9 @@ pub struct LiveReport {
     /// Number of triangles under a tool for which there was no room among the candidates: they bear
     /// nothing, so the force is too small.
     pub n_left_out: usize,
+    /// Number of pressing vertices outside the zone, where the stiffness is that of an earlier moment
+    /// and the body answers linearly.
+    pub n_far: usize,
     /// Whether the contact forces satisfy the law of contact.
     pub is_contact_settled: bool,
     /// Shift of the diagonal that the zone's stiffness needed, as a share of the diagonal.

@@ -219,15 +219,21 @@ impl Moved {
     /// Continues from the present state of the old mesh.
     fn take_over(self, old: &mut Live) -> Box<Live> {
         old.take_back_job();
+        old.ease_beyond();
         old.settle();
         let mut live = self.live;
         let (now, then) = (&old.state.displacements, &self.then.state.displacements);
         let plan = Arc::clone(&live.plan);
         let model = Arc::clone(&live.model);
         let is_followed = live.exterior.is_followed();
-        let is_moved = |v: usize| is_followed || plan.is_inside[v];
-        for v in (0..model.body.n_vertices()).filter(|&v| is_moved(v)) {
-            for l in 0..model.structure.n_free_levels {
+        for v in 0..model.body.n_vertices() {
+            // Displacements outside the zone follow from the exterior's.
+            let n_moved = if is_followed || plan.is_inside[v] {
+                model.structure.n_free_levels
+            } else {
+                0
+            };
+            for l in 0..n_moved {
                 let by = |u: &[Vec3]| self.carry.displacement(v, l, &model, u);
                 live.state.displacements[model.body.node(v, l)] += by(now) - by(then);
             }
@@ -333,11 +339,12 @@ impl Roaming {
         [self.n_meshes, self.n_failed]
     }
 
-    /// See [`Live::step`]. If the tools press outside the fine part of the mesh, the outcome is
-    /// "behind".
+    /// See [`Live::step`]. If the tools press outside the zone or the fine part of the mesh, the
+    /// outcome is "behind".
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.live.step(tools, dt);
-        if report.outcome == StepOutcome::Arrived && self.is_beyond() {
+        let is_beyond = report.n_far > 0 || self.is_beyond();
+        if report.outcome == StepOutcome::Arrived && is_beyond {
             report.outcome = StepOutcome::Behind;
         }
         report
@@ -373,6 +380,10 @@ impl Roaming {
     }
 
     fn ask(&mut self) -> Option<Kind> {
+        if self.live.presses_beyond() {
+            // The zone comes first: the body there is far from equilibrium.
+            return None;
+        }
         let bodies = Arc::clone(self.bodies.as_ref()?);
         if let Some((place, new)) = self.next.take() {
             self.live.take_back_job();

@@ -85,14 +85,15 @@ impl Live {
             plan,
             &self.state.displacements,
         )?;
-        let pressed = self.problem.pressing().map(|c| c.vertex);
+        let pressed = self.problem.pressing().filter(|c| !c.is_far);
+        let pressed = pressed.map(|c| c.vertex);
         let size = inside.skin_stiffness(pattern, pressed);
         let mut was_eased = springs.ease();
         let (mut there, usual) = (0.0, springs.share);
         loop {
             let stiffness = springs.share * size;
             for candidate in &mut self.problem.candidates {
-                candidate.support = if candidate.pressure > 0.0 {
+                candidate.support = if candidate.pressure > 0.0 && !candidate.is_far {
                     stiffness
                 } else {
                     0.0

@@ -85,6 +85,7 @@ impl Live {
             n_active: 0,
             n_candidates: 0,
             n_left_out: 0,
+            n_far: 0,
             is_contact_settled: true,
             shift: 0.0,
             spring: 0.0,

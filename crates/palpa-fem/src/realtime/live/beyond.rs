@@ -1,0 +1,208 @@
+//! Contact outside the zone. A tool that comes down there is felt at once, on the linear answer of
+//! the exterior, until the background has made a zone for it.
+//!
+//! The forces on the exterior are a *load* on it. They act on its last linearisation, so nothing of
+//! them is lost when the background makes another one, and columns that enter a zone start where the
+//! load has moved them.
+
+use palpa_mesh::Vec3;
+
+use super::Live;
+use super::iteration::Pass;
+use crate::contact::kept_gap;
+use crate::model::Model;
+
+/// Deepest indentation from which the linear answer is taken up as the state of a zone, m. Tissue
+/// indented more deeply than that is too far from equilibrium.
+const MOST_TAKEN_UP: f64 = 1.5e-3;
+
+/// Contact outside the zone.
+#[derive(Debug)]
+pub(super) struct Beyond {
+    /// Forces of the tools on the exterior after elimination, on the exterior and on the ring, N.
+    /// `[n_dofs]`
+    load: Vec<f32>,
+    has_load: bool,
+    /// Triangles outside the zone near a tool that does not press within it.
+    pub(super) triangles: Vec<u32>,
+    /// Least gap between such a tool and the skin outside the zone, m.
+    pub(super) clearance: f64,
+    /// Whether a tool may touch outside the zone: it presses there, or nowhere. `[n_tools]`
+    may_touch: Vec<bool>,
+    /// Distances of the skin from these tools, m. `[n_vertices]`
+    distances: Vec<f64>,
+}
+
+impl Beyond {
+    pub(super) fn new(model: &Model, n_tools: usize) -> Self {
+        Self {
+            load: vec![0.0; model.structure.n_dofs()],
+            has_load: false,
+            triangles: Vec::with_capacity(model.body.skin.triangles.len()),
+            clearance: f64::INFINITY,
+            may_touch: vec![false; n_tools],
+            distances: vec![f64::INFINITY; model.body.n_vertices()],
+        }
+    }
+
+    /// The load on the exterior, if any.
+    pub(super) fn load(&self) -> Option<&[f32]> {
+        self.has_load.then_some(&*self.load)
+    }
+}
+
+impl Live {
+    /// Finds the triangles outside the zone that a tool may touch, and brings the exterior to
+    /// equilibrium with the ring and the tools if there are any. Cost: distances of the tools from
+    /// the skin; near the skin, two substitutions through the exterior.
+    pub(super) fn look_outside(&mut self, pass: Pass) {
+        if self.plan.exterior.is_empty() || !self.exterior.answers_linearly() {
+            self.beyond.has_load = false;
+            self.beyond.triangles.clear();
+            self.beyond.clearance = f64::INFINITY;
+            return;
+        }
+        self.load_exterior();
+        if pass == Pass::Near {
+            if !self.beyond.triangles.is_empty() {
+                self.settle_in_step();
+            }
+            return;
+        }
+        if self.beyond.has_load {
+            self.settle_in_step();
+        }
+        self.find_tools();
+        self.find_triangles(self.beyond.has_load);
+        if !self.beyond.triangles.is_empty() && !self.beyond.has_load {
+            self.settle_in_step();
+            self.find_triangles(true);
+        }
+    }
+
+    /// Takes the contact forces outside the zone as the load on the exterior.
+    pub(super) fn load_exterior(&mut self) {
+        let (plan, model, skin) = (&*self.plan, &*self.model, &self.skin);
+        let outside = (0..model.body.n_vertices()).filter(|&v| !plan.is_inside[v]);
+        let forces = outside.map(|v| (v, skin.pushes[v] + skin.frictions[v]));
+        let forces = forces.filter(|(_, force)| *force != Vec3::zeros());
+        self.beyond.has_load = forces.clone().next().is_some();
+        if self.beyond.has_load {
+            let hold = |v: usize| &model.supports[model.body.node(v, 0)];
+            let forces =
+                forces.map(|(v, force)| (plan.tree.first_dof(v), hold(v).free_part(&force)));
+            let (load, scratch) = (&mut self.beyond.load, &mut self.inside.solve);
+            self.outside.take_load(plan, forces, load, scratch);
+        }
+    }
+
+    /// Whether tools press outside the zone.
+    pub(super) fn presses_beyond(&self) -> bool {
+        self.beyond.has_load
+    }
+
+    /// Takes back tools that press deep outside the zone, with a share of their forces: the tissue
+    /// there becomes part of a zone, which follows them from that depth.
+    pub(super) fn ease_beyond(&mut self) {
+        self.load_exterior();
+        if !self.beyond.has_load {
+            return;
+        }
+        for t in 0..self.course.tools.len() {
+            let (model, plan, at) = (&*self.model, &*self.plan, &self.outside.at);
+            let displacements = &self.state.displacements;
+            let pressing = self.problem.candidates.iter().filter(|c| c.pressure > 0.0);
+            let far =
+                pressing.filter(|c| c.tool as usize == t && !plan.is_inside[c.vertex as usize]);
+            let (mut depth, mut along) = (0.0_f64, Vec3::zeros());
+            for candidate in far.clone() {
+                let node = model.body.node(candidate.vertex as usize, 0);
+                depth = depth.max((displacements[node] - at[node]).norm());
+                along += candidate.normal * candidate.pressure;
+            }
+            if depth <= MOST_TAKEN_UP {
+                continue;
+            }
+            let share = MOST_TAKEN_UP / depth;
+            for candidate in far {
+                self.skin.scale(candidate.vertex as usize, share);
+            }
+            let back = along.normalize() * (depth - MOST_TAKEN_UP);
+            self.course.tools[t].pose.translation.vector -= back;
+        }
+        self.course.clearance = 0.0;
+        self.load_exterior();
+    }
+
+    /// As [`Self::settle`], without memory.
+    fn settle_in_step(&mut self) {
+        self.outside.settle(
+            &self.model,
+            &self.plan,
+            None,
+            self.beyond.load(),
+            &mut self.state.displacements,
+            &mut self.ws.moves,
+            &mut self.inside.solve,
+        );
+    }
+
+    /// Finds the tools that press outside the zone or nowhere.
+    fn find_tools(&mut self) {
+        for (t, may_touch) in self.beyond.may_touch.iter_mut().enumerate() {
+            let pressed = self.problem.candidates.iter();
+            let pressed = pressed.filter(|c| c.tool as usize == t && c.pressure > 0.0);
+            let mut is_inside = pressed.map(|c| self.plan.is_inside[c.vertex as usize]);
+            let presses_outside = is_inside.clone().any(|inside| !inside);
+            *may_touch = presses_outside || !is_inside.any(|inside| inside);
+        }
+    }
+
+    /// Finds the triangles outside the zone near these tools. Whether the displacements of the
+    /// exterior `are_settled`: otherwise those of its last linearisation count.
+    fn find_triangles(&mut self, are_settled: bool) {
+        let (model, plan, search) = (&*self.model, &*self.plan, &mut self.search);
+        let beyond = &mut self.beyond;
+        beyond.triangles.clear();
+        beyond.clearance = f64::INFINITY;
+        if !beyond.may_touch.contains(&true) {
+            return;
+        }
+        let tools = self.course.tools.iter().zip(&beyond.may_touch);
+        let tools = tools.filter(|(_, may_touch)| **may_touch);
+        for v in 0..model.body.n_vertices() {
+            let node = model.body.node(v, 0);
+            let is_known = are_settled || plan.is_inside[v];
+            let from = if is_known {
+                &self.state.displacements
+            } else {
+                &self.outside.at
+            };
+            let place = model.body.positions[node] + from[node];
+            let distances = tools
+                .clone()
+                .map(|(tool, _)| tool.tool.distance_at(&tool.pose, &place).distance);
+            beyond.distances[v] = distances.fold(f64::INFINITY, f64::min);
+            search.places[v] = place;
+            search.distances[v] = beyond.distances[v];
+        }
+        for (t, triangle) in model.body.skin.triangles.iter().enumerate() {
+            let corners = triangle.map(|v| v as usize);
+            let is_held = |v: usize| model.supports[model.body.node(v, 0)].n == 3;
+            if corners.iter().all(|&v| plan.is_inside[v]) || corners.iter().all(|&v| is_held(v)) {
+                continue;
+            }
+            let distances = corners.map(|v| beyond.distances[v]);
+            let least = distances.into_iter().fold(f64::INFINITY, f64::min);
+            let at = corners.map(|v| search.places[v]);
+            let edge = (at[0] - at[1]).norm().max((at[2] - at[1]).norm());
+            let epsilons = corners.map(|v| model.skin_stiffness.normal[v]);
+            let kept = kept_gap(corners.map(|v| self.skin.pressures[v]), epsilons);
+            let clearance = (least - 0.6 * edge).max(0.0).min(least.max(0.0));
+            beyond.clearance = beyond.clearance.min(clearance);
+            if least <= self.params.reach + kept + edge {
+                beyond.triangles.push(t as u32);
+            }
+        }
+    }
+}
