@@ -16,6 +16,11 @@ pub(super) struct Candidate {
     /// Unit vector along which it is pressed: the mean of the tool's normals at the points that press
     /// in its triangles.
     pub(super) normal: Vec3,
+    /// The tool's normal at the vertex itself, across which friction acts.
+    pub(super) facing: Vec3,
+    /// Sum of the forces of its points over their resultant along `normal`, at least 1: it bounds
+    /// friction.
+    pub(super) spread: f64,
     /// Area that it stands for at rest, times the share of the pressure along `normal`, m².
     pub(super) area: f64,
     /// Least gap of the points of its triangles, less what the pressure there keeps pressed, m.
@@ -51,6 +56,16 @@ impl Candidate {
     /// Force of the tool on it, N.
     pub(super) fn force(&self) -> Vec3 {
         self.push() + self.friction
+    }
+
+    /// Largest friction for a coefficient, N.
+    pub(super) fn most_friction(&self, coefficient: f64) -> f64 {
+        coefficient * self.spread * self.pressure
+    }
+
+    /// A vector without its part along the tool's normal.
+    pub(super) fn across(&self, vector: &Vec3) -> Vec3 {
+        vector - self.facing * self.facing.dot(vector)
     }
 
     /// Divides a force of pressure (N) into that along the normal and the rest.

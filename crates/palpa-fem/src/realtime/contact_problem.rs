@@ -512,15 +512,14 @@ impl ContactProblem {
                     continue;
                 }
                 let PosedTool { tool, pose } = &tools[candidate.tool as usize];
-                let normal = candidate.normal;
+                let facing = candidate.facing;
                 let own = self.block(i, i);
-                let across = 0.5 * (own.trace() - normal.dot(&(own * normal)));
+                let across = 0.5 * (own.trace() - facing.dot(&(own * facing)));
                 let x = candidate.start + candidate.displacement;
                 let slip = x - (pose * nalgebra::Point3::from(candidate.anchor)).coords;
-                let slip = slip - normal * normal.dot(&slip);
-                let friction = candidate.friction - normal * normal.dot(&candidate.friction);
-                let friction = friction - slip / across;
-                let most = tool.friction_limit(candidate.is_sliding) * candidate.pressure;
+                let slip = candidate.across(&slip);
+                let friction = candidate.across(&candidate.friction) - slip / across;
+                let most = candidate.most_friction(tool.friction_limit(candidate.is_sliding));
                 let norm = friction.norm();
                 let friction = if norm > most {
                     friction * (most / norm)

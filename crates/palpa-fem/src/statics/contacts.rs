@@ -125,7 +125,6 @@ impl Contacts {
         (touches, origin): (&[Touch], &Origin),
     ) {
         self.find(model, displacements, tools, held, touches);
-        self.aim(touches, &origin.touches);
         self.press();
         for slot in &mut self.slots {
             let x = model.body.positions[slot.node] + displacements[slot.node];
@@ -200,25 +199,6 @@ impl Contacts {
                     let slot = Slot::new(model, v as usize, tools, &x, &touches[v as usize]);
                     self.slots.extend(slot);
                 }
-            }
-        }
-    }
-
-    /// Points the normals of the vertices along the forces of pressure that acted on them `before`
-    /// the solve, so that they do not change with the pressures in it.
-    fn aim(&mut self, touches: &[Touch], before: &[Touch]) {
-        for spot in &self.spots {
-            let pressure = spot.mean(|v| before[v as usize].pressure);
-            if pressure > 0.0 {
-                for (&v, share) in spot.vertices.iter().zip(&spot.shares) {
-                    let slot = &mut self.slots[self.slot_of[v as usize] as usize];
-                    slot.push += spot.normal * (share * spot.area * pressure);
-                }
-            }
-        }
-        for slot in &mut self.slots {
-            if let Some(normal) = slot.push.try_normalize(0.0) {
-                slot.turn_to(normal, &touches[slot.vertex]);
             }
         }
     }
@@ -426,29 +406,23 @@ impl Slot {
         let (nearest, _) = nearest_tool(tools, x)?;
         let tool = touch.tool().filter(|&t| t < tools.len()).unwrap_or(nearest);
         let normal = tools[tool].tool.distance_at(&tools[tool].pose, x).normal;
-        let mut slot = Self {
+        let area = model.skin_areas[vertex];
+        let friction = touch.friction - normal * normal.dot(&touch.friction);
+        Some(Self {
             node: model.body.node(vertex, 0),
             vertex,
             tool: tool as u32,
             normal,
             limit: 0.0,
-            multiplier: Vec3::zeros(),
+            multiplier: normal * (touch.pressure * area) + friction,
             push: Vec3::zeros(),
             pressing: 0.0,
             friction: Vec3::zeros(),
             anchor: Vec3::zeros(),
             grip: Grip::None,
-            area: model.skin_areas[vertex],
+            area,
             tangential: model.skin_stiffness.tangential[vertex],
-        };
-        slot.turn_to(normal, touch);
-        Some(slot)
-    }
-
-    /// Takes over a normal, and the multiplier of `touch`.
-    fn turn_to(&mut self, normal: Vec3, touch: &Touch) {
-        self.normal = normal;
-        self.multiplier = normal * (touch.pressure * self.area) + self.across(&touch.friction);
+        })
     }
 
     fn across(&self, vector: &Vec3) -> Vec3 {

@@ -15,6 +15,8 @@ use crate::model::Model;
 /// Deepest indentation from which the linear answer is taken up as the state of a zone, m. Tissue
 /// indented more deeply than that is too far from equilibrium.
 const MOST_TAKEN_UP: f64 = 1.5e-3;
+/// Pace at which deeper tools are followed from there, as a share of the longest move.
+const EASY_PACE: f64 = 0.125;
 
 /// Contact outside the zone.
 #[derive(Debug)]
@@ -101,7 +103,7 @@ impl Live {
         self.beyond.has_load
     }
 
-    /// Takes back tools that press deep outside the zone, with a share of their forces: the tissue
+    /// Takes back tools that press deep outside the zone, with a share of their pressure: the tissue
     /// there becomes part of a zone, which follows them from that depth.
     pub(super) fn ease_beyond(&mut self) {
         self.load_exterior();
@@ -125,10 +127,11 @@ impl Live {
             }
             let share = MOST_TAKEN_UP / depth;
             for candidate in far {
-                self.skin.scale(candidate.vertex as usize, share);
+                self.skin.ease(candidate.vertex as usize, share);
             }
             let back = along.normalize() * (depth - MOST_TAKEN_UP);
             self.course.tools[t].pose.translation.vector -= back;
+            self.recovery.pace = self.recovery.pace.min(EASY_PACE);
         }
         self.course.clearance = 0.0;
         self.load_exterior();

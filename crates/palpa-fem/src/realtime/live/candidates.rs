@@ -61,11 +61,13 @@ impl SkinForces {
         self.is_sliding[v] = from.is_sliding[v];
     }
 
-    /// Multiplies the forces on a vertex.
-    pub(super) fn scale(&mut self, v: usize, by: f64) {
+    /// Multiplies the pressure on a vertex, and lets it touch anew: without friction.
+    pub(super) fn ease(&mut self, v: usize, by: f64) {
         self.pushes[v] *= by;
         self.pressures[v] *= by;
-        self.frictions[v] *= by;
+        self.frictions[v] = Vec3::zeros();
+        self.is_anchored[v] = false;
+        self.is_sliding[v] = false;
     }
 
     /// Removes the forces on a vertex.
@@ -331,9 +333,9 @@ impl Live {
             if let Some(normal) = push.try_normalize(0.0) {
                 candidate.normal = normal;
                 candidate.area *= push.norm() / size;
+                candidate.spread = size / push.norm();
             }
-            let normal = candidate.normal;
-            candidate.friction -= normal * normal.dot(&candidate.friction);
+            candidate.friction = candidate.across(&candidate.friction);
             candidate.take_push(&self.skin.pushes[candidate.vertex as usize]);
         }
         for point in &mut problem.points {
@@ -400,7 +402,7 @@ impl Live {
                 continue;
             }
             let posed = &self.course.tools[candidate.tool as usize];
-            let most = posed.tool.friction_limit(candidate.is_sliding) * candidate.pressure;
+            let most = candidate.most_friction(posed.tool.friction_limit(candidate.is_sliding));
             let is_sliding = candidate.friction.norm() >= most * (1.0 - 1e-6);
             if is_sliding {
                 let node = self.model.body.node(v, 0);
@@ -426,12 +428,15 @@ impl SkinForces {
         let start = search.places[v];
         let (tool, _) = nearest_tool(tools, &start)?;
         let PosedTool { tool: shape, pose } = &tools[tool];
+        let facing = shape.distance_at(pose, &start).normal;
         let is_anchored = self.is_anchored[v];
         Some(Candidate {
             vertex,
             tool: tool as u32,
             start,
-            normal: shape.distance_at(pose, &start).normal,
+            normal: facing,
+            facing,
+            spread: 1.0,
             area: model.skin_areas[v],
             gap: f64::INFINITY,
             pressure: 0.0,
