@@ -41,12 +41,12 @@ fn a_reference_is_finer_than_the_mesh_of_the_loop_and_near_to_a_still_finer_one(
         let share = times * REFERENCE_SHARE;
         Reference::round(&live.prepared, at, share).unwrap()
     };
-    let [coarse, fine] = [2.0, 1.3].map(round);
+    let [coarse, fine] = [3.0, 2.0].map(round);
     assert!(fine.n_nodes() > coarse.n_nodes() && coarse.n_nodes() > own.n_nodes());
-    assert!(fine.mesh_size() < 0.6 * own.mesh_size());
+    assert!(fine.mesh_size() < 0.8 * own.mesh_size());
     let [own, coarse, fine] = [force(&own), force(&coarse), force(&fine)];
     println!("{own} {coarse} {fine} N");
-    assert!((coarse / fine - 1.0).abs() < 0.03, "{coarse} {fine}");
+    assert!((coarse / fine - 1.0).abs() < 0.05, "{coarse} {fine}");
     assert!((own / fine - 1.0).abs() < 0.2, "{own} {fine}");
 }
 
