@@ -23,6 +23,6 @@ mod spots;
 mod touch;
 
 pub(crate) use skin::SkinStiffness;
-pub(crate) use spots::{Fineness, Spot, kept_gap, nearest_tool, spots_of};
+pub(crate) use spots::{Fineness, Spot, edge_of, kept_gap, nearest_tool, spots_of};
 pub use touch::Touch;
 pub(crate) use touch::{anchor_at, first_touch};

@@ -75,6 +75,12 @@ pub(crate) fn nearest_tool(tools: &[PosedTool], x: &Vec3) -> Option<(usize, f64)
     all.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
+/// The longer of two edges of a triangle, m.
+pub(crate) fn edge_of(corners: &[Vec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    (a - b).norm().max((c - b).norm())
+}
+
 /// The largest gap, m, at which pressures (Pa) at the corners of a triangle keep a point pressed.
 pub(crate) fn kept_gap(pressures: [f64; 3], stiffness: [f64; 3]) -> f64 {
     let softest = stiffness.into_iter().fold(f64::INFINITY, f64::min);

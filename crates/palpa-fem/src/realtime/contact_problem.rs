@@ -132,7 +132,7 @@ impl ContactProblem {
     }
 
     /// The candidates with a pressing force.
-    pub(super) fn pressing(&self) -> impl Iterator<Item = &Candidate> {
+    pub(super) fn pressing(&self) -> impl Iterator<Item = &Candidate> + Clone {
         self.candidates.iter().filter(|c| c.pressure > 0.0)
     }
 

@@ -91,6 +91,8 @@ pub(super) struct Plan {
     pub(super) vertices: Vec<u32>,
     /// Triangles of the skin that are in the zone as a whole and can move.
     pub(super) triangles: Vec<u32>,
+    /// The other triangles of the skin that can move.
+    pub(super) outer_triangles: Vec<u32>,
     /// Nodes with unknowns, each with the first of its three unknowns: nodes of the zone (ring
     /// included), of the ring, and of the exterior.
     pub(super) zone: Vec<[u32; 2]>,
@@ -145,6 +147,13 @@ impl Plan {
         let zone = nodes(&|v| is_inside[v]);
         let ring = nodes(&|v| has_ring && is_inside[v] && tree.first_dof(v) >= ring_start);
         let exterior = nodes(&|v| !is_inside[v]);
+        let is_held = |&v: &u32| model.supports[model.body.node(v as usize, 0)].n == 3;
+        let can_move = |t: &u32| !skin.triangles[*t as usize].iter().all(is_held);
+        let moving = (0..skin.triangles.len() as u32).filter(can_move);
+        let (triangles, outer_triangles) = moving.partition(|&t| {
+            let corners = skin.triangles[t as usize].iter();
+            corners.copied().all(|v| is_inside[v as usize])
+        });
         Ok(Self {
             id,
             centres,
@@ -152,13 +161,8 @@ impl Plan {
             vertices: (0..points.len() as u32)
                 .filter(|&v| is_inside[v as usize])
                 .collect(),
-            triangles: (0..skin.triangles.len() as u32)
-                .filter(|&t| {
-                    let corners = skin.triangles[t as usize].iter();
-                    let is_held = |&v: &u32| model.supports[model.body.node(v as usize, 0)].n == 3;
-                    corners.clone().all(|&v| is_inside[v as usize]) && !corners.clone().all(is_held)
-                })
-                .collect(),
+            triangles,
+            outer_triangles,
             zone,
             ring,
             exterior,

@@ -6,7 +6,7 @@ use palpa_mesh::Vec3;
 use crate::Mat3;
 use crate::assembly::Assembler;
 use crate::contact::{
-    Fineness, Spot, Touch, anchor_at, first_touch, kept_gap, nearest_tool, spots_of,
+    Fineness, Spot, Touch, anchor_at, edge_of, first_touch, kept_gap, nearest_tool, spots_of,
 };
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -175,8 +175,7 @@ impl Contacts {
             let reach = kept_gap(corners.map(|v| touches[v].pressure), epsilons);
             let nearest = corners.map(|v| self.distances[v]).into_iter();
             let at = triangle.map(place);
-            let edge = (at[0] - at[1]).norm().max((at[2] - at[1]).norm());
-            if nearest.fold(f64::INFINITY, f64::min) > reach + edge {
+            if nearest.fold(f64::INFINITY, f64::min) > reach + edge_of(&at) {
                 continue;
             }
             let at_rest = corners.map(|v| skin.points[v]);

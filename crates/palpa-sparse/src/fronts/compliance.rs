@@ -126,8 +126,8 @@ impl<T: Number> Columns<T> {
         }
     }
 
-    /// `Y ← L⁻¹ Y` through the visited fronts. `beyond` takes what is left on columns beyond the
-    /// half: their index among the ring's, and for each its numbers and the column of `Y`.
+    /// `Y ← L⁻¹ Y` through the visited fronts. `beyond` takes what is left on the ring if that is
+    /// beyond the half: one column for each force.
     fn substitute(
         &mut self,
         tree: &Tree,

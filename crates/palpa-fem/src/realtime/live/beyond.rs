@@ -8,8 +8,9 @@
 use palpa_mesh::Vec3;
 
 use super::Live;
+use super::candidates::clearance_of;
 use super::iteration::Pass;
-use crate::contact::kept_gap;
+use crate::contact::{edge_of, kept_gap};
 use crate::model::Model;
 
 /// Deepest indentation from which the linear answer is taken up as the state of a zone, m. Tissue
@@ -31,8 +32,6 @@ pub(super) struct Beyond {
     pub(super) clearance: f64,
     /// Whether a tool may touch outside the zone: it presses there, or nowhere. `[n_tools]`
     may_touch: Vec<bool>,
-    /// Distances of the skin from these tools, m. `[n_vertices]`
-    distances: Vec<f64>,
 }
 
 impl Beyond {
@@ -43,7 +42,6 @@ impl Beyond {
             triangles: Vec::with_capacity(model.body.skin.triangles.len()),
             clearance: f64::INFINITY,
             may_touch: vec![false; n_tools],
-            distances: vec![f64::INFINITY; model.body.n_vertices()],
         }
     }
 
@@ -67,17 +65,17 @@ impl Live {
         self.load_exterior();
         if pass == Pass::Near {
             if !self.beyond.triangles.is_empty() {
-                self.settle_in_step();
+                self.settle();
             }
             return;
         }
         if self.beyond.has_load {
-            self.settle_in_step();
+            self.settle();
         }
         self.find_tools();
         self.find_triangles(self.beyond.has_load);
         if !self.beyond.triangles.is_empty() && !self.beyond.has_load {
-            self.settle_in_step();
+            self.settle();
             self.find_triangles(true);
         }
     }
@@ -113,9 +111,8 @@ impl Live {
         for t in 0..self.course.tools.len() {
             let (model, plan, at) = (&*self.model, &*self.plan, &self.outside.at);
             let displacements = &self.state.displacements;
-            let pressing = self.problem.candidates.iter().filter(|c| c.pressure > 0.0);
-            let far =
-                pressing.filter(|c| c.tool as usize == t && !plan.is_inside[c.vertex as usize]);
+            let far = self.problem.pressing();
+            let far = far.filter(|c| c.tool as usize == t && !plan.is_inside[c.vertex as usize]);
             let (mut depth, mut along) = (0.0_f64, Vec3::zeros());
             for candidate in far.clone() {
                 let node = model.body.node(candidate.vertex as usize, 0);
@@ -137,24 +134,11 @@ impl Live {
         self.load_exterior();
     }
 
-    /// As [`Self::settle`], without memory.
-    fn settle_in_step(&mut self) {
-        self.outside.settle(
-            &self.model,
-            &self.plan,
-            None,
-            self.beyond.load(),
-            &mut self.state.displacements,
-            &mut self.ws.moves,
-            &mut self.inside.solve,
-        );
-    }
-
     /// Finds the tools that press outside the zone or nowhere.
     fn find_tools(&mut self) {
         for (t, may_touch) in self.beyond.may_touch.iter_mut().enumerate() {
-            let pressed = self.problem.candidates.iter();
-            let pressed = pressed.filter(|c| c.tool as usize == t && c.pressure > 0.0);
+            let pressed = self.problem.pressing();
+            let pressed = pressed.filter(|c| c.tool as usize == t);
             let mut is_inside = pressed.map(|c| self.plan.is_inside[c.vertex as usize]);
             let presses_outside = is_inside.clone().any(|inside| !inside);
             *may_touch = presses_outside || !is_inside.any(|inside| inside);
@@ -185,26 +169,18 @@ impl Live {
             let distances = tools
                 .clone()
                 .map(|(tool, _)| tool.tool.distance_at(&tool.pose, &place).distance);
-            beyond.distances[v] = distances.fold(f64::INFINITY, f64::min);
+            search.distances[v] = distances.fold(f64::INFINITY, f64::min);
             search.places[v] = place;
-            search.distances[v] = beyond.distances[v];
         }
-        for (t, triangle) in model.body.skin.triangles.iter().enumerate() {
-            let corners = triangle.map(|v| v as usize);
-            let is_held = |v: usize| model.supports[model.body.node(v, 0)].n == 3;
-            if corners.iter().all(|&v| plan.is_inside[v]) || corners.iter().all(|&v| is_held(v)) {
-                continue;
-            }
-            let distances = corners.map(|v| beyond.distances[v]);
-            let least = distances.into_iter().fold(f64::INFINITY, f64::min);
-            let at = corners.map(|v| search.places[v]);
-            let edge = (at[0] - at[1]).norm().max((at[2] - at[1]).norm());
+        for &t in &plan.outer_triangles {
+            let corners = model.body.skin.triangles[t as usize].map(|v| v as usize);
+            let least = search.least_distance(corners);
+            let edge = edge_of(&corners.map(|v| search.places[v]));
             let epsilons = corners.map(|v| model.skin_stiffness.normal[v]);
             let kept = kept_gap(corners.map(|v| self.skin.pressures[v]), epsilons);
-            let clearance = (least - 0.6 * edge).max(0.0).min(least.max(0.0));
-            beyond.clearance = beyond.clearance.min(clearance);
+            beyond.clearance = beyond.clearance.min(clearance_of(least, edge));
             if least <= self.params.reach + kept + edge {
-                beyond.triangles.push(t as u32);
+                beyond.triangles.push(t);
             }
         }
     }

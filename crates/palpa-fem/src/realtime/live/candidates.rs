@@ -6,7 +6,7 @@ use palpa_mesh::Vec3;
 use super::super::candidate::{Candidate, Point};
 use super::super::{MOST_CANDIDATES, MOST_FAR, MOST_POINTS};
 use super::Live;
-use crate::contact::{Fineness, Spot, anchor_at, kept_gap, nearest_tool, spots_of};
+use crate::contact::{Fineness, Spot, anchor_at, edge_of, kept_gap, nearest_tool, spots_of};
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 
@@ -98,6 +98,12 @@ struct Near {
     end: u32,
 }
 
+/// Least gap between a tool and a triangle, m, whose nearest corner is at `least` and whose edges are
+/// no longer than `edge`, m: no point of it is nearer than that corner by much more than half an edge.
+pub(super) fn clearance_of(least: f64, edge: f64) -> f64 {
+    (least - 0.6 * edge).max(0.0).min(least.max(0.0))
+}
+
 /// Scratch of the search.
 #[derive(Debug)]
 pub(super) struct Search {
@@ -129,6 +135,12 @@ impl Search {
             pushes: Vec::with_capacity(MOST_CANDIDATES),
             n_left_out: 0,
         }
+    }
+
+    /// Distance of the nearest of three vertices, m.
+    pub(super) fn least_distance(&self, corners: [usize; 3]) -> f64 {
+        let distances = corners.map(|v| self.distances[v]).into_iter();
+        distances.fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -177,17 +189,13 @@ impl Live {
             let triangle = model.body.skin.triangles[t as usize];
             let corners = triangle.map(|v| v as usize);
             let at = corners.map(|v| search.places[v]);
-            let distances = corners.map(|v| search.distances[v]);
-            let least = distances.into_iter().fold(f64::INFINITY, f64::min);
-            let edge = (at[0] - at[1]).norm().max((at[2] - at[1]).norm());
+            let least = search.least_distance(corners);
+            let edge = edge_of(&at);
             let epsilons = corners.map(|v| model.skin_stiffness.normal[v]);
             let pressures = corners.map(|v| self.skin.pressures[v]);
             let largest = pressures.into_iter().fold(0.0, f64::max);
             let kept = reach + kept_gap(pressures, epsilons);
-            // No point of a triangle is nearer than its nearest corner by more than an edge.
-            clearance = clearance
-                .min((least - 0.6 * edge).max(0.0))
-                .min(least.max(0.0));
+            clearance = clearance.min(clearance_of(least, edge));
             if least > kept + edge {
                 continue;
             }

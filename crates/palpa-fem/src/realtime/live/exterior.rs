@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use palpa_sparse::fronts::SolveScratch;
-
 use super::super::outside::{Follower, Outside};
 use super::super::plan::Trouble;
 use super::Live;
@@ -183,10 +181,8 @@ impl Live {
         Ok(())
     }
 
-    /// Updates the displacements outside the zone. Cost: a substitution through the exterior, and
-    /// memory.
+    /// Updates the displacements outside the zone. Cost: a substitution through the exterior.
     pub fn settle(&mut self) {
-        let mut scratch = SolveScratch::new(&self.plan.tree);
         self.outside.settle(
             &self.model,
             &self.plan,
@@ -194,7 +190,7 @@ impl Live {
             self.beyond.load(),
             &mut self.state.displacements,
             &mut self.ws.moves,
-            &mut scratch,
+            &mut self.inside.solve,
         );
     }
 }

@@ -46,26 +46,20 @@ impl Live {
 
     /// Largest distance of a pressing vertex from the centre of its tool, m.
     pub(super) fn contact_radius(&self, centres: &Centres) -> f64 {
-        let points = &self.model.body.skin.points;
-        self.problem
-            .pressing()
-            .map(|c| (points[c.vertex as usize] - centres.of(c.tool as usize)).norm())
-            .fold(0.0, f64::max)
+        self.radius_where(centres, |_| true)
     }
 
     /// As [`Self::contact_radius`] in the present zone, without vertices outside it.
     pub(super) fn radius_inside(&self) -> f64 {
+        let is_inside = |c: &Candidate| self.plan.is_inside[c.vertex as usize];
+        self.radius_where(&self.plan.centres, is_inside)
+    }
+
+    fn radius_where(&self, centres: &Centres, keep: impl Fn(&Candidate) -> bool) -> f64 {
         let points = &self.model.body.skin.points;
-        let pressing = self.problem.pressing();
-        let pressing = pressing.filter(|c| self.plan.is_inside[c.vertex as usize]);
+        let pressing = self.problem.pressing().filter(|c| keep(c));
         pressing
-            .map(|c| {
-                (
-                    points[c.vertex as usize],
-                    self.plan.centres.of(c.tool as usize),
-                )
-            })
-            .map(|(point, centre)| (point - centre).norm())
+            .map(|c| (points[c.vertex as usize] - centres.of(c.tool as usize)).norm())
             .fold(0.0, f64::max)
     }
 
