@@ -23,7 +23,7 @@ pub(super) struct Candidate {
     pub(super) spread: f64,
     /// Area that it stands for at rest, times the share of the pressure along `normal`, m².
     pub(super) area: f64,
-    /// Least gap of the points of its triangles, less what the pressure there keeps pressed, m.
+    /// In the local model, how much nearer the tool must come until it bears, m.
     pub(super) gap: f64,
     /// Pressing force, N: `p0`, then `p`.
     pub(super) pressure: f64,

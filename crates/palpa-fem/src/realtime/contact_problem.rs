@@ -69,11 +69,11 @@ pub(super) struct ContactProblem {
     pub(super) spread: Vec<f64>,
     pub(super) factor: Vec<f64>,
     pub(super) clusters: Clusters,
-    scratch: Scratch,
+    pub(super) scratch: Scratch,
 }
 
 #[derive(Debug)]
-struct Scratch {
+pub(super) struct Scratch {
     order: Vec<usize>,
     order_of_newton: Vec<usize>,
     /// Row of each candidate in the system, or `usize::MAX`; and the candidates of the rows.
@@ -92,7 +92,7 @@ struct Scratch {
     friction_before: Vec<Vec3>,
     moved: Vec<Vec3>,
     /// Entries of the law's stiffness: row, column, N/m per m, and per area.
-    stiffness: Vec<(u16, u16, f64, f64)>,
+    pub(super) stiffness: Vec<(u16, u16, f64, f64)>,
 }
 
 impl ContactProblem {

@@ -315,9 +315,6 @@ impl Live {
         search
             .pushes
             .resize(problem.candidates.len(), (Vec3::zeros(), 0.0));
-        for candidate in &mut problem.candidates {
-            candidate.gap = f64::INFINITY;
-        }
         for point in &problem.points {
             let corners = point.corners.map(usize::from);
             let spot = &point.spot;
@@ -327,14 +324,11 @@ impl Live {
                     share * self.skin.pressures[vertex]
                 })
                 .sum();
-            let gap = spot.gap - pressure / spot.stiffness;
-            let pressure = (-gap * spot.stiffness).max(0.0);
+            let pressure = (pressure - spot.stiffness * spot.gap).max(0.0);
             for (&i, share) in corners.iter().zip(&spot.shares) {
                 let by = share * spot.area * pressure;
                 search.pushes[i].0 += spot.normal * by;
                 search.pushes[i].1 += by;
-                let candidate = &mut problem.candidates[i];
-                candidate.gap = candidate.gap.min(gap);
             }
         }
         for (candidate, (push, size)) in problem.candidates.iter_mut().zip(&search.pushes) {
