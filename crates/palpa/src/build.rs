@@ -23,7 +23,7 @@ const FAR_FROM_SKIN: f64 = 0.25;
 const USUAL_SIZE: std::ops::Range<f64> = 0.003..4.0;
 
 /// A body ready to be pressed.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct BuiltBody {
     /// The layered body, and the results of its growth.
     pub growth: Growth,

@@ -49,6 +49,7 @@
 //! ```
 
 pub mod accuracy;
+pub mod audit;
 pub mod build;
 pub mod continuum;
 mod error;

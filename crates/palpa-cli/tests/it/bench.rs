@@ -16,7 +16,8 @@ fn a_quick_look_has_all_the_figures() {
         assert_eq!((row.nodes, row.levels), (324, 4));
         assert_eq!((row.n_failed, row.n_backed_off), (0, 0));
         assert!(row.steps_per_s > 0.0 && row.step_ms_p99 >= row.step_ms_median);
-        assert!((row.steps_per_s * row.step_ms_median * 1e-3 - 1.0).abs() < 1e-9);
+        // The rate has all costs: it is the number of steps over their whole time.
+        assert!((row.steps_per_s * row.step_ms_mean * 1e-3 - 1.0).abs() < 1e-9);
         assert!(row.travel_mm <= 0.25 + 1e-9 && row.tool_mm_per_s <= 50.0 + 1e-9);
         assert!(row.most_active > 0 && row.n_active_changes > 0);
         // The forces are those of the body, at any speed.
@@ -58,6 +59,20 @@ fn an_unknown_case_names_the_known() {
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert!(
         stderr.contains("no case \"5k\"") && stderr.contains("4k-prony"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn scans_need_their_folder() {
+    let (code, _, stderr) = palpa().run(&["bench", "--case", "shipped-calf"]);
+    assert!(
+        code == 2 && stderr.contains("shipped-calf needs --data"),
+        "{stderr}"
+    );
+    let (code, _, stderr) = palpa().run(&["bench", "--list", "--data", "nowhere"]);
+    assert!(
+        code == 2 && stderr.contains("calf_skin_open_10k.ply"),
         "{stderr}"
     );
 }

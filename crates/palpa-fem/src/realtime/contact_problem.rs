@@ -422,6 +422,46 @@ impl ContactProblem {
     fn newton_step(&mut self) -> bool {
         let n = self.candidates.len();
         let scratch = &mut self.scratch;
+        for i in 0..n {
+            scratch.right[i] = scratch.laws[i] - scratch.forces[i];
+        }
+        if !self.factor_newton() {
+            return false;
+        }
+        let scratch = &mut self.scratch;
+        let m = scratch.rows.len();
+        let (matrix, springs) = self.spread.split_at(m * m);
+        for (r, &i) in scratch.rows.iter().enumerate() {
+            let mut right = scratch.right[i];
+            for (spring, &j) in springs[r * m..(r + 1) * m].iter().zip(&scratch.rows) {
+                if *spring == 0.0 {
+                    continue;
+                }
+                // Forces that vanish move the others.
+                let along = &self.along[n * j..n * (j + 1)];
+                let lost = (0..n).filter(|&k| scratch.row_of[k] == usize::MAX);
+                let moved: f64 = lost.map(|k| along[k] * scratch.right[k]).sum();
+                right -= spring * moved;
+            }
+            scratch.solution[r] = right;
+        }
+        dense::solve(
+            m,
+            matrix,
+            &scratch.order_of_newton,
+            &mut scratch.solution[..m],
+        );
+        for (r, &i) in scratch.rows.iter().enumerate() {
+            scratch.right[i] = scratch.solution[r];
+        }
+        true
+    }
+
+    /// Factors the matrix of Newton's method for the law's present stiffness, `1 − M/A + S w`, in the
+    /// first rows of `spread`, with the law's springs `S` after it. Returns false if it is singular.
+    fn factor_newton(&mut self) -> bool {
+        let n = self.candidates.len();
+        let scratch = &mut self.scratch;
         // Only vertices with a point that presses have unknown forces; the others lose theirs.
         scratch.rows.clear();
         for i in 0..n {
@@ -434,7 +474,6 @@ impl ContactProblem {
             if !is_open {
                 scratch.rows.push(i);
             }
-            scratch.right[i] = scratch.laws[i] - scratch.forces[i];
         }
         let m = scratch.rows.len();
         let (matrix, springs) = self.spread.split_at_mut(m * m);
@@ -451,8 +490,7 @@ impl ContactProblem {
             matrix[r * m + c] -= share / self.candidates[j].area;
             springs[r * m + c] += spring;
         }
-        for (r, &i) in scratch.rows.iter().enumerate() {
-            let mut right = scratch.right[i];
+        for r in 0..m {
             for (c, &j) in scratch.rows.iter().enumerate() {
                 let spring = springs[r * m + c];
                 if spring == 0.0 {
@@ -463,26 +501,37 @@ impl ContactProblem {
                 for (entry, &k) in row.iter_mut().zip(&scratch.rows) {
                     *entry += spring * along[k];
                 }
-                // Forces that vanish move the others.
-                let lost = (0..n).filter(|&k| scratch.row_of[k] == usize::MAX);
-                let moved: f64 = lost.map(|k| along[k] * scratch.right[k]).sum();
-                right -= spring * moved;
             }
-            scratch.solution[r] = right;
         }
-        if !dense::factor(m, matrix, &mut scratch.order_of_newton) {
-            return false;
+        dense::factor(m, matrix, &mut scratch.order_of_newton)
+    }
+
+    /// Stiffness of the pressing vertices against a displacement of their tool, along their
+    /// normals, N/m.
+    pub(super) fn tool_stiffness(&mut self, tool: usize) -> Mat3 {
+        let mut stiffness = Mat3::zeros();
+        if !self.factor_newton() {
+            return stiffness;
         }
-        dense::solve(
-            m,
-            matrix,
-            &scratch.order_of_newton,
-            &mut scratch.solution[..m],
-        );
-        for (r, &i) in scratch.rows.iter().enumerate() {
-            scratch.right[i] = scratch.solution[r];
+        let scratch = &mut self.scratch;
+        let m = scratch.rows.len();
+        let (matrix, springs) = self.spread.split_at(m * m);
+        let own = |i: usize| self.candidates[i].tool as usize == tool;
+        for axis in 0..3 {
+            for r in 0..m {
+                let row = springs[r * m..(r + 1) * m].iter().zip(&scratch.rows);
+                let pushed = row.filter(|(_, j)| own(**j));
+                let by = pushed.map(|(spring, &j)| spring * self.candidates[j].normal[axis]);
+                scratch.solution[r] = by.sum();
+            }
+            let solution = &mut scratch.solution[..m];
+            dense::solve(m, matrix, &scratch.order_of_newton, solution);
+            for (x, &i) in solution.iter().zip(&scratch.rows).filter(|(_, i)| own(**i)) {
+                let column = stiffness.column(axis) + self.candidates[i].normal * *x;
+                stiffness.set_column(axis, &column);
+            }
         }
-        true
+        stiffness
     }
 
     /// Sweeps over the friction of the candidates, for given pressing forces. Returns whether it

@@ -178,7 +178,7 @@ impl ContactProblem {
                 pose: tool.pose,
                 friction: tool.tool.friction(),
                 force,
-                stiffness: self.tool_stiffness(&clusters, &out.compliance, t),
+                stiffness: self.tool_stiffness(t),
             });
         }
         self.clusters = clusters;
@@ -558,45 +558,6 @@ impl ContactProblem {
         } else {
             1e-3
         }
-    }
-
-    /// Stiffness of the pressing contacts against a displacement of their tool, along their
-    /// normals, N/m.
-    fn tool_stiffness(&mut self, clusters: &Clusters, compliance: &[f64], tool: usize) -> Mat3 {
-        let n = clusters.all.len();
-        let first = |i: usize| {
-            let member = clusters.members[clusters.all[i].first];
-            &self.candidates[usize::from(member)]
-        };
-        let mut rows = [0; MOST_CANDIDATES];
-        let mut m = 0;
-        for i in (0..n).filter(|&i| first(i).pressure > 0.0) {
-            rows[m] = i;
-            m += 1;
-        }
-        let rows = &rows[..m];
-        let mut factor = std::mem::take(&mut self.factor);
-        let entry = |r: usize, c: usize| {
-            let (i, j) = (rows[r], rows[c]);
-            let block = block_of(compliance, n, (i, j));
-            clusters.normals[i].dot(&(block * clusters.normals[j]))
-        };
-        let is_factored = m > 0 && factor_symmetric(m, entry, &mut factor);
-        let mut stiffness = Mat3::zeros();
-        for axis in (0..3).filter(|_| is_factored) {
-            let mut x = [0.0; MOST_CANDIDATES];
-            let own = |i: usize| first(i).tool as usize == tool;
-            for (x, &i) in x.iter_mut().zip(rows).filter(|(_, i)| own(**i)) {
-                *x = clusters.normals[i][axis];
-            }
-            substitute_symmetric(m, &factor, &mut x[..m]);
-            for (x, &i) in x.iter().zip(rows).filter(|(_, i)| own(**i)) {
-                let column = stiffness.column(axis) + clusters.normals[i] * *x;
-                stiffness.set_column(axis, &column);
-            }
-        }
-        self.factor = factor;
-        stiffness
     }
 }
 

@@ -247,6 +247,24 @@ impl BenchCase {
         Ok(Arc::new(model))
     }
 
+    /// The path of the tool at each of four places of a graded mesh; none on other meshes.
+    pub fn rides_at_four_places(&self) -> Vec<Ride> {
+        let (BenchShape::Graded(grading) | BenchShape::OneTissue(grading)) = self.shape else {
+            return Vec::new();
+        };
+        let ride = self.ride();
+        let at = |beside: [f64; 2]| {
+            let [x, y] = [0, 1].map(|i| grading.centre[i] + beside[i] * grading.spacing);
+            Vec3::new(x, y, 0.0)
+        };
+        FOUR_PLACES
+            .map(|beside| Ride {
+                at: at(beside),
+                ..ride
+            })
+            .to_vec()
+    }
+
     /// The path of the tool.
     pub fn ride(&self) -> Ride {
         let at = match self.shape {
@@ -346,6 +364,9 @@ fn layers(name: &'static str, grading: BenchGrading) -> BenchCase {
 /// Offsets from a vertex to a point near the middle of a triangle and half-way to it, in spacings.
 const INSIDE: [f64; 2] = [0.5, 0.3];
 const HALF_WAY: [f64; 2] = [0.25, 0.15];
+
+/// A vertex, the middle of an edge, near the middle of a triangle, and half-way to it.
+const FOUR_PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.5, 0.0], INSIDE, HALF_WAY];
 
 static CASES: LazyLock<Vec<BenchCase>> = LazyLock::new(|| {
     use Mode::{Full, Whole, Zone};

@@ -12,6 +12,7 @@ pub mod ratios;
 pub mod refined;
 pub mod ride;
 pub mod row;
+pub mod shipped;
 
 pub use cases::{BenchCase, cases};
 pub use row::{BenchReport, BenchRow, Mode};

@@ -4,12 +4,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
-use palpa_fem::realtime::{ExteriorMode, Live, LiveParams, LiveReport, Rebuilt, StepOutcome};
+use palpa_fem::realtime::{
+    ExteriorMode, Live, LiveParams, LiveReport, LocalModel, Rebuilt, StepOutcome,
+};
 use palpa_fem::shape::{Pose, Sphere, Tool};
 use palpa_fem::{
     FemError, Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance,
 };
 use palpa_mesh::Vec3;
+use palpa_servo::MAX_CONTACTS;
 
 /// Speed of the tool if the steps allow it, m/s.
 const FASTEST: f64 = 0.05;
@@ -61,6 +64,11 @@ impl Ride {
             pose: Pose::translation(tip.x, tip.y, tip.z),
         };
         (depth, tool)
+    }
+
+    /// Depth of the tool at the position `s` along the path. All in m.
+    pub fn depth_at(&self, s: f64) -> f64 {
+        self.at_length(s).0
     }
 
     /// The places where forces are compared: positions along the path, m.
@@ -139,7 +147,8 @@ pub fn converged(
 /// Result of a ride.
 #[derive(Debug)]
 pub struct Ridden {
-    /// Times of the steps in contact, s, ascending.
+    /// Times of the steps in contact, s, ascending: with the patch, and with the result of a
+    /// background job if one was installed before the step.
     pub times: Vec<f64>,
     /// Number of all steps.
     pub n_steps: usize,
@@ -180,6 +189,25 @@ impl Ridden {
         let last = self.times.len().saturating_sub(1);
         let at = (q * last as f64).round() as usize;
         self.times.get(at).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Mean time of the steps in contact, s; NaN if there was none.
+    pub fn mean(&self) -> f64 {
+        self.times.iter().sum::<f64>() / self.times.len() as f64
+    }
+
+    /// Largest relative error along the press of the forces at all judged places, down, across and
+    /// up, against the force that is known at each depth, N; `None` if none is known.
+    pub fn error_by_depth(
+        &self,
+        ride: &Ride,
+        force_at: impl Fn(f64) -> Option<f64>,
+    ) -> Option<f64> {
+        let errors = ride.judged().into_iter().filter_map(|s| {
+            let found = self.forces.iter().find(|f| (f.0 - s).abs() < 1e-9)?;
+            Some((found.1.z / force_at(ride.depth_at(s))? - 1.0).abs())
+        });
+        errors.reduce(f64::max)
     }
 
     /// Largest relative error of the forces against known ones.
@@ -254,14 +282,16 @@ fn run(
     };
     let mut under: Option<Under> = None;
     let mut last: Option<LiveReport> = None;
+    let mut patch = LocalModel::default();
     for step in 1..=n_steps {
-        if let Some(done) = under.take_if(|under| under.due <= step) {
-            live.install(done.result);
-        }
         let s = step as f64 * travel;
         let tools = [ride.at_length(s).1];
         let clock = ThreadTime::now();
+        if let Some(done) = under.take_if(|under| under.due <= step) {
+            live.install(done.result);
+        }
         let report = live.step(&tools, dt);
+        live.local_model(MAX_CONTACTS, &mut patch);
         let time = clock.elapsed();
         if let Some(job) = live.take_job() {
             let clock = ThreadTime::now();

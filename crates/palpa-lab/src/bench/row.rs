@@ -1,9 +1,11 @@
 //! Rows of the benchmark table and the report.
 
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct as _;
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::growth::Growth;
 use super::ratios::Ratio;
+use super::shipped::ShippedRow;
 
 /// Part of the stiffness that a step recomputes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -49,13 +51,16 @@ pub struct BenchRow {
     pub h_contact_mm: f64,
     /// Radius of the sphere.
     pub tool_radius_mm: f64,
-    /// Steps per second: the inverse of the median time.
+    /// Steps in contact per second of their whole thread-CPU time, patches and installed results of
+    /// the background included.
     pub steps_per_s: f64,
     /// Required steps per second, if there is a target.
     pub target_steps_per_s: Option<f64>,
-    /// Median thread-CPU time of the steps in contact.
+    /// Mean of that time.
+    pub step_ms_mean: f64,
+    /// Median of that time.
     pub step_ms_median: f64,
-    /// 99th percentile of the thread-CPU time of the steps in contact.
+    /// 99th percentile of that time.
     pub step_ms_p99: f64,
     /// CPU time of the background's work, relative to that of the steps.
     pub background_cpu_share: f64,
@@ -63,8 +68,12 @@ pub struct BenchRow {
     pub step_error: f64,
     /// Largest error of the converged forces past 2 mm against those on a refined mesh.
     pub mesh_error: Option<f64>,
-    /// Largest error of the moving step's forces past 2 mm against those on a refined mesh.
+    /// Largest error of the moving step's forces past 2 mm against those on a refined mesh, down,
+    /// across and up.
     pub total_error: Option<f64>,
+    /// The largest such error of four places of the sphere on a graded mesh: on a vertex, on the
+    /// middle of an edge, near the middle of a triangle and half-way there. `None` for other meshes.
+    pub worst_of_four_places: Option<f64>,
     /// Speed of the tool.
     pub tool_mm_per_s: f64,
     /// Travel of the tool in a step.
@@ -90,11 +99,13 @@ pub struct BenchRow {
 }
 
 /// The report of all measurements. After an interruption it holds those completed so far.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default)]
 pub struct BenchReport {
     /// Whether all cases were measured; false after an interruption.
     pub is_complete: bool,
-    /// The table.
+    /// Shipped scenes.
+    pub shipped: Vec<ShippedRow>,
+    /// Uniform blocks and graded bodies.
     pub rows: Vec<BenchRow>,
     /// Growth of the cost with the size of the body.
     pub growth: Vec<Growth>,
@@ -102,4 +113,25 @@ pub struct BenchReport {
     pub ratios: Vec<Ratio>,
     /// Description of how the table is measured.
     pub method: &'static str,
+}
+
+/// The rows of both tables are one list, the shipped scenes first.
+impl Serialize for BenchReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        #[serde(untagged)]
+        enum Row<'a> {
+            Shipped(&'a ShippedRow),
+            Uniform(&'a BenchRow),
+        }
+        let shipped = self.shipped.iter().map(Row::Shipped);
+        let rows: Vec<Row<'_>> = shipped.chain(self.rows.iter().map(Row::Uniform)).collect();
+        let mut report = serializer.serialize_struct("BenchReport", 5)?;
+        report.serialize_field("is_complete", &self.is_complete)?;
+        report.serialize_field("rows", &rows)?;
+        report.serialize_field("growth", &self.growth)?;
+        report.serialize_field("ratios", &self.ratios)?;
+        report.serialize_field("method", self.method)?;
+        report.end()
+    }
 }

@@ -4,6 +4,7 @@
 #![expect(clippy::float_cmp, reason = "what is exact is compared exactly")]
 
 mod accuracy;
+mod audit;
 mod error_bar;
 mod live;
 mod machine;

@@ -1,19 +1,43 @@
 //! The figures of a run.
 
-use palpa_rt::{ForceReport, Log, Quantiles, Report, StepRecord, StepStatus, TickEntry};
+use palpa_rt::{
+    Ending, Happening, Log, Quantiles, RecordKind, Report, StepRecord, StepStatus, TickEntry,
+};
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
 
 use super::Run;
+use super::audit::Audit;
 use super::bars::{self, BarFigures};
-use super::guarantees::{MOST_ARRIVAL, MOST_RMS};
+use super::force::ForceFigures;
+use super::verdicts::{self, Verdict};
 use crate::cli::Context;
 use crate::table::Table;
 use palpa::live::{GOOD_TRAVEL, LiveScene};
 
-/// The hand counts as still if the tool moves no farther than the first value, m, within the last
-/// seconds, second value, s.
-const STILL: [f64; 2] = [0.5e-3, 2.0];
+/// The body of a run, and the motion of the hand. Lengths in m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Setup {
+    pub(super) nodes: usize,
+    pub(super) mesh_size: f64,
+    pub(super) zone_radius: f64,
+    /// Distance from the centre of a zone at which the next zone is requested.
+    pub(super) longest_way: f64,
+    /// Largest speed of the hand, m/s.
+    pub(super) motion_speed: f64,
+}
+
+impl Setup {
+    pub(super) fn new(live: &LiveScene, motion_speed: f64) -> Self {
+        Self {
+            nodes: live.model.n_nodes(),
+            mesh_size: live.mesh_size,
+            zone_radius: live.params.zone_radius,
+            longest_way: live.params.longest_way(),
+            motion_speed,
+        }
+    }
+}
 
 /// Content of loop.json.
 #[derive(Debug, Serialize)]
@@ -36,14 +60,25 @@ pub(super) struct Figures {
     pub(super) devices: Vec<ForceFigures>,
     /// Error bars of the force along the way; `None` if none were asked for.
     pub(super) error_bars: Option<Vec<BarFigures>>,
+    /// Errors of the force at poses that were solved again; `None` if that was not asked for.
+    pub(super) audit: Option<Audit>,
+    /// The guarantees, and whether this run kept them.
+    pub(super) verdicts: Vec<Verdict>,
+    /// Whether every guarantee was judged and kept.
+    pub(super) is_good: bool,
     /// Number of ticks with each fault.
     faults: Vec<(String, u64)>,
     /// Number of ticks with each limit.
     limits: Vec<(String, u64)>,
     n_active_max: u32,
-    lost_ticks: u64,
-    lost_steps: u64,
-    has_log_failed: bool,
+    pub(super) lost_ticks: u64,
+    pub(super) lost_steps: u64,
+    pub(super) lost_events: u64,
+    pub(super) has_log_failed: bool,
+    /// Whether the log can be read to its end.
+    pub(super) is_log_whole: bool,
+    /// Threads that ended because of a panic.
+    pub(super) panicked: Vec<&'static str>,
     threads: Vec<String>,
     memory: String,
     events: Vec<String>,
@@ -89,6 +124,10 @@ pub(super) struct TissueFigures {
     step_wall_us: Times,
     pub(super) held_back: u64,
     unfinished: u64,
+    /// Share of the steps with contact that did not reach their tolerance.
+    pub(super) unfinished_share: f64,
+    /// Number of steps with contact.
+    pub(super) touching: u64,
     /// Number of steps that did not reach the tool.
     behind: u64,
     /// Share of the steps with contact that did not reach the tool.
@@ -96,7 +135,7 @@ pub(super) struct TissueFigures {
     /// Share of the ticks without a force because the tissue was late.
     pub(super) stale_share: f64,
     jobs: u64,
-    jobs_panicked: u64,
+    pub(super) jobs_panicked: u64,
     job_cpu_us: Times,
     /// Wall time from the request of a zone until it is taken over, ms: 90th percentile.
     zone_wall_p90_ms: Option<f64>,
@@ -106,91 +145,45 @@ pub(super) struct TissueFigures {
     meshes: u64,
 }
 
-#[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(Default))]
-pub(super) struct ForceFigures {
-    pub(super) max_force_n: f64,
-    /// RMS of the force between 20 and 400 Hz over the last 2 s; `None` if the tool was not still
-    /// then.
-    pub(super) rms_still_n: Option<f64>,
-    rms_worst_n: f64,
-    pub(super) arrival_max_n: f64,
-    arrival_p999_n: f64,
-    /// Largest change of force where a patch arrives, beyond the change that the device's own
-    /// displacement causes through the tissue's stiffness.
-    pub(super) arrival_alone_max_n: f64,
-    pub(super) other_p999_n: f64,
-    other_max_n: f64,
-    /// Energy taken from the hand, as counted by the law.
-    energy_in_mj: f64,
-    /// Energy given to the hand, as counted by the law.
-    energy_out_mj: f64,
-    /// Largest energy given out beyond the energy taken in, since the last fault.
-    pub(super) energy_deficit_mj: f64,
-    pub(super) energy_budget_mj: f64,
-    softening_max: f64,
-}
-
 /// The ticks up to a time, s.
-fn ticks_until(log: &Log, seconds: f64) -> impl DoubleEndedIterator<Item = &TickEntry> {
+pub(super) fn ticks_until(log: &Log, seconds: f64) -> impl DoubleEndedIterator<Item = &TickEntry> {
     log.ticks.iter().filter(move |t| t.tick.now <= seconds)
 }
 
-impl ForceFigures {
-    /// The figures of device `k`, up to a time in s.
-    fn new(report: &Report, log: &Log, k: usize, force: &ForceReport, seconds: f64) -> Self {
-        let ticks = || ticks_until(log, seconds);
-        let records = || ticks().map(move |t| &t.devices[k]);
-        let last = records().next_back();
-        Self {
-            max_force_n: force.max_force,
-            rms_still_n: is_still(log, k, seconds.min(report.duration)).then_some(force.rms_band),
-            rms_worst_n: force.rms_band_worst,
-            arrival_max_n: force.arrival_max,
-            arrival_p999_n: force.arrival_p999,
-            arrival_alone_max_n: force.arrival_alone_max,
-            other_p999_n: force.other_p999,
-            other_max_n: force.other_max,
-            energy_in_mj: last.map_or(0.0, |d| d.energy_in * 1e3),
-            energy_out_mj: last.map_or(0.0, |d| d.energy_out * 1e3),
-            energy_deficit_mj: force.max_work.max(0.0) * 1e3,
-            energy_budget_mj: ticks()
-                .next_back()
-                .map_or(0.0, |t| t.tick.energy_budget * 1e3),
-            softening_max: records().map(|d| d.softening).fold(0.0, f64::max),
-        }
-    }
-}
-
 impl TissueFigures {
-    /// The figures of a run, up to a time in s; `motion_speed` in m/s.
-    fn new(report: &Report, log: &Log, live: &LiveScene, motion_speed: f64, seconds: f64) -> Self {
+    /// The figures of a run, up to a time in s.
+    fn new(report: &Report, log: &Log, setup: &Setup, until: f64) -> Self {
         let status = |wanted: StepStatus| {
             let steps = log.steps.iter();
-            steps.filter(|s| s.status == wanted as u8).count() as u64
+            steps.filter(move |s| s.status == wanted as u8)
         };
-        let touching = log.steps.iter().filter(|s| s.n_contacts > 0).count();
-        let behind = status(StepStatus::Behind);
-        let stale = ticks_until(log, seconds).filter(|t| {
+        let touches = |s: &&StepRecord| s.n_contacts > 0;
+        let touching = log.steps.iter().filter(touches).count();
+        let share = |n: usize| n as f64 / touching.max(1) as f64;
+        let behind = status(StepStatus::Behind).count();
+        let unfinished = status(StepStatus::Unfinished);
+        let stale = ticks_until(log, until).filter(|t| {
             let bits = u16::try_from(t.tick.faults).unwrap_or(0);
             Faults::from_bits(bits).contains(Faults::STALE_PATCH)
         });
         let by_steps = fastest_by_steps(report);
         let zone_wall = zone_wall(log);
         // The tool moves away from the middle of a zone while the next zone is computed.
-        let by_zones = zone_wall.map(|time| live.params.longest_way() / time);
+        let by_zones = zone_wall.map(|time| setup.longest_way / time);
         Self {
             steps: report.steps,
             steps_per_s: report.step_rate,
             fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
             fastest_by_steps_mm_per_s: 1e3 * by_steps,
-            motion_mm_per_s: 1e3 * motion_speed,
+            motion_mm_per_s: 1e3 * setup.motion_speed,
             step_cpu_us: report.step_cpu.into(),
             step_wall_us: report.step_wall.into(),
             held_back: report.held_back,
-            unfinished: status(StepStatus::Unfinished),
-            behind,
-            behind_share: behind as f64 / touching.max(1) as f64,
+            unfinished_share: share(unfinished.clone().filter(touches).count()),
+            unfinished: unfinished.count() as u64,
+            touching: touching as u64,
+            behind: behind as u64,
+            behind_share: share(behind),
             stale_share: stale.count() as f64 / report.ticks.max(1) as f64,
             jobs: report.jobs.count,
             jobs_panicked: report.jobs_panicked,
@@ -204,15 +197,9 @@ impl TissueFigures {
 }
 
 impl Figures {
-    pub(super) fn new(
-        run: &Run,
-        log: &Log,
-        live: &LiveScene,
-        motion_speed: f64,
-        seconds: f64,
-    ) -> Self {
-        let (report, forces) = (&run.report, &run.forces);
-        let ticks = || ticks_until(log, seconds);
+    pub(super) fn new(run: &Run, log: &Log, setup: &Setup) -> Self {
+        let (report, until) = (&run.report, run.until);
+        let ticks = || ticks_until(log, until);
         let mut faults = Vec::new();
         let mut limits = Vec::new();
         for tick in ticks() {
@@ -221,28 +208,36 @@ impl Figures {
             let bits = u16::try_from(tick.tick.limits).unwrap_or(0);
             Limits::from_bits(bits).for_each_name(|name| count(&mut limits, name));
         }
-        let devices = forces.iter().enumerate();
-        let devices = devices.map(|(k, force)| ForceFigures::new(report, log, k, force, seconds));
-        Self {
+        let lost_events = report.events.iter().map(|event| match event.what {
+            Happening::RecordsLost(RecordKind::Events, n) => n,
+            _ => 0,
+        });
+        let mut figures = Self {
             seconds: report.duration,
-            nodes: live.model.n_nodes(),
-            mesh_size_mm: live.mesh_size * 1e3,
-            zone_radius_mm: live.params.zone_radius * 1e3,
+            nodes: setup.nodes,
+            mesh_size_mm: setup.mesh_size * 1e3,
+            zone_radius_mm: setup.zone_radius * 1e3,
             ticks: report.ticks,
             misses: report.skipped,
             tick_cpu_us: report.tick_cpu.into(),
             wake_up_lateness_us: report.lateness.into(),
             cpu_histogram: report.tick_cpu_histogram.clone(),
             lateness_histogram: report.lateness_histogram.clone(),
-            tissue: TissueFigures::new(report, log, live, motion_speed, seconds),
-            devices: devices.collect(),
+            tissue: TissueFigures::new(report, log, setup, until),
+            devices: ForceFigures::of_all(run, log),
             error_bars: run.bars.clone(),
+            audit: run.audit.clone(),
+            verdicts: Vec::new(),
+            is_good: false,
             faults,
             limits,
             n_active_max: ticks().map(|t| t.tick.n_active).max().unwrap_or(0),
             lost_ticks: report.lost_records[0],
             lost_steps: report.lost_records[1],
+            lost_events: lost_events.sum(),
             has_log_failed: report.has_log_failed,
+            is_log_whole: log.ending == Ending::Whole,
+            panicked: report.panicked.clone(),
             threads: run.threads.clone(),
             memory: match &report.memory_locked {
                 Ok(()) => "locked".to_owned(),
@@ -253,7 +248,10 @@ impl Figures {
                 .iter()
                 .map(|e| format!("{:.3} s: {}", e.time, e.what))
                 .collect(),
-        }
+        };
+        figures.verdicts = verdicts::judge(&figures);
+        figures.is_good = figures.verdicts.iter().all(|verdict| verdict.is_kept);
+        figures
     }
 
     pub(super) fn say(&self, context: &Context) -> anyhow::Result<()> {
@@ -288,10 +286,14 @@ impl Figures {
             t.fastest_tool_mm_per_s
         ))?;
         for d in &self.devices {
-            context.say(d.table())?;
+            context.say(d.line())?;
         }
+        context.say(verdicts::table(&self.verdicts))?;
         if let Some(error_bars) = &self.error_bars {
             bars::say(error_bars, context)?;
+        }
+        if let Some(audit) = &self.audit {
+            audit.say(context)?;
         }
         let list = |counts: &[(String, u64)]| {
             let all: Vec<String> = counts
@@ -315,70 +317,6 @@ impl Figures {
         context.say(format!("memory {}", self.memory))?;
         Ok(())
     }
-}
-
-impl ForceFigures {
-    /// Largest change of force that a patch may bring, N.
-    pub(super) fn most_arrival_n(&self) -> f64 {
-        2.0 * self.other_p999_n
-    }
-
-    fn table(&self) -> Table<3> {
-        let mut table = Table::new(["force", "found", "allowed"]).with_left_names();
-        let mut row = |name: &str, found: String, allowed: String| {
-            table.push([name.to_owned(), found, allowed]);
-        };
-        let newtons = |x: f64| format!("{x:.4} N");
-        row("largest", newtons(self.max_force_n), String::new());
-        row(
-            "20 to 400 Hz, the hand still at the end",
-            self.rms_still_n
-                .map_or_else(|| "not still".to_owned(), newtons),
-            newtons(MOST_RMS),
-        );
-        row(
-            "largest change where a patch arrives",
-            newtons(self.arrival_max_n),
-            newtons(self.most_arrival_n()),
-        );
-        row(
-            "the same without the device's displacement",
-            newtons(self.arrival_alone_max_n),
-            newtons(MOST_ARRIVAL),
-        );
-        let joules = |x: f64| format!("{x:.2} mJ");
-        row("energy taken in", joules(self.energy_in_mj), String::new());
-        row(
-            "energy given out",
-            joules(self.energy_out_mj),
-            String::new(),
-        );
-        row(
-            "largest excess of energy given out",
-            joules(self.energy_deficit_mj),
-            joules(self.energy_budget_mj),
-        );
-        let softened = format!("{:.1} %", 100.0 * self.softening_max);
-        row("tissue softened for the device", softened, String::new());
-        table
-    }
-}
-
-/// Whether the tool was still in the last seconds.
-fn is_still(log: &Log, device: usize, end: f64) -> bool {
-    let [most, time] = STILL;
-    let last = log
-        .ticks
-        .iter()
-        .filter(|t| (end - time..=end).contains(&t.tick.now));
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for place in last.map(|t| t.devices[device].position) {
-        for c in 0..3 {
-            low[c] = low[c].min(place[c]);
-            high[c] = high[c].max(place[c]);
-        }
-    }
-    (0..3).all(|c| high[c] - low[c] < most) && end > time
 }
 
 /// Time from the end of the step that requests a zone to the step that takes it over, s: 90th

@@ -1,9 +1,12 @@
 //! `palpa loop-report`: runs the whole engine in real time and reports on it.
 
+mod audit;
 mod bars;
 mod figures;
-mod guarantees;
+mod force;
+mod hand;
 mod picture;
+mod verdicts;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -12,16 +15,17 @@ use anyhow::Context as _;
 use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
 use palpa_scene::Scene;
 
+use self::audit::Audit;
 use self::bars::{BarFigures, Bars, LOOK_PERIOD};
-use self::figures::Figures;
-use self::guarantees::broken;
+use self::figures::{Figures, Setup};
+use self::hand::still_spans;
 use super::Outcome;
 use crate::cli::Context;
 use palpa::live::{LiveScene, Watch, machine, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
 /// The scene that is used if none is given.
-const EMBEDDED: &str = include_str!("../../../scenes/forearm_lump.toml");
+pub(super) const EMBEDDED: &str = include_str!("../../../scenes/forearm_lump.toml");
 /// Shortest duration of a run, s. Shorter runs do not show rare ticks, and the RMS of the force
 /// needs two seconds.
 const LEAST_SECONDS: f64 = 5.0;
@@ -31,7 +35,8 @@ const MOST_SECONDS: f64 = 3600.0;
 ///
 /// A simulated hand holds the haptic device of the scene and moves it as the scene's motion says.
 /// The tissue is computed with finite elements, the force at 1 kHz. Without a SCENE, the hand
-/// strokes a forearm with a lump. Meanwhile a thread of the lowest priority computes error bars of
+/// strokes a forearm with a lump. Each guarantee is judged; one that the run gave nothing to judge by
+/// is not kept. Meanwhile a thread of the lowest priority computes error bars of
 /// the force at up to five places along the way. Writes the log (log.mcap, for `palpa replay`), the figures
 /// (loop.json), histograms of the times of ticks, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
@@ -58,6 +63,10 @@ pub struct Args {
     /// Compute no error bars
     #[arg(long)]
     no_error_bars: bool,
+    /// After the run, solve N poses of the tool again statically on finer meshes, and report the
+    /// error of the force there, 1 to 500
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
+    audit: Option<u16>,
     /// Print the scene as a start for your own, and run nothing
     #[arg(long)]
     print_scene: bool,
@@ -105,9 +114,12 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         tissue.live().n_columns()[1],
     ))?;
     let log = out.path().join("log.mcap");
-    let run = run_engine(args, context, &scene, &live, tissue, log)?;
+    let mut run = run_engine(args, context, &scene, &live, tissue, log)?;
     let log = Log::open(out.path().join("log.mcap"))?;
-    let figures = Figures::new(&run, &log, &live, scene.motion.speed, args.seconds);
+    if let Some(n) = args.audit.filter(|_| !context.is_interrupted()) {
+        run.audit = Some(audit::audit(n.into(), &run, &log, &scene, &live, context)?);
+    }
+    let figures = Figures::new(&run, &log, &Setup::new(&live, scene.motion.speed));
     let subtitle = format!(
         "{} at up to {:.0} mm/s; {} in a {} hand",
         scene.motion.kind.name(),
@@ -117,15 +129,17 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     );
     write(&figures, &log, &scene, &subtitle, out)?;
     figures.say(context)?;
-    let broken = broken(&figures);
-    for guarantee in &broken {
-        context.say(format!("NOT GOOD: {guarantee}"))?;
+    for problem in verdicts::problems(&figures.verdicts) {
+        context.say(format!("NOT GOOD: {problem}"))?;
+    }
+    if figures.is_good {
+        context.say("GOOD: every guarantee was judged and kept")?;
     }
     context.say(format!("written to {}", out.path().display()))?;
     context.json(&figures)?;
     Ok(if context.is_interrupted() {
         Outcome::Interrupted
-    } else if broken.is_empty() {
+    } else if figures.is_good {
         Outcome::Done
     } else {
         Outcome::NotGood
@@ -134,17 +148,20 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
 
 /// The results of a run.
 struct Run {
-    /// Before the ramp down at the end.
-    forces: Vec<palpa_rt::ForceReport>,
     report: Report,
+    /// When the ramp down at the end began, s on the loop's clock: later ticks do not count.
+    until: f64,
+    /// Spans of the path of the hand in which its target was still, s.
+    still: Vec<[f64; 2]>,
     /// `None` if none were asked for.
     bars: Option<Vec<BarFigures>>,
+    /// `None` if none was asked for.
+    audit: Option<Audit>,
     /// What the system granted to the threads.
     threads: Vec<String>,
 }
 
-/// Runs for the requested time or until Ctrl-C. The report of the forces is taken before the ramp
-/// down at the end. Error bars that are missing then are computed afterwards.
+/// Runs for the requested time or until Ctrl-C. Error bars that are missing then are computed afterwards.
 fn run_engine(
     args: &Args,
     context: &Context,
@@ -154,6 +171,7 @@ fn run_engine(
     log: PathBuf,
 ) -> anyhow::Result<Run> {
     let way = path(scene, &live.scene_from_device, args.seconds);
+    let still = still_spans(&way, args.seconds);
     let device = open_device(&scene.device, way)?;
     let params = EngineParams {
         servo: servo_params(&*device),
@@ -187,15 +205,16 @@ fn run_engine(
         bar.set_position(engine.now() as u64);
     }
     bar.finish_and_clear();
-    // Taken before the stop, so that the ramp down does not count.
-    let forces = engine.report().forces;
+    let until = engine.now().min(args.seconds);
     let report = engine.stop();
     let mut threads: Vec<String> = report.granted.iter().map(ToString::to_string).collect();
     threads.extend(bars.as_ref().map(Bars::granted));
     Ok(Run {
-        forces,
         report,
+        until,
+        still,
         bars: bars.map(|bars| bars.finish(context)),
+        audit: None,
         threads,
     })
 }

@@ -1,10 +1,12 @@
 //! Smoothness and energy of the forces, computed from ticks, live or from a log.
 
+mod filter;
+
+pub(crate) use self::filter::{BandPass, VIBRATION};
+
 use crate::{histogram::Histogram, record::DeviceRecord, servo_loop::TickEntry};
 use std::collections::VecDeque;
 
-/// The band in which hands feel vibration, Hz.
-const BAND: [f64; 2] = [20.0, 400.0];
 /// Window of the RMS, s.
 const WINDOW: f64 = 2.0;
 
@@ -13,7 +15,7 @@ const WINDOW: f64 = 2.0;
 #[derive(Debug)]
 pub struct ForceStats {
     period: f64,
-    filters: [[Biquad; 2]; 3],
+    filter: BandPass,
     last: Option<DeviceRecord>,
     /// Squares of the filtered force in the window, N².
     squares: VecDeque<f64>,
@@ -59,16 +61,9 @@ pub struct ForceReport {
 impl ForceStats {
     /// Statistics for a loop of this period, s.
     pub fn new(period: f64) -> Self {
-        let [low, high] = BAND;
-        // The upper edge must lie below half the sampling rate.
-        let high = high.min(0.49 / period);
-        let pair = [
-            Biquad::high_pass(low * period),
-            Biquad::low_pass(high * period),
-        ];
         Self {
             period,
-            filters: [pair; 3],
+            filter: BandPass::new(VIBRATION, period),
             last: None,
             squares: VecDeque::new(),
             worst_sum: 0.0,
@@ -88,10 +83,7 @@ impl ForceStats {
             return;
         };
         let force = device.force;
-        let filtered: f64 = (self.filters.iter_mut().zip(force))
-            .map(|([high, low], f)| low.next(high.next(f)).powi(2))
-            .sum();
-        self.squares.push_back(filtered);
+        self.squares.push_back(self.filter.square(force));
         let window = (WINDOW / self.period) as usize;
         if self.squares.len() > window {
             self.squares.pop_front();
@@ -153,50 +145,8 @@ impl ForceStats {
     }
 }
 
-fn norm(v: [f64; 3]) -> f64 {
+pub(crate) fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// A second-order Butterworth filter, direct form II transposed. From the bilinear transform:
-/// Zölzer, DAFX (2011), 2.3.
-#[derive(Debug, Clone, Copy)]
-struct Biquad {
-    b: [f64; 3],
-    a: [f64; 2],
-    state: [f64; 2],
-}
-
-impl Biquad {
-    /// `f` is the corner in cycles per sample.
-    fn low_pass(f: f64) -> Self {
-        let k = (std::f64::consts::PI * f).tan();
-        Self::new([k * k, 2.0 * k * k, k * k], k)
-    }
-
-    fn high_pass(f: f64) -> Self {
-        Self::new([1.0, -2.0, 1.0], (std::f64::consts::PI * f).tan())
-    }
-
-    fn new(b: [f64; 3], k: f64) -> Self {
-        let scale = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
-        Self {
-            b: b.map(|b| b * scale),
-            a: [
-                2.0 * (k * k - 1.0) * scale,
-                (1.0 - std::f64::consts::SQRT_2 * k + k * k) * scale,
-            ],
-            state: [0.0; 2],
-        }
-    }
-
-    fn next(&mut self, x: f64) -> f64 {
-        let y = self.b[0] * x + self.state[0];
-        self.state = [
-            self.b[1] * x - self.a[0] * y + self.state[1],
-            self.b[2] * x - self.a[1] * y,
-        ];
-        y
-    }
 }
 
 #[cfg(test)]

@@ -1,104 +1,23 @@
-//! `palpa bench`: rates of the moving step, and its errors at these rates.
+//! Uniform blocks and bodies that are graded toward the tool.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::{Context as _, anyhow, bail};
+use anyhow::{Context as _, anyhow};
 use palpa_fem::Model;
+use palpa_fem::realtime::LiveParams;
 
-use super::Outcome;
+use super::super::Outcome;
 use crate::cli::Context;
 use crate::table::Table;
-use palpa_lab::bench::cases::{BenchCase, BenchShape, Run, Tissue, cases};
+use palpa_lab::bench::cases::{BenchCase, BenchShape, Run, Tissue};
 use palpa_lab::bench::ratios::{Ratio, dense_inverse, full_factor};
 use palpa_lab::bench::refined::Problem;
-use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params, ride};
-use palpa_lab::bench::{BenchReport, BenchRow, Mode, growth, picture};
-
-/// Description for the report of how the table is measured.
-const METHOD: &str = "thread-CPU time of Live::step alone, one core; a frictionless sphere comes down at up to 50 mm/s and no \
-    more than 0.25 mm a step, presses 5 mm deep, strokes 20 mm sideways and lifts (the graded bodies: presses and lifts); \
-    median and 99th percentile over all steps in contact; background work runs apart, is taken over as many steps later as \
-    its CPU time is long, and is counted as a share of the steps' CPU time; step error: largest error of the force past 2 mm \
-    against the converged quasi-static force at the same place on the same mesh; mesh error: converged forces against \
-    those on a refined mesh, while pressing; total error: forces of the moving step against those on the refined mesh, \
-    while pressing";
-
-/// Measure the speed and the error of the moving step
-///
-/// A tool presses, strokes and lifts on bodies of 1,000 to 64,000 nodes and on meshes graded toward
-/// the tool. Contact changes on the way, and the tool leaves the zones. Rates are medians of
-/// thread-CPU time on one core. Writes bench.json, bench.csv, bench.svg and bench.png.
-#[derive(Debug, clap::Args)]
-pub struct Args {
-    /// Run only this case; may be repeated [default: all]
-    #[arg(long = "case", value_name = "NAME")]
-    cases: Vec<String>,
-    /// Use small bodies only; takes seconds
-    #[arg(long, conflicts_with = "cases")]
-    quick: bool,
-    /// List the cases and run none
-    #[arg(long)]
-    list: bool,
-    /// Compute the forces on refined meshes, the reference for mesh errors, and run no case
-    #[arg(long)]
-    refined: bool,
-}
-
-/// Runs the command.
-///
-/// # Errors
-/// If a case does not exist, a body cannot be computed with, or a result cannot be written.
-pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let chosen = chosen(args)?;
-    if args.list {
-        for case in &chosen {
-            context.say(case.name)?;
-        }
-        let names: Vec<&str> = chosen.iter().map(|case| case.name).collect();
-        context.json(&names)?;
-        return Ok(Outcome::Done);
-    }
-    if args.refined {
-        return refined(&chosen, context);
-    }
-    context.out_dir()?;
-    context.begin_recording();
-    let mut report = BenchReport {
-        method: METHOD,
-        ..BenchReport::default()
-    };
-    let is_whole = measure(&chosen, context, &mut report)?;
-    let is_of_growth = |row: &BenchRow| {
-        cases().iter().any(|case| {
-            case.name == row.case
-                && case.tissue == Tissue::Elastic
-                && matches!(case.shape, BenchShape::Block { .. })
-        })
-    };
-    report.growth = growth::growth(&report.rows.iter().filter(|row| is_of_growth(row)));
-    report.is_complete = is_whole;
-    say(context, &report)?;
-    let out = context.out_dir()?;
-    out.write_json("bench.json", &report)?;
-    let mut table = out.table("bench.csv")?;
-    for row in &report.rows {
-        table.push(row)?;
-    }
-    table.finish()?;
-    if !report.rows.is_empty() {
-        picture::draw(&report, is_of_growth).save(out, "bench")?;
-    }
-    context.json(&report)?;
-    Ok(if is_whole {
-        Outcome::Done
-    } else {
-        Outcome::Interrupted
-    })
-}
+use palpa_lab::bench::ride::{JUDGED_FROM, Known, Ridden, converged, params as mode_params, ride};
+use palpa_lab::bench::{BenchReport, BenchRow, Mode};
 
 /// Computes the forces on refined meshes that the source code records.
-fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Result<Outcome> {
+pub(super) fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Result<Outcome> {
     let mut found = Vec::new();
     for problem in Problem::ALL {
         if !chosen.iter().any(|case| case.problem == problem) {
@@ -123,24 +42,8 @@ fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Result<Outcome> 
     Ok(Outcome::Done)
 }
 
-fn chosen(args: &Args) -> anyhow::Result<Vec<&'static BenchCase>> {
-    let is_known = |name: &String| cases().iter().any(|case| case.name == name.as_str());
-    if let Some(unknown) = args.cases.iter().find(|name| !is_known(name)) {
-        let known: Vec<&str> = cases().iter().map(|case| case.name).collect();
-        bail!(
-            "there is no case \"{unknown}\"; the cases are {}",
-            known.join(", ")
-        );
-    }
-    let is_named = |case: &BenchCase| {
-        args.cases.is_empty() && (!args.quick || case.is_quick)
-            || args.cases.iter().any(|name| name == case.name)
-    };
-    Ok(cases().iter().filter(|case| is_named(case)).collect())
-}
-
 /// Measures all lines. Returns false if interrupted.
-fn measure(
+pub(super) fn measure(
     chosen: &[&BenchCase],
     context: &Context,
     report: &mut BenchReport,
@@ -157,7 +60,7 @@ fn measure(
             if context.is_interrupted() {
                 return Ok(false);
             }
-            let mut params = params(run.mode, run.zone_radius);
+            let mut params = mode_params(run.mode, run.zone_radius);
             if let Some(stale) = run.stale {
                 params.stale = stale;
             }
@@ -171,7 +74,11 @@ fn measure(
                 Some(known) => known,
                 None => known.insert(truth(case, &model, ridden.travel / ridden.dt)?),
             };
-            report.rows.push(row(case, run, &model, &ridden, known)?);
+            let mut row = row(case, run, &model, &ridden, known)?;
+            if run.mode == Mode::Zone {
+                row.worst_of_four_places = worst_of_four_places(case, &model, params)?;
+            }
+            report.rows.push(row);
         }
         ratios(case, &model, report)?;
         let own: Vec<&BenchRow> = report
@@ -183,6 +90,21 @@ fn measure(
         progress.inc(1);
     }
     Ok(true)
+}
+
+/// Largest total error with the sphere at four places of a graded mesh; `None` on other meshes.
+fn worst_of_four_places(
+    case: &BenchCase,
+    model: &Arc<Model>,
+    params: LiveParams,
+) -> anyhow::Result<Option<f64>> {
+    let mut worst: Option<f64> = None;
+    for at in case.rides_at_four_places() {
+        let ridden = ride(model, &at, params)?;
+        let error = ridden.error_by_depth(&at, |depth| case.problem.force_at(depth));
+        worst = worst.into_iter().chain(error).reduce(f64::max);
+    }
+    Ok(worst)
 }
 
 /// Forces of the converged body.
@@ -217,18 +139,8 @@ fn row(
     let pressed = on_mesh.iter().filter(|known| known.is_press);
     let mesh_errors =
         pressed.filter_map(|known| Some((known.force.z / force_at(known.depth)? - 1.0).abs()));
-    let total_errors = known
-        .iter()
-        .filter(|known| known.is_press)
-        .filter_map(|known| {
-            let found = ridden
-                .forces
-                .iter()
-                .find(|f| (f.0 - known.at).abs() < 1e-9)?;
-            Some((found.1.z / force_at(known.depth)? - 1.0).abs())
-        });
     let is_elastic = sudden.is_none();
-    let median = ridden.median();
+    let total_error = ridden.error_by_depth(&case.ride(), force_at);
     Ok(BenchRow {
         case: case.name.to_owned(),
         nodes: model.n_nodes(),
@@ -238,14 +150,16 @@ fn row(
         zone_radius_mm: (!is_full).then_some(run.zone_radius * 1e3),
         h_contact_mm: case.shape.h_contact() * 1e3,
         tool_radius_mm: case.radius * 1e3,
-        steps_per_s: 1.0 / median,
+        steps_per_s: 1.0 / ridden.mean(),
         target_steps_per_s: run.target,
-        step_ms_median: median * 1e3,
+        step_ms_mean: ridden.mean() * 1e3,
+        step_ms_median: ridden.median() * 1e3,
         step_ms_p99: ridden.quantile(0.99) * 1e3,
         background_cpu_share: ridden.cpu[0] / ridden.cpu[1],
         step_error: ridden.error(known),
         mesh_error: mesh_errors.reduce(f64::max),
-        total_error: total_errors.reduce(f64::max).filter(|_| is_elastic),
+        total_error: total_error.filter(|_| is_elastic),
+        worst_of_four_places: None,
         tool_mm_per_s: ridden.travel / ridden.dt * 1e3,
         travel_mm: ridden.travel * 1e3,
         n_steps: ridden.times.len(),
@@ -305,19 +219,20 @@ fn ratios(case: &BenchCase, model: &Arc<Model>, report: &mut BenchReport) -> any
 
 fn say_rows(context: &Context, rows: &[&BenchRow]) -> anyhow::Result<()> {
     let mut table = Table::new([
-        "case",
+        "uniform block",
         "nodes",
         "mode",
         "r mm",
         "h mm",
         "steps/s",
         "asked",
-        "ms",
+        "median ms",
         "p99 ms",
         "bg CPU",
         "step err",
         "mesh err",
         "total err",
+        "4 places",
         "mm/s",
         "switches",
         "bad",
@@ -342,6 +257,7 @@ fn say_rows(context: &Context, rows: &[&BenchRow]) -> anyhow::Result<()> {
             percent(row.step_error),
             maybe(row.mesh_error),
             maybe(row.total_error),
+            maybe(row.worst_of_four_places),
             format!("{:.0}", row.tool_mm_per_s),
             row.n_zone_switches.to_string(),
             (row.n_backed_off + row.n_failed).to_string(),
@@ -350,7 +266,7 @@ fn say_rows(context: &Context, rows: &[&BenchRow]) -> anyhow::Result<()> {
     context.say(&table)
 }
 
-fn say(context: &Context, report: &BenchReport) -> anyhow::Result<()> {
+pub(super) fn say(context: &Context, report: &BenchReport) -> anyhow::Result<()> {
     context.say(format_args!(
         "Errors are the largest past {:.0} mm; bg CPU is the background's over the steps'.",
         JUDGED_FROM * 1e3

@@ -1,0 +1,85 @@
+//! The shipped scenes.
+
+use palpa_lab::bench::BenchReport;
+use palpa_lab::bench::shipped::{MeasureParams, ShippedCase, ShippedRow, measure};
+
+use crate::cli::Context;
+use crate::table::Table;
+
+/// Measures the cases. Returns false if interrupted.
+pub(super) fn measure_all(
+    cases: &[ShippedCase],
+    params: &MeasureParams,
+    context: &Context,
+    report: &mut BenchReport,
+) -> anyhow::Result<bool> {
+    let progress = context.progress(cases.len(), "measuring");
+    for case in cases {
+        if context.is_interrupted() {
+            break;
+        }
+        progress.set_message(case.name.clone());
+        let row = measure(case, params, || !context.is_interrupted());
+        if context.is_interrupted() {
+            break;
+        }
+        report
+            .shipped
+            .push(row.map_err(|e| e.context(format!("case \"{}\"", case.name)))?);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    if !report.shipped.is_empty() {
+        context.say(table(&report.shipped))?;
+        context.say(
+            "Errors are 95th percentiles past 2 mm, against static forces on finer meshes; bg CPU is the share of a core \
+             during the motion.",
+        )?;
+    }
+    Ok(!context.is_interrupted())
+}
+
+fn table(rows: &[ShippedRow]) -> Table<16> {
+    let mut table = Table::new([
+        "shipped scene",
+        "accuracy",
+        "nodes",
+        "steps/s",
+        "p99 ms",
+        "error",
+        "largest",
+        "down",
+        "across",
+        "up",
+        "of the mesh",
+        "of the reference",
+        "places",
+        "behind",
+        "bg CPU",
+        "mm/s",
+    ])
+    .with_left_names();
+    let percent =
+        |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{:.1} %", 1e2 * x));
+    for row in rows {
+        table.push([
+            row.case.clone(),
+            percent(row.accuracy),
+            row.nodes.to_string(),
+            format!("{:.0}", row.steps_per_s_mean),
+            format!("{:.2}", row.step_ms_p99),
+            percent(row.total_error_p95),
+            percent(row.total_error_max),
+            percent(row.total_error_p95_press),
+            percent(row.total_error_p95_stroke),
+            percent(row.total_error_p95_lift),
+            percent(row.mesh_error_p95),
+            percent(row.reference_change),
+            row.n_places.to_string(),
+            format!("{} of {}", row.n_behind, row.n_steps),
+            format!("{:.2}", row.background_cpu_share),
+            format!("{:.0}–{:.0}", row.hand_mm_per_s_min, row.hand_mm_per_s_max),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,203 @@
+//! Measures a case: rate over all places, error at poses drawn along each way.
+
+use fastrand::Rng;
+use palpa::audit::{REFERENCE_SHARE, Reference, Stop, has_history, quantile, relaxes, thinned};
+use palpa::live::LiveScene;
+
+use super::drive::{Driven, Felt, Part, drive};
+use super::places::{Spot, draw_spots};
+use super::{ShippedCase, ShippedRow};
+
+/// Poses are drawn from this depth on, m, and where the force is at least this share of the largest at
+/// the place: errors are relative.
+const FROM_DEPTH: f64 = 2e-3;
+const LEAST_FORCE: f64 = 0.2;
+/// The mesh that judges the reference has sizes this many times those of the reference.
+const FINER: f64 = 0.7;
+/// Longest way of the tool between two static steps, m, and longest time if tissue relaxes, s.
+const LONGEST_WAY: f64 = 0.5e-3;
+const LONGEST_TIME: f64 = 0.05;
+const SEED: u64 = 7;
+
+/// How much is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeasureParams {
+    /// Number of places.
+    pub n_places: usize,
+    /// Poses that are solved again on each part of the way: down, across, and up.
+    pub n_poses: usize,
+}
+
+/// An audited pose.
+#[derive(Debug, Clone, Copy)]
+struct Audited {
+    part: Part,
+    error: Option<f64>,
+    mesh_error: Option<f64>,
+}
+
+/// Measures a case. `goes_on` is asked before each place and pose; if it returns false, the places
+/// until then are the result.
+///
+/// # Errors
+/// If the body cannot be grown or pressed, or a place has no room.
+pub fn measure(
+    case: &ShippedCase,
+    params: &MeasureParams,
+    mut goes_on: impl FnMut() -> bool,
+) -> anyhow::Result<ShippedRow> {
+    let mut row = ShippedRow {
+        case: case.name.clone(),
+        accuracy: case.scene.mesh.accuracy,
+        hand_mm_per_s_min: f64::INFINITY,
+        reference_nodes: usize::MAX,
+        ..ShippedRow::default()
+    };
+    let (mut times, mut audited, mut n_nodes) = (Vec::new(), Vec::new(), 0);
+    let (mut duration, mut background) = (0.0, 0.0);
+    let spots = draw_spots(case, params.n_places)?;
+    for (k, (spot, live)) in spots.iter().enumerate() {
+        if !goes_on() {
+            break;
+        }
+        let scene = spot.scene(&case.scene);
+        let driven = drive(&scene, live)?;
+        audited.extend(audit(&driven, live, params, k, &mut row, &mut goes_on)?);
+        note(&mut row, spot, &driven);
+        n_nodes += live.model.n_nodes();
+        duration += driven.duration;
+        background += driven.background;
+        times.extend(driven.times);
+    }
+    anyhow::ensure!(row.n_places > 0, "no place was measured");
+    row.nodes = n_nodes / row.n_places;
+    let whole: f64 = times.iter().sum();
+    times.sort_by(f64::total_cmp);
+    row.n_steps = times.len();
+    row.steps_per_s_mean = times.len() as f64 / whole;
+    row.step_ms_p99 = quantile(&times, 0.99).unwrap_or(f64::NAN) * 1e3;
+    row.background_cpu_share = background / duration;
+    row.steps_cpu_share = whole / duration;
+    enter_errors(&mut row, &audited);
+    Ok(row)
+}
+
+fn note(row: &mut ShippedRow, spot: &Spot, driven: &Driven) {
+    let speed = spot.speed * 1e3;
+    row.hand_mm_per_s_min = row.hand_mm_per_s_min.min(speed);
+    row.hand_mm_per_s_max = row.hand_mm_per_s_max.max(speed);
+    row.n_places += 1;
+    row.n_behind += driven.n_behind;
+    row.n_unfinished += driven.n_unfinished;
+    row.n_failed += driven.n_failed;
+}
+
+fn enter_errors(row: &mut ShippedRow, audited: &[Audited]) {
+    let sorted = |errors: &mut dyn Iterator<Item = f64>| {
+        let mut errors: Vec<f64> = errors.collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    };
+    let all = sorted(&mut audited.iter().filter_map(|pose| pose.error));
+    row.n_poses = all.len();
+    row.n_poses_failed = audited.len() - all.len();
+    row.total_error_p95 = quantile(&all, 0.95);
+    row.total_error_max = quantile(&all, 1.0);
+    let of_part = |part: Part| {
+        let of_part = audited.iter().filter(|pose| pose.part == part);
+        quantile(&sorted(&mut of_part.filter_map(|pose| pose.error)), 0.95)
+    };
+    row.total_error_p95_press = of_part(Part::Press);
+    row.total_error_p95_stroke = of_part(Part::Stroke);
+    row.total_error_p95_lift = of_part(Part::Lift);
+    let of_mesh = sorted(&mut audited.iter().filter_map(|pose| pose.mesh_error));
+    row.mesh_error_p95 = quantile(&of_mesh, 0.95);
+}
+
+/// Solves poses of a way again.
+fn audit(
+    driven: &Driven,
+    live: &LiveScene,
+    params: &MeasureParams,
+    k: usize,
+    row: &mut ShippedRow,
+    goes_on: &mut impl FnMut() -> bool,
+) -> anyhow::Result<Vec<Audited>> {
+    let felt = &driven.felt;
+    let chosen = drawn(felt, params.n_poses, k);
+    let Some(&last) = chosen.last() else {
+        return Ok(Vec::new());
+    };
+    let stops: Vec<Stop> = felt.iter().map(stop).collect();
+    let prepared = &live.prepared;
+    let of_chosen: Vec<Stop> = chosen.iter().map(|&i| stops[i]).collect();
+    let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
+    row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
+    if k == 0 {
+        let tool = &of_chosen[of_chosen.len() / 2].tool;
+        let at = tool.pose.translation.vector;
+        let press = |share: f64| Reference::round(prepared, at, share).ok()?.press(tool);
+        let [usual, finer] = [1.0, FINER].map(|times| press(times * REFERENCE_SHARE));
+        let change = usual.zip(finer);
+        row.reference_change = change.map(|(usual, finer)| (usual - finer).norm() / finer.norm());
+    }
+    let scene = &prepared.scene;
+    let mut forces = Vec::new();
+    let mut on_loop = None;
+    if has_history(scene) {
+        let longest_time = relaxes(scene).then_some(LONGEST_TIME);
+        let kept = thinned(&stops[..=last], &chosen, LONGEST_WAY, longest_time);
+        let way: Vec<Stop> = kept.iter().map(|&i| stops[i]).collect();
+        let found = kept.iter().zip(mesh.follow(&way, &mut *goes_on));
+        let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
+        forces.extend(found.map(|(_, force)| force));
+    } else {
+        on_loop = Some(Reference::on(prepared)?);
+        for stop in &of_chosen {
+            if !goes_on() {
+                break;
+            }
+            forces.push(mesh.press(&stop.tool));
+        }
+    }
+    let audited = chosen.iter().zip(forces).map(|(&i, force)| {
+        let felt = &felt[i];
+        let error = |found: palpa_mesh::Vec3| Some((found - force?).norm() / force?.norm());
+        let on_loop = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
+        Audited {
+            part: felt.part,
+            error: error(felt.force),
+            mesh_error: on_loop.and_then(error),
+        }
+    });
+    Ok(audited.collect())
+}
+
+fn stop(felt: &Felt) -> Stop {
+    Stop {
+        tool: felt.tool,
+        time: felt.time,
+    }
+}
+
+/// `n` poses of each part of a way, at random, spread over the part. Indices, ascending.
+fn drawn(felt: &[Felt], n: usize, k: usize) -> Vec<usize> {
+    let largest = felt.iter().map(|f| f.force.norm()).fold(0.0, f64::max);
+    let mut rng = Rng::with_seed(SEED + k as u64);
+    let mut chosen = Vec::new();
+    for part in [Part::Press, Part::Stroke, Part::Lift] {
+        let is_firm = |f: &Felt| {
+            let force = f.force.norm();
+            f.depth >= FROM_DEPTH && force > 0.0 && force >= LEAST_FORCE * largest
+        };
+        let firm: Vec<usize> = (felt.iter().enumerate())
+            .filter(|(_, f)| f.part == part && is_firm(f))
+            .map(|(i, _)| i)
+            .collect();
+        let n = n.min(firm.len());
+        chosen
+            .extend((0..n).map(|i| firm[rng.usize(i * firm.len() / n..(i + 1) * firm.len() / n)]));
+    }
+    chosen.sort_unstable();
+    chosen
+}

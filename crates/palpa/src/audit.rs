@@ -1,0 +1,228 @@
+//! The static force at poses of the loop, solved again on a mesh that is finer than the loop's: how
+//! wrong the force of the loop is.
+//!
+//! ```text
+//!  poses of the tool ─► a mesh finer than the loop's round them ─► static steps along the way ─► forces
+//! ```
+//! Tissue that neither relaxes nor rubs has one equilibrium at each pose, so each is pressed straight
+//! from above ([`Reference::press`]). Else the way to the pose matters, and
+//! [`Reference::follow`] goes it again in quasi-static steps.
+
+use std::sync::Arc;
+
+use palpa_fem::{Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
+use palpa_mesh::{SurfaceIndex, Vec3};
+use palpa_scene::{Scene, Target};
+
+use crate::Prepared;
+use crate::build::{BuiltBody, nearest};
+use crate::press::mesh::{Sizes, along_skin};
+
+/// Edges and heights of a reference mesh under the tool, as a share of the contact radius: 1.3 mm for
+/// a ball of 10 mm. On a layered block the force at 5 mm is then 0.7 % above that with 0.9 mm.
+pub const REFERENCE_SHARE: f64 = 0.22;
+/// Growth of the sizes with the distance from the tool.
+const GROWTH: f64 = 0.35;
+/// A mesh with more nodes is not used: it would take minutes for a press.
+const MOST_NODES: usize = 60_000;
+/// Distance between the points along a way at which a mesh is fine, m.
+const WAY_STEP: f64 = 4e-3;
+/// Heights above the pose at which a straight press solves for the equilibrium on its way, m. It
+/// begins higher than any press is deep; in the air a step costs nothing.
+const HEIGHTS: [f64; 7] = [50e-3, 7.5e-3, 6e-3, 4.5e-3, 3e-3, 1.5e-3, 0.0];
+
+/// A mesh round some places of a body, and what is needed to press it.
+#[derive(Debug)]
+pub struct Reference {
+    model: Arc<Model>,
+    rest: State,
+    params: SolveParams,
+    mesh_size: f64,
+}
+
+/// A pose of the tool at a time, s.
+#[derive(Debug, Clone, Copy)]
+pub struct Stop {
+    /// The tool with its pose in the scene's frame.
+    pub tool: PosedTool,
+    /// Time, s. Only differences matter, and only for tissue that relaxes.
+    pub time: f64,
+}
+
+impl Reference {
+    /// The mesh of a scene as it is, such as that of the loop.
+    ///
+    /// # Errors
+    /// When the body cannot be pressed, or has no equilibrium at rest.
+    pub fn on(prepared: &Prepared) -> anyhow::Result<Self> {
+        Ok(Self {
+            model: prepared.model()?,
+            rest: prepared.rest()?,
+            params: prepared.solve_params(),
+            mesh_size: prepared.mesh.mesh_size,
+        })
+    }
+
+    /// A mesh of the body of `of` that is fine round the place of the skin nearest to `at`. `share`
+    /// is that of [`REFERENCE_SHARE`].
+    ///
+    /// # Errors
+    /// When the place cannot be pressed, or the mesh would have too many nodes.
+    pub fn round(of: &Prepared, at: Vec3, share: f64) -> anyhow::Result<Self> {
+        Self::build(of, at, &[], share)
+    }
+
+    /// A mesh of the body of `of` that is fine along the way of these stops across the skin.
+    ///
+    /// # Errors
+    /// As [`Self::round`].
+    pub fn along(of: &Prepared, stops: &[Stop], share: f64) -> anyhow::Result<Self> {
+        let place = of.place();
+        let along = along_skin(&of.scene, &place.direction);
+        let far = |stop: &Stop| (stop.tool.pose.translation.vector - place.at).dot(&along);
+        let (low, high) = (stops.iter().map(far)).fold((0.0_f64, 0.0_f64), |(low, high), far| {
+            (low.min(far), high.max(far))
+        });
+        let n = ((high - low) / WAY_STEP).ceil() as usize;
+        let way: Vec<f64> = (0..=n)
+            .map(|i| low + (high - low) * i as f64 / n.max(1) as f64)
+            .collect();
+        Self::build(of, place.at, &way, share)
+    }
+
+    fn build(of: &Prepared, at: Vec3, way: &[f64], share: f64) -> anyhow::Result<Self> {
+        let scene = finer(&of.scene, at);
+        let skin = &of.grown.growth.body.skin;
+        let closest = SurfaceIndex::build(skin).closest(at);
+        let press_at = closest.map_or(at, |closest| closest.point);
+        let grown = Arc::new(BuiltBody {
+            press_at,
+            press_vertex: nearest(skin, press_at),
+            ..(*of.grown).clone()
+        });
+        let sizes = Sizes::even(&scene, scene.tool.edge_length(share), GROWTH);
+        let prepared = Prepared::with_sizes(&scene, grown, Some(sizes), way)?;
+        let n_nodes = prepared.mesh.body.n_nodes();
+        anyhow::ensure!(
+            n_nodes <= MOST_NODES,
+            "a finer mesh would have {n_nodes} nodes, more than the {MOST_NODES} that are solved for an audit"
+        );
+        Self::on(&prepared)
+    }
+
+    /// Number of nodes.
+    pub fn n_nodes(&self) -> usize {
+        self.model.n_nodes()
+    }
+
+    /// Mean length of the skin's edges near the tool, m.
+    pub fn mesh_size(&self) -> f64 {
+        self.mesh_size
+    }
+
+    /// Static force of the tissue on a tool that was pressed straight along its own axis to its pose,
+    /// N, in the scene's frame; `None` if no equilibrium was found. It is instantaneous: nothing
+    /// relaxes.
+    pub fn press(&self, tool: &PosedTool) -> Option<Vec3> {
+        let out = tool.pose.rotation * Vec3::z();
+        let above = |height: f64| {
+            let mut tool = *tool;
+            tool.pose.translation.vector += out * height;
+            Stop { tool, time: 0.0 }
+        };
+        let forces = self.follow(&HEIGHTS.map(above), || true);
+        *forces.last()?
+    }
+
+    /// Static forces of the tissue on a tool that goes from stop to stop, N, in the scene's frame.
+    /// The first stop must not touch the body. From the first stop without an equilibrium on, and if
+    /// `goes_on`, which is asked before each stop, returns false, they are `None`.
+    pub fn follow(&self, stops: &[Stop], mut goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
+        let mut forces = vec![None; stops.len()];
+        let Some(first) = stops.first() else {
+            return forces;
+        };
+        let (mut state, mut ws) = (self.rest.clone(), Workspace::new(&self.model));
+        let (mut before, mut time) = ([first.tool], first.time);
+        for (force, stop) in forces.iter_mut().zip(stops) {
+            if !goes_on() {
+                break;
+            }
+            let now = [stop.tool];
+            let load = Load {
+                tools: &now,
+                duration: stop.time - time,
+                ..Load::default()
+            };
+            let last = Load {
+                tools: &before,
+                ..Load::default()
+            };
+            let report = advance(&self.model, &mut state, &mut ws, &last, &load, &self.params);
+            if report.outcome != Outcome::Converged {
+                break;
+            }
+            *force = report.tool_forces.first().copied();
+            (before, time) = (now, stop.time);
+        }
+        forces
+    }
+}
+
+/// Thins a way to static steps, no more than `longest_way` apart, m, and `longest_time`, s, if that
+/// matters. Keeps the first stop and those of `kept`, which ascend. Indices, ascending.
+pub fn thinned(
+    stops: &[Stop],
+    kept: &[usize],
+    longest_way: f64,
+    longest_time: Option<f64>,
+) -> Vec<usize> {
+    let mut all = vec![0];
+    let mut last = 0;
+    for i in 1..stops.len() {
+        let (from, next) = (&stops[last], &stops[(i + 1).min(stops.len() - 1)]);
+        let way = next.tool.pose.translation.vector - from.tool.pose.translation.vector;
+        let is_late = longest_time.is_some_and(|longest| next.time - from.time > longest);
+        if way.norm() > longest_way || is_late || kept.binary_search(&i).is_ok() {
+            all.push(i);
+            last = i;
+        }
+    }
+    all
+}
+
+/// The quantile `q`, 0 to 1, of values in ascending order: at least this share of them is no larger.
+pub fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
+    let last = ascending.len().checked_sub(1)?;
+    ascending.get((q * last as f64).ceil() as usize).copied()
+}
+
+/// Whether the force at a pose depends on the way to it.
+pub fn has_history(scene: &Scene) -> bool {
+    rubs(scene) || relaxes(scene)
+}
+
+/// Whether the tool rubs on the skin.
+pub fn rubs(scene: &Scene) -> bool {
+    scene.tool.contact().is_some_and(|tool| tool.friction > 0.0)
+}
+
+/// Whether a tissue of the scene relaxes.
+pub fn relaxes(scene: &Scene) -> bool {
+    let of_layers = scene.layers.iter().map(|layer| &layer.tissue);
+    let mut all = of_layers.chain(scene.lumps.iter().map(|lump| &lump.tissue));
+    all.any(|tissue| tissue.prony.is_some())
+}
+
+/// The scene, set to press at `at` on a mesh without the limits of a live one.
+fn finer(scene: &Scene, at: Vec3) -> Scene {
+    let mut scene = scene.clone();
+    scene.press.target = Target::Point(at.into());
+    scene.press.direction = None;
+    scene.press.speeds.clear();
+    // The depth is that of the poses; the press itself is not run.
+    scene.press.depth = scene.press.depth.min(1e-3);
+    scene.mesh.refine = true;
+    scene.mesh.max_vertices = MOST_NODES;
+    scene
+}
