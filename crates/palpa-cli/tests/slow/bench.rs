@@ -23,14 +23,14 @@ fn the_recorded_forces_are_those_of_the_refined_meshes() {
 
 /// A shipped scene goes through the same door as the loop. Its forces are solved again on a finer mesh.
 #[test]
-fn a_shipped_scene_is_measured_at_places_drawn_at_random() {
+fn a_shipped_scene_is_measured_at_a_place_drawn_at_random() {
     let bench = Bench::new(env!("CARGO_BIN_EXE_palpa"));
     let args = [
         "bench",
         "--case",
         "shipped-block",
         "--places",
-        "2",
+        "1",
         "--poses",
         "1",
         "--json",
@@ -43,9 +43,13 @@ fn a_shipped_scene_is_measured_at_places_drawn_at_random() {
     assert_eq!(row["case"], "shipped-block");
     assert_eq!(row["accuracy"], serde_json::Value::Null);
     let row: ShippedRow = serde_json::from_value(row.clone()).unwrap();
-    assert_eq!((row.n_places, row.n_poses, row.n_poses_failed), (2, 6, 0));
+    assert_eq!(
+        (row.n_places, row.n_poses, row.n_poses_failed),
+        (1, 3, 0),
+        "{row:?}"
+    );
     assert!(
-        row.steps_per_s_mean > 0.0 && row.step_ms_p99 > 0.0 && row.n_steps > 100,
+        row.steps_per_s_mean > 0.0 && row.step_ms_p99 > 0.0 && row.n_steps > 20,
         "{row:?}"
     );
     let (p95, max) = (row.total_error_p95.unwrap(), row.total_error_max.unwrap());

@@ -131,8 +131,6 @@ fn audit(
     let stops: Vec<Stop> = felt.iter().map(stop).collect();
     let prepared = &live.prepared;
     let of_chosen: Vec<Stop> = chosen.iter().map(|&i| stops[i]).collect();
-    let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
-    row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
     if k == 0 {
         let tool = &of_chosen[of_chosen.len() / 2].tool;
         let at = tool.pose.translation.vector;
@@ -148,6 +146,8 @@ fn audit(
         let longest_time = relaxes(scene).then_some(LONGEST_TIME);
         let kept = thinned(&stops[..=last], &chosen, LONGEST_WAY, longest_time);
         let way: Vec<Stop> = kept.iter().map(|&i| stops[i]).collect();
+        let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
+        row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
         let found = kept.iter().zip(mesh.follow(&way, &mut *goes_on));
         let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
         forces.extend(found.map(|(_, force)| force));
@@ -157,6 +157,9 @@ fn audit(
             if !goes_on() {
                 break;
             }
+            let at = stop.tool.pose.translation.vector;
+            let mesh = Reference::round(prepared, at, REFERENCE_SHARE)?;
+            row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
             forces.push(mesh.press(&stop.tool));
         }
     }
