@@ -21,6 +21,15 @@ use crate::press::mesh::{Sizes, along_skin};
 /// Edges and heights of a reference mesh under the tool, as a share of the contact radius: 1.3 mm for
 /// a ball of 10 mm. On a layered block the force at 5 mm is then 0.7 % above that with 0.9 mm.
 pub const REFERENCE_SHARE: f64 = 0.22;
+/// The mesh that judges a reference has sizes this many times those of the reference.
+const FINER: f64 = 0.7;
+/// Where the way matters, the longest way of the tool between two static steps, m, and if tissue
+/// relaxes, the longest time between them, s.
+pub const LONGEST_WAY: f64 = 0.5e-3;
+/// See [`LONGEST_WAY`].
+pub const LONGEST_TIME: f64 = 0.05;
+/// Poses are audited where the force is at least this share of the largest: errors are relative.
+pub const LEAST_FORCE: f64 = 0.2;
 /// Growth of the sizes with the distance from the tool.
 const GROWTH: f64 = 0.35;
 /// A mesh with more nodes is not used: it would take minutes for a press.
@@ -166,6 +175,37 @@ impl Reference {
             (before, time) = (now, stop.time);
         }
         forces
+    }
+}
+
+/// How good a reference is, at one pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Number of nodes of a mesh with 0.7 times the sizes.
+    pub finer_nodes: usize,
+    /// Change of the static force on that mesh, as a share of it.
+    pub change: f64,
+}
+
+impl Quality {
+    /// Presses one pose on a reference and on a still finer mesh; `None` if either has no
+    /// equilibrium or too many nodes, or `goes_on`, which is asked before each press, returns false.
+    pub fn find(
+        of: &Prepared,
+        tool: &PosedTool,
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Option<Self> {
+        let at = tool.pose.translation.vector;
+        let mut press = |times: f64| {
+            let mesh = Reference::round(of, at, times * REFERENCE_SHARE).ok()?;
+            let force = goes_on().then(|| mesh.press(tool))??;
+            Some((mesh.n_nodes(), force))
+        };
+        let ((_, usual), (finer_nodes, finer)) = (press(1.0)?, press(FINER)?);
+        Some(Self {
+            finer_nodes,
+            change: (finer - usual).norm() / finer.norm(),
+        })
     }
 }
 

@@ -29,8 +29,6 @@ pub(super) struct Candidate {
     pub(super) pressure: f64,
     /// What the pressure at its points adds across `normal`, N: the tool's normals differ from it.
     pub(super) aside: Vec3,
-    /// Share of its area that presses.
-    pub(super) closed: f64,
     /// Force of friction on it, N.
     pub(super) friction: Vec3,
     /// Stiffness `κ` of the spring that holds it, N/m; 0 for none.

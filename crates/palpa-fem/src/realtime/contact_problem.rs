@@ -87,6 +87,8 @@ pub(super) struct Scratch {
     forces: Vec<f64>,
     trial: Vec<f64>,
     laws: Vec<f64>,
+    /// Whether any point of the triangles of a candidate presses, by the law.
+    is_closed: Vec<bool>,
     right: Vec<f64>,
     solution: Vec<f64>,
     friction_before: Vec<Vec3>,
@@ -122,6 +124,7 @@ impl ContactProblem {
                 forces: vec![0.0; n],
                 trial: vec![0.0; n],
                 laws: vec![0.0; n],
+                is_closed: vec![false; n],
                 right: vec![0.0; n],
                 solution: vec![0.0; n],
                 friction_before: vec![Vec3::zeros(); n],
@@ -129,6 +132,14 @@ impl ContactProblem {
                 stiffness: Vec::with_capacity(9 * super::MOST_POINTS),
             },
         }
+    }
+
+    /// Forgets candidates and points, and the law's stiffness, which refers to them.
+    pub(super) fn clear(&mut self) {
+        self.candidates.clear();
+        self.points.clear();
+        self.scratch.stiffness.clear();
+        self.scratch.is_closed.fill(false);
     }
 
     /// The candidates with a pressing force.
@@ -206,12 +217,7 @@ impl ContactProblem {
         for point in &self.points {
             let spot = &point.spot;
             let corners = point.corners.map(usize::from);
-            let (mut pressure, mut moved) = (0.0, Vec3::zeros());
-            for (&i, share) in corners.iter().zip(&spot.shares) {
-                let candidate = &self.candidates[i];
-                pressure += share * candidate.pressure / candidate.area;
-                moved += candidate.displacement * *share;
-            }
+            let (pressure, moved) = self.at_point(point);
             let gap = spot.gap + spot.normal.dot(&moved);
             let force = (pressure - spot.stiffness * gap).max(0.0) * spot.area;
             if force == 0.0 {
@@ -225,6 +231,17 @@ impl ContactProblem {
                 candidate.aside += (normal - along * along.dot(&normal)) * (force * share);
             }
         }
+    }
+
+    /// The multiplier at a point, Pa, and its displacement in the iteration, m.
+    pub(super) fn at_point(&self, point: &Point) -> (f64, Vec3) {
+        let (mut pressure, mut moved) = (0.0, Vec3::zeros());
+        for (&i, share) in point.corners.iter().zip(&point.spot.shares) {
+            let candidate = &self.candidates[usize::from(i)];
+            pressure += share * candidate.pressure / candidate.area;
+            moved += candidate.displacement * *share;
+        }
+        (pressure, moved)
     }
 
     /// Removes the springs from the compliance along the normals, and from the displacements without
@@ -338,14 +355,13 @@ impl ContactProblem {
             trial,
             slides,
             laws,
+            is_closed,
             stiffness,
             ..
         } = &mut self.scratch;
         laws[..n].fill(0.0);
         stiffness.clear();
-        for candidate in &mut self.candidates {
-            candidate.closed = 0.0;
-        }
+        is_closed[..n].fill(false);
         for point in &self.points {
             let (mut pressure, mut gap) = (0.0, point.spot.gap);
             for k in 0..3 {
@@ -362,7 +378,7 @@ impl ContactProblem {
                 let weight = point.spot.shares[k] * point.spot.area;
                 let weight = weight * point.cosines[k];
                 laws[i] += weight * pressure;
-                self.candidates[i].closed += weight;
+                is_closed[i] = true;
                 if with_stiffness {
                     for l in 0..3 {
                         let share = weight * point.spot.shares[l];
@@ -371,9 +387,6 @@ impl ContactProblem {
                     }
                 }
             }
-        }
-        for candidate in &mut self.candidates {
-            candidate.closed /= candidate.area;
         }
         let errors = laws[..n].iter().zip(&trial[..n]);
         errors
@@ -459,21 +472,18 @@ impl ContactProblem {
 
     /// Factors the matrix of Newton's method for the law's present stiffness, `1 − M/A + S w`, in the
     /// first rows of `spread`, with the law's springs `S` after it. Returns false if it is singular.
-    fn factor_newton(&mut self) -> bool {
+    pub(super) fn factor_newton(&mut self) -> bool {
         let n = self.candidates.len();
         let scratch = &mut self.scratch;
         // Only vertices with a point that presses have unknown forces; the others lose theirs.
         scratch.rows.clear();
         for i in 0..n {
-            let is_open = self.candidates[i].closed == 0.0;
-            scratch.row_of[i] = if is_open {
-                usize::MAX
-            } else {
-                scratch.rows.len()
-            };
-            if !is_open {
+            scratch.row_of[i] = if scratch.is_closed[i] {
                 scratch.rows.push(i);
-            }
+                scratch.rows.len() - 1
+            } else {
+                usize::MAX
+            };
         }
         let m = scratch.rows.len();
         let (matrix, springs) = self.spread.split_at_mut(m * m);
@@ -507,12 +517,9 @@ impl ContactProblem {
     }
 
     /// Stiffness of the pressing vertices against a displacement of their tool, along their
-    /// normals, N/m.
+    /// normals, N/m, after [`Self::factor_newton`].
     pub(super) fn tool_stiffness(&mut self, tool: usize) -> Mat3 {
         let mut stiffness = Mat3::zeros();
-        if !self.factor_newton() {
-            return stiffness;
-        }
         let scratch = &mut self.scratch;
         let m = scratch.rows.len();
         let (matrix, springs) = self.spread.split_at(m * m);

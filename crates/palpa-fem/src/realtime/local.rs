@@ -170,6 +170,7 @@ impl ContactProblem {
         }
         self.comply(&mut clusters, &mut out.compliance);
         self.give_way(&mut clusters, &mut out.compliance);
+        let is_factored = self.factor_newton();
         out.tools.clear();
         for (t, tool) in tools.iter().enumerate() {
             let own = self.candidates.iter().filter(|c| c.tool as usize == t);
@@ -178,7 +179,11 @@ impl ContactProblem {
                 pose: tool.pose,
                 friction: tool.tool.friction(),
                 force,
-                stiffness: self.tool_stiffness(t),
+                stiffness: if is_factored {
+                    self.tool_stiffness(t)
+                } else {
+                    Mat3::zeros()
+                },
             });
         }
         self.clusters = clusters;
@@ -194,12 +199,7 @@ impl ContactProblem {
         for point in &self.points {
             let spot = &point.spot;
             let corners = point.corners.map(usize::from);
-            let (mut pressure, mut moved) = (0.0, Vec3::zeros());
-            for (&i, share) in corners.iter().zip(&spot.shares) {
-                let candidate = &self.candidates[i];
-                pressure += share * candidate.pressure / candidate.area;
-                moved += candidate.displacement * *share;
-            }
+            let (pressure, moved) = self.at_point(point);
             let gap = spot.gap + spot.normal.dot(&moved) - pressure / spot.stiffness;
             for (&i, share) in corners.iter().zip(&spot.shares) {
                 let onset = &mut onsets[i];

@@ -581,10 +581,13 @@ fn a_step_too_far_backs_off_and_recovers() {
         params(MODES[1]),
     )
     .unwrap();
-    let mut bad = 0;
+    let (mut bad, mut local) = (0, LocalModel::default());
     let jump = [2e-3, 31e-3, 31e-3, 31e-3, 31e-3, 31e-3];
     for depth in jump.into_iter().chain([2e-3; 40]) {
         let report = live.step(&at(tool, 0.0, 0.0, depth), 0.002);
+        // A patch can be asked for after any step, failed ones too.
+        live.local_model(60, &mut local);
+        assert!(local.compliance.iter().all(|w| w.is_finite()));
         bad += u32::from(report.outcome != StepOutcome::Arrived);
         assert!(
             live.displacements()

@@ -26,7 +26,7 @@ const POISSON: f64 = 0.45;
 const OGDEN_EXPONENT: f64 = 8.0;
 /// Prony terms (share, time in s) of the relaxing tissue: half of the stiffness relaxes, one part
 /// fast and one slowly.
-const RELAXING: [(f64, f64); 2] = [(0.3, 0.1), (0.2, 1.0)];
+pub(super) const RELAXING: [(f64, f64); 2] = [(0.3, 0.1), (0.2, 1.0)];
 
 /// Length of the limb, its radius, and the radius of its bone, m.
 const LIMB: [f64; 3] = [0.2, 0.04, 0.012];

@@ -4,7 +4,10 @@
 //!  log ─► N poses, spread over the time in contact ─► straight presses, or their way again ─► errors
 //! ```
 
-use palpa::audit::{REFERENCE_SHARE, Reference, Stop, quantile, relaxes, rubs, thinned};
+use palpa::audit::{
+    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Quality, REFERENCE_SHARE, Reference, Stop, quantile,
+    relaxes, rubs, thinned,
+};
 use palpa::live::LiveScene;
 use palpa_rt::{Log, StepRecord, TickEntry};
 use palpa_scene::Scene;
@@ -15,15 +18,8 @@ use super::Run;
 use crate::cli::Context;
 use crate::table::Table;
 
-/// Poses are drawn where the force is at least this share of the largest: errors are relative.
-const LEAST_FORCE: f64 = 0.2;
-/// The mesh that judges the reference has sizes this many times those of the reference.
-const FINER: f64 = 0.7;
-/// Where the way matters: most contacts whose way is gone again, longest way of the tool between two
-/// static steps, m, and longest time between them if tissue relaxes, s.
+/// Where the way matters: most contacts whose way is gone again.
 const MOST_CONTACTS: usize = 3;
-const LONGEST_WAY: f64 = 0.5e-3;
-const LONGEST_TIME: f64 = 0.05;
 const SEED: u64 = 14;
 
 /// The audit of a run.
@@ -330,16 +326,9 @@ impl Audit {
             return;
         };
         let tool = all[*i].stop(live).tool;
-        let press = |share: f64| {
-            let tip = tool.pose.translation.vector;
-            let reference = Reference::round(&live.prepared, tip, share).ok()?;
-            let force = (!context.is_interrupted()).then(|| reference.press(&tool))??;
-            Some((reference.n_nodes(), force))
-        };
-        let [usual, finer] = [1.0, FINER].map(|times| press(times * REFERENCE_SHARE));
-        mesh.finer_nodes = finer.map(|(nodes, _)| nodes);
-        mesh.finer_changes_it_by = (usual.zip(finer))
-            .map(|((_, usual), (_, finer))| (finer - usual).norm() / finer.norm());
+        let quality = Quality::find(&live.prepared, &tool, || !context.is_interrupted());
+        mesh.finer_nodes = quality.map(|quality| quality.finer_nodes);
+        mesh.finer_changes_it_by = quality.map(|quality| quality.change);
     }
 
     fn sum_up(&mut self, asked: usize) {

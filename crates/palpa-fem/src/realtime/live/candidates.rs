@@ -237,8 +237,7 @@ impl Live {
     fn choose(&mut self) {
         let (model, search, problem) = (&*self.model, &mut self.search, &mut self.problem);
         let skin = &mut self.skin;
-        problem.candidates.clear();
-        problem.points.clear();
+        problem.clear();
         search.n_left_out = 0;
         search
             .near
@@ -443,7 +442,6 @@ impl SkinForces {
             gap: f64::INFINITY,
             pressure: 0.0,
             aside: Vec3::zeros(),
-            closed: 0.0,
             friction: self.frictions[v],
             support: 0.0,
             yielding: model.skin_stiffness.normal[v] * model.skin_areas[v],

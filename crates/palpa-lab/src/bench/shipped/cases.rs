@@ -7,8 +7,8 @@ use palpa_scene::{
     Law, Moduli, Prony, PronyTerm, Resistance, Scene, Skin, Sourced, Status, Tissue, Tool,
 };
 
-/// Prony terms (share, time in s) of the relaxing tissues: those of the uniform blocks.
-const RELAXING: [(f64, f64); 2] = [(0.3, 0.1), (0.2, 1.0)];
+use crate::bench::cases::RELAXING;
+
 /// Poisson's ratio of nearly incompressible tissues, and friction of a tool that rubs.
 const POISSON: f64 = 0.49;
 const FRICTION: f64 = 0.3;

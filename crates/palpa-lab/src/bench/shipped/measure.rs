@@ -1,22 +1,18 @@
 //! Measures a case: rate over all places, error at poses drawn along each way.
 
 use fastrand::Rng;
-use palpa::audit::{REFERENCE_SHARE, Reference, Stop, has_history, quantile, relaxes, thinned};
+use palpa::audit::{
+    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Quality, REFERENCE_SHARE, Reference, Stop, has_history,
+    quantile, relaxes, thinned,
+};
 use palpa::live::LiveScene;
 
 use super::drive::{Driven, Felt, Part, drive};
 use super::places::{Spot, draw_spots};
 use super::{ShippedCase, ShippedRow};
 
-/// Poses are drawn from this depth on, m, and where the force is at least this share of the largest at
-/// the place: errors are relative.
+/// Poses are drawn from this depth on, m.
 const FROM_DEPTH: f64 = 2e-3;
-const LEAST_FORCE: f64 = 0.2;
-/// The mesh that judges the reference has sizes this many times those of the reference.
-const FINER: f64 = 0.7;
-/// Longest way of the tool between two static steps, m, and longest time if tissue relaxes, s.
-const LONGEST_WAY: f64 = 0.5e-3;
-const LONGEST_TIME: f64 = 0.05;
 const SEED: u64 = 7;
 
 /// How much is measured.
@@ -133,11 +129,8 @@ fn audit(
     let of_chosen: Vec<Stop> = chosen.iter().map(|&i| stops[i]).collect();
     if k == 0 {
         let tool = &of_chosen[of_chosen.len() / 2].tool;
-        let at = tool.pose.translation.vector;
-        let press = |share: f64| Reference::round(prepared, at, share).ok()?.press(tool);
-        let [usual, finer] = [1.0, FINER].map(|times| press(times * REFERENCE_SHARE));
-        let change = usual.zip(finer);
-        row.reference_change = change.map(|(usual, finer)| (usual - finer).norm() / finer.norm());
+        let quality = Quality::find(prepared, tool, &mut *goes_on);
+        row.reference_change = quality.map(|quality| quality.change);
     }
     let scene = &prepared.scene;
     let mut forces = Vec::new();
