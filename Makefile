@@ -64,8 +64,8 @@ test-data: shared $(VENV)/ready
 	@command -v ccx >/dev/null || echo "test-data: CalculiX (ccx) is not installed, its tests are left out"
 	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa-cli --features data-tests --test data \
 	  -- $$(command -v ccx >/dev/null || echo "--skip ccx::")
-	cargo test --release --package palpa-plot --tests
-	cargo run --release --package palpa-cli -- press --out "$(RESULTS)/press"
+	cargo test --workspace --test it -- vtu::
+	cargo run --release --package palpa-cli --features data-tests -- press --out "$(RESULTS)/press"
 	"$(VENV)/bin/python" tools/check_vtu.py "$(RESULTS)"
 
 shared:

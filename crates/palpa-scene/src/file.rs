@@ -316,9 +316,15 @@ pub(crate) struct MeshTable {
     /// half of a lump's smallest radius, 0.5 mm to 10 mm; as near the tool for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_lumps: Option<Length>,
-    /// Increase of the wanted length with the distance from the tool or lump, as a share of that
-    /// distance, 0.02 to 5. Default: 0.5.
-    pub(crate) growth: f64,
+    /// Increase of the wanted length of edges with the distance from the tool or lump, as a share of
+    /// that distance, 0.02 to 5. Default: 0.5; 1.2 in real time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) growth: Option<f64>,
+    /// Increase of the wanted height of levels with the depth below the skin or the distance from a
+    /// lump, as a share of it, 0.02 to 5. Default: that of `growth`; 0.5 in real time if `growth` is
+    /// not given either.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) level_growth: Option<f64>,
     /// Largest number of skin vertices after refinement, 100 to 500000. At this limit refinement
     /// stops. Default: 20000.
     pub(crate) max_vertices: u32,
@@ -342,7 +348,8 @@ impl Default for MeshTable {
             refine: true,
             near_tool: None,
             near_lumps: None,
-            growth: 0.5,
+            growth: None,
+            level_growth: None,
             max_vertices: 20_000,
             accuracy: None,
             max_time: None,

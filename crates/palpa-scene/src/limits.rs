@@ -218,6 +218,7 @@ mod tests {
         says("MeshTable", "near_tool", &EDGE_LENGTH);
         says("MeshTable", "near_lumps", &EDGE_LENGTH);
         says("MeshTable", "growth", &GROWTH);
+        says("MeshTable", "level_growth", &GROWTH);
         says("MeshTable", "max_vertices", &MESH_VERTICES);
         says("MeshTable", "accuracy", &ACCURACY);
         says("MeshTable", "max_time", &SEARCH_TIME);

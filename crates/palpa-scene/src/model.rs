@@ -64,9 +64,12 @@ pub struct Mesh {
     /// Wanted length of edges and height of levels in and around lumps; `None` is
     /// [automatic](Self::near_lump_of).
     pub near_lumps: Option<f64>,
-    /// Increase of the wanted length with the distance from the tool or lump, as a share of that
-    /// distance.
-    pub growth: f64,
+    /// Increase of the wanted length of edges with the distance from the tool or lump, as a share of
+    /// that distance; `None` is [automatic](Self::growth_of_edges).
+    pub growth: Option<f64>,
+    /// Increase of the wanted height of levels with the distance from the skin or a lump, as a share
+    /// of it; `None` is [automatic](Self::growth_of_levels).
+    pub level_growth: Option<f64>,
     /// Largest number of skin vertices after refinement.
     pub max_vertices: usize,
     /// Half the width of the error bar that may be left at the deepest, as a share of the force;
@@ -80,6 +83,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Automatic increase of sizes.
+    pub const GROWTH: f64 = 0.5;
     /// Least automatic edge length, m.
     const FINEST: f64 = 0.5e-3;
     /// Why no accuracy can be reached with a tool of a single node.
@@ -118,6 +123,16 @@ impl Mesh {
             return Err(Self::NO_LIMIT.to_owned());
         }
         Ok(())
+    }
+
+    /// Increase of the wanted length of edges, as given or by default: 0.5.
+    pub fn growth_of_edges(&self) -> f64 {
+        self.growth.unwrap_or(Self::GROWTH)
+    }
+
+    /// Increase of the wanted height of levels, as given or by default: that of the edges.
+    pub fn growth_of_levels(&self) -> f64 {
+        self.level_growth.unwrap_or_else(|| self.growth_of_edges())
     }
 
     /// Wanted length near `tool` in metres, as given or by default. Default: a quarter of the

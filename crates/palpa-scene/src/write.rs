@@ -104,6 +104,7 @@ fn mesh(mesh: &Mesh) -> MeshTable {
         near_tool: mesh.near_tool.map(Length::from_si),
         near_lumps: mesh.near_lumps.map(Length::from_si),
         growth: mesh.growth,
+        level_growth: mesh.level_growth,
         max_vertices: u32::try_from(mesh.max_vertices).unwrap_or(u32::MAX),
         accuracy: mesh.accuracy.map(Share::from_si),
         max_time: mesh.max_time.map(Time::from_si),

@@ -34,7 +34,6 @@ export interface components {
             /**
              * @description Mesh size of the body near the tool and lumps.
              * @default {
-             *       "growth": 0.5,
              *       "max_vertices": 20000,
              *       "moves": false,
              *       "refine": true
@@ -351,10 +350,14 @@ export interface components {
             accuracy?: string;
             /**
              * Format: double
-             * @description Increase of the wanted length with the distance from the tool or lump, as a share of that distance, 0.02 to 5. Default: 0.5.
-             * @default 0.5
+             * @description Increase of the wanted length of edges with the distance from the tool or lump, as a share of that distance, 0.02 to 5. Default: 0.5; 1.2 in real time.
              */
             growth?: number;
+            /**
+             * Format: double
+             * @description Increase of the wanted height of levels with the depth below the skin or the distance from a lump, as a share of it, 0.02 to 5. Default: that of `growth`; 0.5 in real time if `growth` is not given either.
+             */
+            level_growth?: number;
             /**
              * @description Longest time for the choice of a mesh by `accuracy`, 1 s to 86400 s. Default: no limit.
              * @example 0.5 s

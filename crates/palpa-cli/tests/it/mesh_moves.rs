@@ -20,10 +20,8 @@ const START: f64 = 0.8;
 fn stroke(moves: bool) -> (Vec<RehearsalTick>, u64) {
     let mut scene: toml::Table = FOREARM.parse().unwrap();
     scene["motion"]["length"] = "60 mm".into();
-    scene["mesh"]
-        .as_table_mut()
-        .unwrap()
-        .insert("moves".to_owned(), moves.into());
+    let mesh = toml::Table::from_iter([("moves".to_owned(), moves.into())]);
+    scene.insert("mesh".to_owned(), mesh.into());
     let scene = Scene::parse(&scene.to_string(), Path::new("")).unwrap();
     let live = LiveScene::build(&scene).unwrap();
     let [from, to] = [-HALF, HALF].map(|x| Vec3::x() * x);

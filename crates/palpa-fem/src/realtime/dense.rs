@@ -42,14 +42,75 @@ pub(super) fn solve(n: usize, matrix: &[f64], order: &[usize], right: &mut [f64]
     }
     for r in 0..n {
         let row = &matrix[r * n..r * n + r];
-        let sum: f64 = row.iter().zip(&*right).map(|(a, x)| a * x).sum();
-        right[r] -= sum;
+        right[r] -= dot(row, &right[..r]);
     }
     for r in (0..n).rev() {
         let row = &matrix[r * n + r + 1..(r + 1) * n];
-        let sum: f64 = row.iter().zip(&right[r + 1..n]).map(|(a, x)| a * x).sum();
-        right[r] = (right[r] - sum) / matrix[r * n + r];
+        right[r] = (right[r] - dot(row, &right[r + 1..n])) / matrix[r * n + r];
     }
+}
+
+/// Factors a dense symmetric matrix as `LDLᵀ`. `row` is memory for a row. Returns false if a pivot is
+/// nearly zero.
+pub(super) fn factor_symmetric(
+    n: usize,
+    entry: impl Fn(usize, usize) -> f64,
+    factor: &mut [f64],
+    row: &mut [f64],
+) -> bool {
+    // Row r of the factor holds L D up to the diagonal, then D; `row` holds L.
+    for r in 0..n {
+        let (before, own) = factor.split_at_mut(r * n);
+        let (own, row) = (&mut own[..=r], &mut row[..r]);
+        for c in 0..r {
+            let other = &before[c * n..=c * n + c];
+            let sum = entry(r, c) - dot(&row[..c], &other[..c]);
+            own[c] = sum;
+            row[c] = sum / other[c];
+        }
+        let whole = entry(r, r);
+        let pivot = whole - dot(row, &own[..r]);
+        if pivot.is_nan() || pivot.abs() <= LEAST_PIVOT * whole.abs() {
+            return false;
+        }
+        own[r] = pivot;
+    }
+    true
+}
+
+/// Solves with the factor of [`factor_symmetric`]; the solution replaces the right side.
+pub(super) fn solve_symmetric(n: usize, factor: &[f64], right: &mut [f64]) {
+    for r in 0..n {
+        let row = &factor[r * n..=r * n + r];
+        right[r] = (right[r] - dot(&row[..r], &right[..r])) / row[r];
+    }
+    for r in 0..n {
+        right[r] *= factor[r * n + r];
+    }
+    for r in (0..n).rev() {
+        let row = &factor[r * n..=r * n + r];
+        let x = right[r] / row[r];
+        right[r] = x;
+        for (other, entry) in right.iter_mut().zip(&row[..r]) {
+            *other -= entry * x;
+        }
+    }
+}
+
+/// The product of two vectors.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Sums of their own, so that they are computed side by side.
+    let mut sums = [0.0; 8];
+    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = (a.remainder().iter().zip(b.remainder()))
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]
@@ -68,5 +129,33 @@ mod tests {
             assert!((sum - [1.0, 2.0, 3.0][r]).abs() < 1e-12);
         }
         assert!(!factor(2, &mut [1.0, 2.0, 2.0, 4.0], &mut [0; 2]));
+    }
+
+    #[test]
+    fn an_indefinite_symmetric_system_is_solved_and_a_singular_one_refused() {
+        const N: usize = 21;
+        let a = |r: usize, c: usize| {
+            let apart = r.abs_diff(c) as f64;
+            let own = if r == 2 { -3.0 } else { 4.0 };
+            if r == c {
+                own
+            } else {
+                (apart * 0.9).cos() / (1.0 + apart)
+            }
+        };
+        let expected: [f64; N] = std::array::from_fn(|i| (i as f64).sin());
+        let mut x: [f64; N] = std::array::from_fn(|r| (0..N).map(|c| a(r, c) * expected[c]).sum());
+        let (mut factor, mut row) = ([0.0; N * N], [0.0; N]);
+        assert!(factor_symmetric(N, a, &mut factor, &mut row));
+        solve_symmetric(N, &factor, &mut x);
+        for (x, expected) in x.iter().zip(expected) {
+            assert!((x - expected).abs() < 1e-12, "{x} is not {expected}");
+        }
+        assert!(!factor_symmetric(
+            2,
+            |_, _| 1.0,
+            &mut [0.0; 4],
+            &mut [0.0; 2]
+        ));
     }
 }

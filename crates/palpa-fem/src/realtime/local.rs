@@ -8,7 +8,8 @@ use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
 use super::candidate::Candidate;
-use super::contact_problem::{ContactProblem, factor_symmetric, substitute_symmetric};
+use super::contact_problem::ContactProblem;
+use super::dense;
 use crate::Mat3;
 use crate::posed_tool::PosedTool;
 use crate::shape::Pose;
@@ -345,7 +346,9 @@ impl ContactProblem {
             stiffness[r * m + r] += ALSO_CLOSED * closed[r];
         }
         let entry = |r: usize, c: usize| stiffness[r * m + c];
-        if !factor_symmetric(m, entry, &mut self.factor) {
+        solution.clear();
+        solution.resize(m, 0.0);
+        if !dense::factor_symmetric(m, entry, &mut self.factor, solution) {
             return;
         }
         let along = |at: usize, normal: &Vec3| {
@@ -364,7 +367,7 @@ impl ContactProblem {
             for at in cj.first..cj.end {
                 solution[row_of[usize::from(members[at])]] = along(at, &normals[j]);
             }
-            substitute_symmetric(m, &self.factor, solution);
+            dense::solve_symmetric(m, &self.factor, solution);
             for at in cj.first..cj.end {
                 let row = row_of[usize::from(members[at])];
                 solution[row] -= along(at, &normals[j]) / closed[row];
@@ -405,7 +408,7 @@ impl ContactProblem {
         }
         let rows = &rows[..m];
         let candidates = &self.candidates;
-        let mut factor = std::mem::take(&mut self.factor);
+        let (mut factor, mut row) = (std::mem::take(&mut self.factor), [0.0; MOST_CANDIDATES]);
         let is_stable = SHARES.iter().any(|share| {
             let entry = |r: usize, c: usize| {
                 let own = if r == c {
@@ -415,7 +418,7 @@ impl ContactProblem {
                 };
                 own - self.along_with_springs(rows[r], rows[c])
             };
-            factor_symmetric(m, entry, &mut factor)
+            dense::factor_symmetric(m, entry, &mut factor, &mut row)
                 && (0..m).all(|r| factor[r * m + r] > LEAST_RELEASE * entry(r, r))
         });
         self.factor = factor;
@@ -440,7 +443,7 @@ impl ContactProblem {
             for (r, x) in x[..m].iter_mut().enumerate() {
                 *x = self.spread[j + size * r];
             }
-            substitute_symmetric(m, &self.factor, &mut x[..m]);
+            dense::solve_symmetric(m, &self.factor, &mut x[..m]);
             for (r, x) in x[..m].iter().enumerate() {
                 let spread = &self.spread[size * r..size * (r + 1)];
                 let column = &mut self.released[size * j..size * (j + 1)];

@@ -494,11 +494,16 @@ fn a_body_at_rest_is_let_be_and_wakes_when_touched() {
         };
         let model = model_of(13, false, prony);
         let away = at(tool, 0.0, 0.0, -5e-3);
-        let mut live = Live::new(Arc::clone(&model), &away, params(mode)).unwrap();
+        // Friction keeps what a step leaves out of balance, and two presses do not leave the same.
+        let params = LiveParams {
+            tolerance: 1e-3,
+            ..params(mode)
+        };
+        let mut live = Live::new(Arc::clone(&model), &away, params).unwrap();
         let first = press(&mut live);
-        // Two seconds are twenty times the longest memory.
+        // Four seconds are forty times the longest memory.
         let mut n_solved = 0;
-        for _ in 0..200 {
+        for _ in 0..400 {
             n_solved += live.step(&away, DT).iterations;
             if let Some(job) = live.take_job() {
                 live.install(job.run());

@@ -142,7 +142,12 @@ fn a_body_under_tension_begins_again_at_rest() {
         let mut sum = 0;
         for exterior in MODES {
             let start = at(tool, X, 0.0, -1e-3);
-            let mut live = Live::new(Arc::clone(&model), &start, params(exterior)).unwrap();
+            // With more iterations these steps do not fail.
+            let params = LiveParams {
+                max_iterations: 2,
+                ..params(exterior)
+            };
+            let mut live = Live::new(Arc::clone(&model), &start, params).unwrap();
             let mut n_again = 0;
             for k in 0..200 {
                 // Deep, and deep at another place.

@@ -48,6 +48,10 @@ impl Reader<'_> {
             None => Ok(None),
             Some(length) => Ok(Some(at.key(key).within(length, &limits::EDGE_LENGTH)?.si())),
         };
+        let growth = |key, growth: Option<f64>| match growth {
+            None => Ok(None),
+            Some(growth) => at.key(key).within(growth, &limits::GROWTH).map(Some),
+        };
         if let (Some(_), Some(near_tool)) = (mesh.accuracy, mesh.near_tool) {
             return Err(at.key("near_tool").invalid(format!(
                 "{near_tool} beside `accuracy`, which chooses this length; remove one of the two"
@@ -65,7 +69,8 @@ impl Reader<'_> {
             refine: mesh.refine,
             near_tool: edge("near_tool", mesh.near_tool)?,
             near_lumps: edge("near_lumps", mesh.near_lumps)?,
-            growth: at.key("growth").within(mesh.growth, &limits::GROWTH)?,
+            growth: growth("growth", mesh.growth)?,
+            level_growth: growth("level_growth", mesh.level_growth)?,
             max_vertices: at
                 .key("max_vertices")
                 .within(mesh.max_vertices, &limits::MESH_VERTICES)?

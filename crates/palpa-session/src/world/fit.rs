@@ -41,7 +41,7 @@ pub(super) fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
     scene.mesh.moves |= scene.mesh.refine;
     let usual = scene.mesh.near_tool_of(&scene.tool);
     if scene.mesh.refine && scene.mesh.near_tool.is_none() {
-        let fine = (scene.tool.contact_radius() / 3.0).max(LEAST_EDGE);
+        let fine = (0.4 * scene.tool.contact_radius()).max(LEAST_EDGE);
         scene.mesh.near_tool = Some(fine);
         if usual.is_some_and(|usual| 1.5 * usual < fine) {
             notes.push(Note::CoarserForTouch { edge: fine });

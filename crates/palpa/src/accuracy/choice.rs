@@ -123,7 +123,7 @@ struct Factors {
 impl Factors {
     fn sizes(self, scene: &Scene) -> Sizes {
         let h = scene.tool.edge_length(FIRST).clamp(LIMITS.0, LIMITS.1);
-        let mut sizes = Sizes::even(scene, h, scene.mesh.growth);
+        let mut sizes = Sizes::graded(scene, h);
         for graded in [&mut sizes.skin, &mut sizes.levels] {
             (graded.near, graded.far) = (self.near, self.far);
         }

@@ -45,7 +45,12 @@ impl FineScene {
     pub fn new(prepared: Arc<Prepared>) -> anyhow::Result<Self> {
         let scene = &prepared.scene;
         Ok(Self {
-            coarse: CoarseBody::build(scene, &prepared.grown, prepared.lumps())?,
+            coarse: CoarseBody::build(
+                scene,
+                &prepared.grown,
+                prepared.lumps(),
+                prepared.mesh.sizes,
+            )?,
             radius: zone_radius(scene) + MARGIN,
             kept: Mutex::default(),
             prepared,

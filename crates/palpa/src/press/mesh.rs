@@ -103,11 +103,21 @@ impl Sizes {
     /// The sizes that the scene asks for; `None` for a tool that needs no refinement.
     pub fn of(scene: &Scene) -> Option<Self> {
         let h = scene.mesh.near_tool_of(&scene.tool)?;
-        Some(Self::even(scene, h, scene.mesh.growth))
+        Some(Self::graded(scene, h))
+    }
+
+    /// Sizes of `h` (m) at the tool that grow as the scene says.
+    pub fn graded(scene: &Scene, h: f64) -> Self {
+        let mesh = &scene.mesh;
+        Self::growing(scene, h, mesh.growth_of_edges(), mesh.growth_of_levels())
     }
 
     /// Sizes of `h` (m) at the tool that grow by `growth` with the distance.
     pub fn even(scene: &Scene, h: f64, growth: f64) -> Self {
+        Self::growing(scene, h, growth, growth)
+    }
+
+    fn growing(scene: &Scene, h: f64, growth: f64, of_levels: f64) -> Self {
         let graded = Graded::even(h, growth);
         let (_, radius) = reach(scene);
         let below = if scene.tool.is_flat() {
@@ -122,7 +132,7 @@ impl Sizes {
             },
             levels: Graded {
                 border: NEAR * scene.tool.contact_radius(),
-                growth: below * growth,
+                growth: below * of_levels,
                 ..graded
             },
         }
@@ -382,7 +392,7 @@ fn over_lumps(
             fine.push(Fine {
                 points: vec![shadow.on_skin],
                 radius: radius * wide,
-                size: Graded::even(h * wide, scene.mesh.growth),
+                size: Graded::even(h * wide, scene.mesh.growth_of_edges()),
                 is_rim: false,
             });
         }
@@ -403,16 +413,20 @@ pub struct CoarseBody {
 }
 
 impl CoarseBody {
-    /// Builds the coarse body of a scene.
+    /// Builds the coarse body of a scene, with these sizes near the tool.
     ///
     /// # Errors
     /// When the direction or the depth does not fit the place.
-    pub fn build(scene: &Scene, built: &BuiltBody, lumps: &[Lump]) -> anyhow::Result<Self> {
+    pub fn build(
+        scene: &Scene,
+        built: &BuiltBody,
+        lumps: &[Lump],
+        sizes: Option<Sizes>,
+    ) -> anyhow::Result<Self> {
         let grown = &built.growth.body;
         // The notes are dropped: those of the first pressed body say the same.
         let mut notes = Vec::new();
         let place = Place::find(scene, built, &mut notes)?;
-        let sizes = Sizes::of(scene);
         let (body, _) = split_near(scene, grown.clone(), &place, lumps, sizes);
         Ok(Self {
             fine: over_lumps(scene, &body, lumps, &mut notes),
@@ -583,7 +597,8 @@ fn split_near(
                 let shadow = shadows.of(point);
                 let depths = mean_depths(&body, &body.skin.triangles[shadow.triangle]);
                 let depth = (point - shadow.on_skin).norm();
-                wish(depths, depth, radius, Graded::even(h, scene.mesh.growth));
+                let size = Graded::even(h, scene.mesh.growth_of_levels());
+                wish(depths, depth, radius, size);
             }
         }
     }

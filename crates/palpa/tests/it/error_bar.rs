@@ -39,7 +39,7 @@ fn moment(live: &LiveScene, depth: f64, aside: f64) -> Moment {
 
 #[test]
 fn the_bar_of_the_live_mesh_is_that_of_a_press_there_on_the_same_mesh() {
-    let scene = parse(&block());
+    let scene = parse(&block().growth(0.5));
     let live = LiveScene::build(&scene).unwrap();
     let bar = probe(&live.prepared, &moment(&live, 3e-3, 0.0), || true).unwrap();
     // The loop's mesh with the same size near the tool is that of a press.

@@ -57,8 +57,8 @@ pub struct Args {
     #[arg(long, default_value_t = 6, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     places: u16,
     /// Poses that are solved again on the way down, on the way across, and on the way up at each
-    /// place, 1 to 100
-    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
+    /// place, 0 to 100; with 0, no error is measured
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=100))]
     poses: u16,
     /// Folder with surfaces from scans, for the cases shipped-calf…
     #[arg(long, value_name = "DIR")]

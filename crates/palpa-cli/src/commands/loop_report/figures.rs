@@ -113,6 +113,8 @@ impl From<Quantiles> for Times {
 pub(super) struct TissueFigures {
     pub(super) steps: u64,
     pub(super) steps_per_s: f64,
+    /// Rate of the steps with contact; `None` without such steps.
+    steps_per_s_in_contact: Option<f64>,
     /// Largest speed of the tool at which the force keeps its accuracy: steps are short enough, and
     /// zones arrive in time.
     fastest_tool_mm_per_s: f64,
@@ -166,13 +168,15 @@ impl TissueFigures {
             let bits = u16::try_from(t.tick.faults).unwrap_or(0);
             Faults::from_bits(bits).contains(Faults::STALE_PATCH)
         });
-        let by_steps = fastest_by_steps(report);
+        let in_contact = rate_in_contact(&log.steps);
+        let by_steps = GOOD_TRAVEL * in_contact.unwrap_or(report.step_rate);
         let zone_wall = zone_wall(log);
         // The tool moves away from the middle of a zone while the next zone is computed.
         let by_zones = zone_wall.map(|time| setup.longest_way / time);
         Self {
             steps: report.steps,
             steps_per_s: report.step_rate,
+            steps_per_s_in_contact: in_contact,
             fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
             fastest_by_steps_mm_per_s: 1e3 * by_steps,
             motion_mm_per_s: 1e3 * setup.motion_speed,
@@ -274,10 +278,23 @@ impl Figures {
         context.say(table)?;
         let t = &self.tissue;
         context.say(format!(
-            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s ({} steps, {} unfinished, {} behind, {} held back, {} zones, {} meshes), \
-             {} background jobs ({} panicked), {:.1} % of a core",
-            self.seconds, self.ticks, self.misses, t.steps_per_s, t.steps, t.unfinished, t.behind, t.held_back, t.zones, t.meshes,
-            t.jobs, t.jobs_panicked, 100.0 * t.background_cpu_share
+            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s, {} in contact ({} steps, {} unfinished, {} behind, {} held back, \
+             {} zones, {} meshes), {} background jobs ({} panicked), {:.1} % of a core",
+            self.seconds,
+            self.ticks,
+            self.misses,
+            t.steps_per_s,
+            t.steps_per_s_in_contact
+                .map_or_else(|| "none".to_owned(), |rate| format!("{rate:.0}")),
+            t.steps,
+            t.unfinished,
+            t.behind,
+            t.held_back,
+            t.zones,
+            t.meshes,
+            t.jobs,
+            t.jobs_panicked,
+            100.0 * t.background_cpu_share
         ))?;
         context.say(format!(
             "the hand goes at {:.0} mm/s; steps ({:.2} mm each) and zones come in time for up to {:.0} mm/s",
@@ -340,9 +357,11 @@ fn zone_wall(log: &Log) -> Option<f64> {
     times.get(times.len() * 9 / 10).copied()
 }
 
-/// Speed at which a tool moves by [`GOOD_TRAVEL`] in a step, m/s.
-fn fastest_by_steps(report: &Report) -> f64 {
-    GOOD_TRAVEL * report.step_rate.min(1.0 / report.step_wall.p50)
+/// Rate of the steps with contact, each until the next step begins, 1/s.
+fn rate_in_contact(steps: &[StepRecord]) -> Option<f64> {
+    let pairs = steps.windows(2).filter(|pair| pair[0].n_contacts > 0);
+    let time: f64 = pairs.clone().map(|pair| pair[1].now - pair[0].now).sum();
+    (time > 0.0).then(|| pairs.count() as f64 / time)
 }
 
 fn count(counts: &mut Vec<(String, u64)>, name: &str) {

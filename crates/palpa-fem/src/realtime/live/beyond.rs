@@ -26,6 +26,8 @@ pub(super) struct Beyond {
     /// `[n_dofs]`
     load: Vec<f32>,
     has_load: bool,
+    /// Whether the displacements outside the zone are those under the present ring and load.
+    pub(super) is_settled: bool,
     /// Triangles outside the zone near a tool that does not press within it.
     pub(super) triangles: Vec<u32>,
     /// Least gap between such a tool and the skin outside the zone, m.
@@ -39,6 +41,7 @@ impl Beyond {
         Self {
             load: vec![0.0; model.structure.n_dofs()],
             has_load: false,
+            is_settled: false,
             triangles: Vec::with_capacity(model.body.skin.triangles.len()),
             clearance: f64::INFINITY,
             may_touch: vec![false; n_tools],
@@ -63,7 +66,7 @@ impl Live {
             return;
         }
         self.load_exterior();
-        if pass == Pass::Near {
+        if matches!(pass, Pass::Follow | Pass::Near) {
             if !self.beyond.triangles.is_empty() {
                 self.settle();
             }
@@ -73,10 +76,10 @@ impl Live {
             self.settle();
         }
         self.find_tools();
-        self.find_triangles(self.beyond.has_load);
-        if !self.beyond.triangles.is_empty() && !self.beyond.has_load {
+        self.find_triangles();
+        if !self.beyond.triangles.is_empty() && !self.beyond.is_settled {
             self.settle();
-            self.find_triangles(true);
+            self.find_triangles();
         }
     }
 
@@ -145,9 +148,9 @@ impl Live {
         }
     }
 
-    /// Finds the triangles outside the zone near these tools. Whether the displacements of the
-    /// exterior `are_settled`: otherwise those of its last linearisation count.
-    fn find_triangles(&mut self, are_settled: bool) {
+    /// Finds the triangles outside the zone near these tools. Where the exterior is not settled, the
+    /// displacements of its last linearisation count.
+    fn find_triangles(&mut self) {
         let (model, plan, search) = (&*self.model, &*self.plan, &mut self.search);
         let beyond = &mut self.beyond;
         beyond.triangles.clear();
@@ -159,7 +162,7 @@ impl Live {
         let tools = tools.filter(|(_, may_touch)| **may_touch);
         for v in 0..model.body.n_vertices() {
             let node = model.body.node(v, 0);
-            let is_known = are_settled || plan.is_inside[v];
+            let is_known = beyond.is_settled || plan.is_inside[v];
             let from = if is_known {
                 &self.state.displacements
             } else {

@@ -120,6 +120,8 @@ pub(super) struct Search {
     pushes: Vec<(Vec3, f64)>,
     /// Triangles that press and for which there was no room.
     pub(super) n_left_out: usize,
+    /// Least gap of a triangle without candidates, m.
+    pub(super) covered: f64,
 }
 
 impl Search {
@@ -134,6 +136,7 @@ impl Search {
             candidate_of: vec![NONE; n],
             pushes: Vec::with_capacity(MOST_CANDIDATES),
             n_left_out: 0,
+            covered: 0.0,
         }
     }
 
@@ -159,6 +162,7 @@ impl Live {
     pub(super) fn find_candidates(&mut self, dt: f64) {
         let reach = (FASTEST * 2.0 * dt).clamp(LEAST_REACH, self.params.reach);
         self.place_skin();
+        self.search.covered = reach;
         self.find_spots(reach);
         self.choose();
         self.aim();
@@ -262,6 +266,7 @@ impl Live {
             };
             if n > most || n_far + more_far > MOST_FAR {
                 search.n_left_out += usize::from(is_pressing);
+                search.covered = search.covered.min(near.gap);
                 continue;
             }
             for v in vertices {
@@ -344,6 +349,27 @@ impl Live {
             point.cosines = point
                 .corners
                 .map(|i| normal.dot(&problem.candidates[usize::from(i)].normal));
+        }
+    }
+
+    /// Updates what a new step needs to know of the candidates of the last one.
+    pub(super) fn touch_again(&mut self) {
+        let (search, skin, tools) = (&self.search, &self.skin, &self.course.tools);
+        self.course.clearance = 0.0;
+        for candidate in &mut self.problem.candidates {
+            let v = candidate.vertex as usize;
+            let node = self.model.body.node(v, 0);
+            let place = self.model.body.positions[node] + self.state.displacements[node];
+            let posed = &tools[candidate.tool as usize];
+            candidate.facing = posed.tool.distance_at(&posed.pose, &place).normal;
+            candidate.is_anchored = skin.is_anchored[v];
+            candidate.anchor = if candidate.is_anchored {
+                skin.anchors[v]
+            } else {
+                anchor_at(posed, &place)
+            };
+            candidate.is_sliding = skin.is_sliding[v];
+            candidate.origin = search.origins[v];
         }
     }
 

@@ -183,6 +183,10 @@ impl Live {
 
     /// Updates the displacements outside the zone. Cost: a substitution through the exterior.
     pub fn settle(&mut self) {
+        if self.beyond.is_settled {
+            return;
+        }
+        self.beyond.is_settled = !self.exterior.is_followed();
         self.outside.settle(
             &self.model,
             &self.plan,

@@ -6,6 +6,7 @@ use palpa_mesh::Vec3;
 
 use super::super::plan::Trouble;
 use super::Live;
+use super::kept::Kept;
 use super::report::{LiveReport, StepOutcome};
 use crate::model::Model;
 
@@ -31,8 +32,10 @@ pub(super) enum Known {
 /// The kind of an iteration within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// The first one.
+    /// The first one of a step, with new candidates, and with a new stiffness if the kept one is worn.
     First,
+    /// The first one of a step, with all that is kept of the last.
+    Follow,
     /// A later one, with a new stiffness and new candidates.
     Anew,
     /// A later one near equilibrium, with the factor, compliance and candidates of the previous
@@ -76,7 +79,11 @@ impl Live {
         let plan = Arc::clone(&self.plan);
         self.evaluate_forces(pass)?;
         self.look_outside(pass);
-        if pass == Pass::Near {
+        let keeps_compliance = matches!(pass, Pass::Follow | Pass::Near);
+        if pass == Pass::Follow {
+            self.touch_again();
+        }
+        if keeps_compliance {
             self.measure_gaps();
         } else {
             self.find_candidates(dt);
@@ -85,13 +92,17 @@ impl Live {
                 report.residual = residual;
                 return Ok(());
             }
-            self.refactor(report)?;
+            if pass == Pass::Anew || !self.keeps_factor() {
+                self.refactor(report)?;
+            }
         }
         self.right_side();
         let x = &mut self.ws.x;
         self.inside.substitute(&plan, x);
-        if pass != Pass::Near {
+        if !keeps_compliance {
             self.inside.comply(&plan, &self.outside, &mut self.problem);
+            self.kept
+                .renew_contact(self.search.covered, self.problem.has_friction);
         }
         self.inside.project(&plan, x, &mut self.problem);
         self.problem.solve(&self.course.tools);
@@ -111,7 +122,8 @@ impl Live {
     /// Evaluates the internal forces if those of the last iteration are out of date: the body has
     /// changed, or its materials have memory and time has passed.
     fn evaluate_forces(&mut self, pass: Pass) -> Result<(), Trouble> {
-        let has_aged = pass == Pass::First && self.model.has_memory;
+        let is_first = matches!(pass, Pass::First | Pass::Follow);
+        let has_aged = is_first && self.model.has_memory;
         if !has_aged && self.known != Known::Nothing {
             return Ok(());
         }
@@ -129,6 +141,7 @@ impl Live {
         for &[node, _] in &self.plan.zone {
             self.ws.before[node as usize] = self.state.displacements[node as usize];
         }
+        self.beyond.is_settled = false;
         let mut share = 1.0;
         loop {
             self.take(share);
@@ -259,9 +272,11 @@ impl Live {
             && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
     }
 
-    /// Marks the forces as unknown. Call it when the body has moved to another state or has another
-    /// zone.
+    /// Marks the forces as unknown, and the factor as that of another body. Call it when the body has
+    /// moved to another state or has another zone.
     pub(super) fn forget_forces(&mut self) {
         self.known = Known::Nothing;
+        self.kept = Kept::NONE;
+        self.beyond.is_settled = false;
     }
 }

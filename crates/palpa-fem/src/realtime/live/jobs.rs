@@ -5,6 +5,7 @@ use std::sync::Arc;
 use palpa_mesh::Vec3;
 
 use super::super::plan::Centres;
+use super::kept::Kept;
 use super::pressed::{Pressed, nearest_point};
 use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
 use super::{ExteriorMode, Live};
@@ -310,6 +311,12 @@ impl Live {
     fn put_in(&mut self, made: Made, room: &mut Room) {
         let was_linear = self.exterior.renew();
         let (mut inside, mut follower) = (None, None);
+        // An older factor does for another exterior of the same zone.
+        let kept = if made.zone.is_some() {
+            Kept::NONE
+        } else {
+            self.kept
+        };
         if let Some(zone) = made.zone {
             (inside, follower) = (Some(zone.inside), zone.follower);
             room.retired.entering = zone.entering;
@@ -351,6 +358,7 @@ impl Live {
             self.keep_good();
         }
         self.forget_forces();
+        self.kept = kept;
     }
 }
 

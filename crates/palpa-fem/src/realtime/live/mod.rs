@@ -6,6 +6,7 @@
 //! | `params`, `report` | how a step is set up, and how it ended |
 //! | `step` | one step from begin to end: iterations, verdict, memory, jobs |
 //! | `iteration` | one Newton iteration |
+//! | `kept` | what is kept from step to step: factor, candidates, compliance |
 //! | `springs` | the zone's factor, and the springs that make it possible deep under a tool |
 //! | `candidates` | triangles near the tools, and the contact forces on the skin |
 //! | `course` | how far the tools may go in a step |
@@ -38,6 +39,7 @@ mod exterior;
 mod glance;
 mod iteration;
 mod jobs;
+mod kept;
 mod params;
 mod pressed;
 mod rebuild;
@@ -71,6 +73,7 @@ use course::Course;
 use exterior::ExteriorState;
 use iteration::{Known, Scratch};
 use jobs::Jobs;
+use kept::Kept;
 use pressed::nearest_point;
 use rebuild::Room;
 use recovery::Recovery;
@@ -105,6 +108,7 @@ pub struct Live {
     singles: Vec<u32>,
     skin: SkinForces,
     known: Known,
+    kept: Kept,
     course: Course,
     recovery: Recovery,
     springs: Springs,
@@ -214,6 +218,7 @@ impl Live {
             skin: come.skin,
             singles,
             known: Known::Nothing,
+            kept: Kept::NONE,
             course: Course::new(tools),
             springs: Springs::NONE,
             jobs: Jobs::new(&model, room, kept, n_before, n_zones),

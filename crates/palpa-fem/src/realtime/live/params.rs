@@ -30,8 +30,8 @@ impl Default for LiveParams {
         Self {
             zone_radius: 15e-3,
             exterior: ExteriorMode::Followed,
-            max_iterations: 2,
-            tolerance: 0.01,
+            max_iterations: 4,
+            tolerance: 0.003,
             reach: 1.5e-3,
             leave: 0.2,
             longest_move: 3e-3,

@@ -32,6 +32,11 @@ impl Springs {
         patience: PATIENCE[0],
     };
 
+    /// Whether there are any.
+    pub(super) fn are_on(&self) -> bool {
+        self.share > 0.0
+    }
+
     /// Removes the springs, because the body has moved to another state.
     pub(super) fn take_off(&mut self) {
         self.share = 0.0;
@@ -107,6 +112,7 @@ impl Live {
                     report.shift = report.shift.max(shift);
                     report.spring = springs.share;
                     springs.settle(usual, shift);
+                    self.kept.renew_factor(shift);
                     return Ok(());
                 }
                 Err(trouble) if may_shift => return Err(trouble),

@@ -1,12 +1,12 @@
 //! One step: the tools move, the body follows, and the result is judged.
 
-use super::iteration::{Known, Pass};
+use super::iteration::Known;
 use super::report::{LiveReport, StepOutcome};
 use super::{ExteriorState, Live};
 use crate::posed_tool::PosedTool;
 
 /// Residual above which tools are followed more slowly, as a share of the tools' force.
-const ROUGH: f64 = 0.1;
+pub(super) const ROUGH: f64 = 0.1;
 /// Residual above which a step has lost the body, as a share of the tools' force.
 const LOST: f64 = 0.6;
 
@@ -96,15 +96,17 @@ impl Live {
 
     /// Runs Newton iterations until the zone is in balance or the limit is reached.
     fn iterations(&mut self, dt: f64, report: &mut LiveReport) {
+        let mut before = f64::INFINITY;
         while report.iterations < self.params.max_iterations {
             let pass = if report.iterations == 0 {
-                Pass::First
-            } else if report.residual < ROUGH && report.shift == 0.0 {
-                // The first iteration has come near equilibrium, so its stiffness and contact
-                // directions can be kept.
-                Pass::Near
+                self.first_pass()
             } else {
-                Pass::Anew
+                self.next_pass(report.residual, before, report.shift)
+            };
+            before = if report.iterations == 0 {
+                f64::INFINITY
+            } else {
+                report.residual
             };
             report.iterations += 1;
             match self.iterate(dt, pass, report) {

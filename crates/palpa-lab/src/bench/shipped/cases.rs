@@ -16,7 +16,7 @@ const FRICTION: f64 = 0.3;
 /// Benchmark B2 of the verification, under a ball in a simulated hand.
 const BLOCK: &str = r#"
 [body]
-generator = { kind = "block", size = ["100 mm", "100 mm", "40 mm"], spacing = "12 mm" }
+generator = { kind = "block", size = ["100 mm", "100 mm", "40 mm"], spacing = "10 mm" }
 [[layer]]
 tissue = { name = "skin", young = "100 kPa", poisson = 0.45 }
 thickness = "2 mm"

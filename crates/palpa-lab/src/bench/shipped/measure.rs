@@ -46,7 +46,6 @@ pub fn measure(
         case: case.name.clone(),
         accuracy: case.scene.mesh.accuracy,
         hand_mm_per_s_min: f64::INFINITY,
-        reference_nodes: usize::MAX,
         ..ShippedRow::default()
     };
     let (mut times, mut audited, mut n_nodes) = (Vec::new(), Vec::new(), 0);
@@ -140,7 +139,7 @@ fn audit(
         let kept = thinned(&stops[..=last], &chosen, LONGEST_WAY, longest_time);
         let way: Vec<Stop> = kept.iter().map(|&i| stops[i]).collect();
         let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
-        row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
+        row.note_reference(mesh.n_nodes());
         let found = kept.iter().zip(mesh.follow(&way, &mut *goes_on));
         let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
         forces.extend(found.map(|(_, force)| force));
@@ -152,7 +151,7 @@ fn audit(
             }
             let at = stop.tool.pose.translation.vector;
             let mesh = Reference::round(prepared, at, REFERENCE_SHARE)?;
-            row.reference_nodes = row.reference_nodes.min(mesh.n_nodes());
+            row.note_reference(mesh.n_nodes());
             forces.push(mesh.press(&stop.tool));
         }
     }

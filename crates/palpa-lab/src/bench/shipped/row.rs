@@ -52,9 +52,17 @@ pub struct ShippedRow {
     pub hand_mm_per_s_min: f64,
     /// Speed of the fastest hand.
     pub hand_mm_per_s_max: f64,
-    /// Least number of nodes of a reference mesh.
-    pub reference_nodes: usize,
+    /// Least number of nodes of a reference mesh; `None` if no pose was solved again.
+    pub reference_nodes: Option<usize>,
     /// Change of the static force at one pose on a mesh with 0.7 times the sizes of the reference, as
     /// a share of it.
     pub reference_change: Option<f64>,
+}
+
+impl ShippedRow {
+    /// Notes the size of a reference mesh.
+    pub(super) fn note_reference(&mut self, n_nodes: usize) {
+        let least = self.reference_nodes.unwrap_or(n_nodes);
+        self.reference_nodes = Some(least.min(n_nodes));
+    }
 }

@@ -355,7 +355,12 @@ fn the_loop_itself_is_judged() {
         [Guarantee::TickTime]
     );
     assert_eq!(
-        broken(|run, _| run.report.step_wall.p50 = 5e-3),
+        broken(|_, log| {
+            // Steps in the air do not count.
+            for step in &mut log.steps {
+                step.now *= if step.n_contacts > 0 { 5.0 } else { 1.0 };
+            }
+        }),
         [Guarantee::HandSpeed]
     );
     assert_eq!(
