@@ -2,6 +2,7 @@
 //! goes.
 
 use palpa::Note;
+use palpa::live::EDGE_SHARE;
 use palpa_scene::{ContactShape, ContactTool, ModelKind, Scene, Tool};
 
 /// Least edge length under the tool if the scene gives none, m. With finer meshes the engine would
@@ -41,7 +42,7 @@ pub(super) fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
     scene.mesh.moves |= scene.mesh.refine;
     let usual = scene.mesh.near_tool_of(&scene.tool);
     if scene.mesh.refine && scene.mesh.near_tool.is_none() {
-        let fine = (0.4 * scene.tool.contact_radius()).max(LEAST_EDGE);
+        let fine = (EDGE_SHARE * scene.tool.contact_radius()).max(LEAST_EDGE);
         scene.mesh.near_tool = Some(fine);
         if usual.is_some_and(|usual| 1.5 * usual < fine) {
             notes.push(Note::CoarserForTouch { edge: fine });

@@ -57,6 +57,8 @@ pub const GOOD_TRAVEL: f64 = 0.2e-3;
 /// Largest number of nodes. A larger body needs gigabytes, and one step of it takes longer than the
 /// age limit of a patch.
 const MOST_NODES: usize = 80_000;
+/// Default length of the edges under the tool, as a share of its contact radius.
+pub const EDGE_SHARE: f64 = 0.4;
 /// Distance between the points along the hand's way at which the body is refined, m.
 const WAY_STEP: f64 = 4e-3;
 
@@ -207,13 +209,12 @@ impl LiveScene {
 /// so they need not be smaller than the lump. Returns the sizes near the tool with it: intervals deeper
 /// than one and a half contact radii may be higher than in a press.
 fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
-    const SHARE: f64 = 0.4;
     const EDGE_GROWTH: f64 = 1.2;
     const LUMP_SHARE: f64 = 1.5;
     const DEEP: f64 = 1.6;
     let mut scene = scene.clone();
     let mesh = &mut scene.mesh;
-    mesh.near_tool = mesh.near_tool_at(&scene.tool, SHARE);
+    mesh.near_tool = mesh.near_tool_at(&scene.tool, EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
     if mesh.growth.is_none() {
         mesh.growth = Some(EDGE_GROWTH);
