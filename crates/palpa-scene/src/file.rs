@@ -308,7 +308,7 @@ pub(crate) struct MeshTable {
     /// Default: true.
     pub(crate) refine: bool,
     /// Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to
-    /// 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real
+    /// 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, 0.4 times in real
     /// time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) near_tool: Option<Length>,
@@ -330,7 +330,8 @@ pub(crate) struct MeshTable {
     pub(crate) max_vertices: u32,
     /// Error bar that `palpa press` may leave: half its width at the deepest, as a share of the
     /// force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so
-    /// `near_tool` cannot be given too. Default: sizes as given here.
+    /// `near_tool` cannot be given too. Default: sizes as given here. In real time nothing is measured
+    /// before: all default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) accuracy: Option<Share>,
     /// Longest time for the choice of a mesh by `accuracy`, 1 s to 86400 s. Default: no limit.

@@ -24,14 +24,17 @@ pub const REFERENCE_SHARE: f64 = 0.22;
 /// The mesh that judges a reference has sizes this many times those of the reference.
 const FINER: f64 = 0.7;
 /// Where the way matters, the longest way of the tool between two static steps, m, and if tissue
-/// relaxes, the longest time between them, s.
-pub const LONGEST_WAY: f64 = 0.5e-3;
+/// relaxes, the longest time between them, s. The static solver divides steps of tools with friction
+/// itself.
+pub const LONGEST_WAY: f64 = 1e-3;
 /// See [`LONGEST_WAY`].
 pub const LONGEST_TIME: f64 = 0.05;
 /// Poses are audited where the force is at least this share of the largest: errors are relative.
 pub const LEAST_FORCE: f64 = 0.2;
 /// Growth of the sizes with the distance from the tool.
 const GROWTH: f64 = 0.35;
+/// Forces out of balance that a static step may leave, as a share of the tool's.
+const TOLERANCE: f64 = 1e-4;
 /// A mesh with more nodes is not used: it would take minutes for a press.
 const MOST_NODES: usize = 60_000;
 /// Distance between the points along a way at which a mesh is fine, m.
@@ -67,7 +70,10 @@ impl Reference {
         Ok(Self {
             model: prepared.model()?,
             rest: prepared.rest()?,
-            params: prepared.solve_params(),
+            params: SolveParams {
+                tolerance: TOLERANCE,
+                ..prepared.solve_params()
+            },
             mesh_size: prepared.mesh.mesh_size,
         })
     }

@@ -440,7 +440,7 @@ impl fmt::Display for Note {
             ),
             Self::CoarseUnderTool { edge, radius } => write!(
                 f,
-                "skin edges near the tool are {:.1} mm long, more than a third of its contact radius of {:.1} mm: the force \
+                "skin edges near the tool are {:.1} mm long, more than half its contact radius of {:.1} mm: the force \
                  depends on the mesh; refine it with [mesh] near_tool",
                 mm(edge),
                 mm(radius)

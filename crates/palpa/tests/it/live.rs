@@ -50,6 +50,30 @@ fn a_bonded_tool_and_a_moving_mesh_without_refinement_are_refused() {
     assert!(still.contains("needs refine = true"), "{still}");
 }
 
+#[test]
+fn the_live_mesh_is_as_fine_as_the_scene_asks() {
+    let mesh = |accuracy: &str| {
+        let scene = SceneText::block([80.0, 80.0, 40.0], 10.0)
+            .layer(Layer::elastic("gel", "10 kPa"))
+            .press(4.0)
+            .sphere(8.0);
+        let scene = if accuracy.is_empty() {
+            scene
+        } else {
+            scene.set("mesh", "accuracy", accuracy)
+        };
+        let live = LiveScene::build(&parse(&scene)).unwrap();
+        (live.mesh_size, live.model.n_nodes())
+    };
+    let usual = mesh("");
+    assert_eq!(usual, mesh("3 %"));
+    let (fine, coarse) = (mesh("1 %"), mesh("9 %"));
+    assert!(fine.0 < 0.7 * usual.0, "{fine:?} {usual:?}");
+    assert!(fine.1 > 2 * usual.1, "{fine:?} {usual:?}");
+    assert!(coarse.0 > 1.4 * usual.0, "{coarse:?} {usual:?}");
+    assert!(coarse.1 < usual.1, "{coarse:?} {usual:?}");
+}
+
 /// Tissue whose upper layer is under tension, pressed near an edge, where tension moves the skin.
 fn tense() -> SceneText {
     SceneText::soft_over_stiff([60.0, 60.0, 24.0], 8.0, 8.0, 10.0)

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_scene::Scene;
+use palpa_scene::units::Share;
 
 use super::Outcome;
 use super::loop_report::EMBEDDED;
@@ -60,6 +61,9 @@ pub struct Args {
     /// place, 0 to 100; with 0, no error is measured
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=100))]
     poses: u16,
+    /// Accuracy that the shipped scenes ask of their meshes [default: 3 %]
+    #[arg(long, value_name = "SHARE")]
+    accuracy: Option<Share>,
     /// Folder with surfaces from scans, for the cases shipped-calf…
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -152,7 +156,14 @@ fn finish(report: &mut BenchReport, context: &Context) -> anyhow::Result<()> {
 
 fn chosen(args: &Args) -> anyhow::Result<Chosen> {
     let lump_forearm = Scene::parse(EMBEDDED, Path::new("")).context("the embedded scene")?;
-    let shipped = shipped_cases(&lump_forearm, args.data.as_deref())?;
+    let mut shipped = shipped_cases(&lump_forearm, args.data.as_deref())?;
+    if let Some(accuracy) = args.accuracy {
+        for case in &mut shipped {
+            case.scene.mesh.accuracy = Some(accuracy.si());
+            let mesh = &case.scene.mesh;
+            mesh.check(&case.scene.tool).map_err(anyhow::Error::msg)?;
+        }
+    }
     let names = || {
         let shipped = shipped.iter().map(|case| case.name.as_str());
         shipped.chain(cases().iter().map(|case| case.name))

@@ -64,7 +64,7 @@ fn table(rows: &[ShippedRow]) -> Table<16> {
     for row in rows {
         table.push([
             row.case.clone(),
-            percent(row.accuracy),
+            percent(Some(row.accuracy)),
             row.nodes.to_string(),
             format!("{:.0}", row.steps_per_s_mean),
             format!("{:.2}", row.step_ms_p99),

@@ -43,6 +43,17 @@ pub(super) struct Audit {
     not_audited: Vec<String>,
     reference: Option<MeshOfReference>,
     poses: Vec<Audited>,
+    /// The contacts whose way was gone again.
+    pub(super) ways: Vec<Vec<OnWay>>,
+}
+
+/// A static step of a way that was gone again.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct OnWay {
+    /// Position of the tool, in the device's frame.
+    pub(super) position_mm: [f64; 3],
+    /// Static force on the hand, in the device's frame.
+    pub(super) static_n: [f64; 3],
 }
 
 /// The mesh that static forces come from, and how good it is.
@@ -270,6 +281,14 @@ fn along_the_way(
         let stops: Vec<Stop> = kept.iter().map(|&i| whole[i]).collect();
         let reference = Reference::along(&live.prepared, &stops, REFERENCE_SHARE)?;
         let forces = reference.follow(&stops, || !context.is_interrupted());
+        let turn = live.scene_from_device.rotation;
+        let on_way = kept.iter().zip(&forces).filter_map(|(&i, force)| {
+            Some(OnWay {
+                position_mm: (all[way.start + i].position() * 1e3).into(),
+                static_n: turn.inverse_transform_vector(force.as_ref()?).into(),
+            })
+        });
+        audit.ways.push(on_way.collect());
         let of_chosen = (kept.iter().zip(forces)).filter(|(i, _)| in_way.binary_search(i).is_ok());
         found.extend(of_chosen.map(|(i, force)| (way.start + i, force)));
         audit.keep_coarsest(&reference);
@@ -298,6 +317,7 @@ impl Audit {
             not_audited: Vec::new(),
             reference: None,
             poses: Vec::new(),
+            ways: Vec::new(),
         }
     }
 

@@ -21,7 +21,7 @@ use self::figures::{Figures, Setup};
 use self::hand::still_spans;
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{LiveScene, Watch, machine, notes_of, open_device, path, servo_params};
+use palpa::live::{LiveScene, Watch, across, machine, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
 /// The scene that is used if none is given.
@@ -127,7 +127,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         scene.device.preset.name(),
         scene.device.grip.name()
     );
-    write(&figures, &log, &scene, &subtitle, out)?;
+    write(&figures, &log, &scene, &live, &subtitle, out)?;
     figures.say(context)?;
     for problem in verdicts::problems(&figures.verdicts) {
         context.say(format!("NOT GOOD: {problem}"))?;
@@ -223,6 +223,7 @@ fn write(
     figures: &Figures,
     log: &Log,
     scene: &Scene,
+    live: &LiveScene,
     subtitle: &str,
     out: &OutDir,
 ) -> anyhow::Result<()> {
@@ -231,5 +232,10 @@ fn write(
     let bars = figures.error_bars.as_deref().unwrap_or_default();
     picture::forces(log, bars, subtitle).save(out, "force_time")?;
     picture::depth(log, bars, scene.motion.above, subtitle).save(out, "force_depth")?;
+    if scene.motion.kind.goes_across() {
+        let along = across(&scene.motion, &live.scene_from_device);
+        let ways = figures.audit.as_ref().map_or(&[][..], |audit| &audit.ways);
+        picture::across(log, &along, ways, subtitle).save(out, "force_across")?;
+    }
     Ok(())
 }

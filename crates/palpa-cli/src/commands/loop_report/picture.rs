@@ -1,8 +1,9 @@
 //! The plots of a run.
 
 use palpa_rt::{Log, StepStatus, TickEntry};
-use palpa_servo::Faults;
+use palpa_servo::{Faults, Vec3};
 
+use super::audit::OnWay;
 use super::bars::BarFigures;
 use super::figures::Figures;
 use palpa_plot::{Axis, Band, Chart, Color, Guide, PALETTE, Picture, Series, panels};
@@ -133,6 +134,49 @@ pub(super) fn depth(log: &Log, bars: &[BarFigures], above: f64, subtitle: &str) 
     .series(Series::new("on the way", points(&entries[..last])).with_color(FAINT))
     .line("the last press", points(&entries[last..]));
     with_bars(chart, bars, |bar| bar.depth_mm).draw()
+}
+
+/// Plots force against place along the way across the skin: against the motion, and out of the skin.
+/// With friction the first is a loop, as wide as twice the friction. Beside them the static forces of
+/// the ways that were gone again.
+pub(super) fn across(log: &Log, along: &Vec3, ways: &[Vec<OnWay>], subtitle: &str) -> Picture {
+    let out = Vec3::z();
+    let chart = |title: &str, direction: &Vec3| {
+        let value = |force: [f64; 3]| Vec3::from(force).dot(direction);
+        let felt = thinned(log).map(|t| {
+            let device = &t.devices[0];
+            let is_felt = device.force != [0.0; 3];
+            // A point that is not finite is a gap.
+            let force = if is_felt {
+                value(device.force)
+            } else {
+                f64::NAN
+            };
+            [1e3 * Vec3::from(device.position).dot(along), force]
+        });
+        let chart = Chart::new(
+            Axis::linear("place along the way [mm]"),
+            Axis::linear("force [N]"),
+        )
+        .title(title)
+        .subtitle(subtitle)
+        .line("felt at 1 kHz", felt.collect());
+        let points = ways.iter().flatten().map(|stop| {
+            let at = Vec3::from(stop.position_mm).dot(along);
+            [at, value(stop.static_n)]
+        });
+        let points: Vec<[f64; 2]> = points.collect();
+        if points.is_empty() {
+            return chart;
+        }
+        let name = "the same way in static steps, on a finer mesh";
+        chart.series(Series::new(name, points).only_markers())
+    };
+    let charts = [
+        chart("Force along the way", along),
+        chart("Force out of the skin", &out),
+    ];
+    panels("Force across the skin", &charts, 1)
 }
 
 /// Adds the static forces with their error bars.

@@ -5,7 +5,8 @@ use palpa::audit::{
     LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Quality, REFERENCE_SHARE, Reference, Stop, has_history,
     quantile, relaxes, thinned,
 };
-use palpa::live::LiveScene;
+use palpa::live::{ACCURACY, LiveScene};
+use rayon::prelude::*;
 
 use super::drive::{Driven, Felt, Part, drive};
 use super::places::{Spot, draw_spots};
@@ -32,37 +33,48 @@ struct Audited {
     mesh_error: Option<f64>,
 }
 
-/// Measures a case. `goes_on` is asked before each place and pose; if it returns false, the places
-/// until then are the result.
+/// What the audit of a way finds.
+#[derive(Debug, Default)]
+struct Audit {
+    poses: Vec<Audited>,
+    /// Least number of nodes of a reference mesh.
+    nodes: Option<usize>,
+    /// See [`ShippedRow::reference_change`].
+    change: Option<f64>,
+}
+
+/// Measures a case: goes all ways one after the other, then solves poses of several ways at a time.
+/// `goes_on` is asked before each place and pose; if it returns false, what was measured until then is
+/// the result.
 ///
 /// # Errors
 /// If the body cannot be grown or pressed, or a place has no room.
 pub fn measure(
     case: &ShippedCase,
     params: &MeasureParams,
-    mut goes_on: impl FnMut() -> bool,
+    goes_on: impl Fn() -> bool + Sync,
 ) -> anyhow::Result<ShippedRow> {
     let mut row = ShippedRow {
         case: case.name.clone(),
-        accuracy: case.scene.mesh.accuracy,
+        accuracy: case.scene.mesh.accuracy.unwrap_or(ACCURACY),
         hand_mm_per_s_min: f64::INFINITY,
         ..ShippedRow::default()
     };
-    let (mut times, mut audited, mut n_nodes) = (Vec::new(), Vec::new(), 0);
+    let (mut times, mut ways, mut n_nodes) = (Vec::new(), Vec::new(), 0);
     let (mut duration, mut background) = (0.0, 0.0);
     let spots = draw_spots(case, params.n_places)?;
-    for (k, (spot, live)) in spots.iter().enumerate() {
+    for (spot, live) in &spots {
         if !goes_on() {
             break;
         }
         let scene = spot.scene(&case.scene);
         let driven = drive(&scene, live)?;
-        audited.extend(audit(&driven, live, params, k, &mut row, &mut goes_on)?);
         note(&mut row, spot, &driven);
         n_nodes += live.model.n_nodes();
         duration += driven.duration;
         background += driven.background;
         times.extend(driven.times);
+        ways.push((live, driven.felt));
     }
     anyhow::ensure!(row.n_places > 0, "no place was measured");
     row.nodes = n_nodes / row.n_places;
@@ -73,7 +85,18 @@ pub fn measure(
     row.step_ms_p99 = quantile(&times, 0.99).unwrap_or(f64::NAN) * 1e3;
     row.background_cpu_share = background / duration;
     row.steps_cpu_share = whole / duration;
-    enter_errors(&mut row, &audited);
+    let audits = ways.par_iter().enumerate().map(|(k, (live, felt))| {
+        if goes_on() {
+            audit(felt, live, params, k, &goes_on)
+        } else {
+            Ok(Audit::default())
+        }
+    });
+    let audits = audits.collect::<anyhow::Result<Vec<Audit>>>()?;
+    row.reference_nodes = audits.iter().filter_map(|audit| audit.nodes).min();
+    row.reference_change = audits.iter().find_map(|audit| audit.change);
+    let poses: Vec<Audited> = audits.into_iter().flat_map(|audit| audit.poses).collect();
+    enter_errors(&mut row, &poses);
     Ok(row)
 }
 
@@ -111,25 +134,23 @@ fn enter_errors(row: &mut ShippedRow, audited: &[Audited]) {
 
 /// Solves poses of a way again.
 fn audit(
-    driven: &Driven,
+    felt: &[Felt],
     live: &LiveScene,
     params: &MeasureParams,
     k: usize,
-    row: &mut ShippedRow,
-    goes_on: &mut impl FnMut() -> bool,
-) -> anyhow::Result<Vec<Audited>> {
-    let felt = &driven.felt;
+    goes_on: &impl Fn() -> bool,
+) -> anyhow::Result<Audit> {
     let chosen = drawn(felt, params.n_poses, k);
+    let mut audit = Audit::default();
     let Some(&last) = chosen.last() else {
-        return Ok(Vec::new());
+        return Ok(audit);
     };
     let stops: Vec<Stop> = felt.iter().map(stop).collect();
     let prepared = &live.prepared;
     let of_chosen: Vec<Stop> = chosen.iter().map(|&i| stops[i]).collect();
     if k == 0 {
         let tool = &of_chosen[of_chosen.len() / 2].tool;
-        let quality = Quality::find(prepared, tool, &mut *goes_on);
-        row.reference_change = quality.map(|quality| quality.change);
+        audit.change = Quality::find(prepared, tool, goes_on).map(|quality| quality.change);
     }
     let scene = &prepared.scene;
     let mut forces = Vec::new();
@@ -139,8 +160,8 @@ fn audit(
         let kept = thinned(&stops[..=last], &chosen, LONGEST_WAY, longest_time);
         let way: Vec<Stop> = kept.iter().map(|&i| stops[i]).collect();
         let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
-        row.note_reference(mesh.n_nodes());
-        let found = kept.iter().zip(mesh.follow(&way, &mut *goes_on));
+        audit.nodes = Some(mesh.n_nodes());
+        let found = kept.iter().zip(mesh.follow(&way, goes_on));
         let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
         forces.extend(found.map(|(_, force)| force));
     } else {
@@ -151,11 +172,12 @@ fn audit(
             }
             let at = stop.tool.pose.translation.vector;
             let mesh = Reference::round(prepared, at, REFERENCE_SHARE)?;
-            row.note_reference(mesh.n_nodes());
+            let n_nodes = mesh.n_nodes();
+            audit.nodes = Some(audit.nodes.map_or(n_nodes, |least| least.min(n_nodes)));
             forces.push(mesh.press(&stop.tool));
         }
     }
-    let audited = chosen.iter().zip(forces).map(|(&i, force)| {
+    let poses = chosen.iter().zip(forces).map(|(&i, force)| {
         let felt = &felt[i];
         let error = |found: palpa_mesh::Vec3| Some((found - force?).norm() / force?.norm());
         let on_loop = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
@@ -165,7 +187,8 @@ fn audit(
             mesh_error: on_loop.and_then(error),
         }
     });
-    Ok(audited.collect())
+    audit.poses = poses.collect();
+    Ok(audit)
 }
 
 fn stop(felt: &Felt) -> Stop {

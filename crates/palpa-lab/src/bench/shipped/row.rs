@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct ShippedRow {
     /// Name of the case, `shipped-…`.
     pub case: String,
-    /// Accuracy that the scene asks of its mesh, as a share of the force; `None` if it asks for none.
-    pub accuracy: Option<f64>,
+    /// Accuracy that the scene asks of its mesh, as a share of the force: 3 % if it asks for none.
+    pub accuracy: f64,
     /// Nodes of the loop's mesh, the mean over the places.
     pub nodes: usize,
     /// Steps with a vertex near the tool per second of their CPU time, patch and installed results of
@@ -57,12 +57,4 @@ pub struct ShippedRow {
     /// Change of the static force at one pose on a mesh with 0.7 times the sizes of the reference, as
     /// a share of it.
     pub reference_change: Option<f64>,
-}
-
-impl ShippedRow {
-    /// Notes the size of a reference mesh.
-    pub(super) fn note_reference(&mut self, n_nodes: usize) {
-        let least = self.reference_nodes.unwrap_or(n_nodes);
-        self.reference_nodes = Some(least.min(n_nodes));
-    }
 }
