@@ -37,10 +37,10 @@ use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
 use palpa_mesh::Vec3;
-use palpa_scene::{Mesh, Scene};
+use palpa_scene::{Mesh, Scene, Skin as GivenSkin};
 use palpa_servo::Pose;
 
-use crate::build::{build_within, in_mm};
+use crate::build::{Pressed, build_for, in_mm};
 use crate::note::Note;
 use crate::prepare::Prepared;
 use crate::press::mesh::{Sizes, along_skin};
@@ -107,8 +107,14 @@ impl LiveScene {
         }
         let (scene, sizes) = coarser(scene);
         let scene = &scene;
-        let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
         let way = if moves { Vec::new() } else { way(scene) };
+        let pressed = if moves {
+            Pressed::Anywhere
+        } else {
+            Pressed::Along(&way)
+        };
+        let grown = build_for(scene, MOST_NODES, pressed).context("in real time")?;
+        let grown = Arc::new(grown);
         let prepared = Arc::new(Prepared::with_sizes(scene, grown, sizes, &way)?);
         // The loop begins at rest, as the press does. Without tension that is the undeformed mesh,
         // so there is nothing to solve.
@@ -206,7 +212,8 @@ impl LiveScene {
 /// a press. On a layered block the force is within 1.3 % past 2 mm of that on a mesh with edges of
 /// 0.15 contact radii. With half the growth of the edges it is the same; with one level less in soft fat,
 /// or one for the muscle, it is 2 to 3 % more. Prisms that a lump cuts have its share of the stiffness,
-/// so they need not be smaller than the lump. Returns the sizes near the tool with it: intervals deeper
+/// so they need not be smaller than the lump. A skin from a file is coarsened where it is finer than
+/// that; one made by formula has the spacing that the scene asks for. Returns the sizes near the tool with it: intervals deeper
 /// than one and a half contact radii may be higher than in a press.
 fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const EDGE_GROWTH: f64 = 1.2;
@@ -214,6 +221,8 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const DEEP: f64 = 1.6;
     let mut scene = scene.clone();
     let mesh = &mut scene.mesh;
+    let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
+    mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     mesh.near_tool = mesh.near_tool_at(&scene.tool, EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
     if mesh.growth.is_none() {
