@@ -18,8 +18,9 @@
 //! centres of the given triangles. Each of these points belongs to the triangle of the coarse skin
 //! that it is nearest to among those that took the place of its own.
 //!
-//! *Tried elsewhere:* libraries that simplify to a number of triangles (`meshopt`, `baby_shark`,
-//! `threecrate`) know no wanted length by place, and no bound on the distance of the surfaces.
+//! *Not used:* libraries that simplify meshes (`meshopt`, `baby_shark`, `threecrate`,
+//! `axiolid-decimate`). None takes lengths of edges by place, and triangles that are good for pictures
+//! may be too thin for finite elements.
 
 mod collapse;
 mod sizes;

@@ -22,8 +22,7 @@ fn fine_limb() -> SceneText {
         .set("press", "retract", false)
         .set("press", "step", "1.25 mm")
         .near_tool(3.0)
-        .set("mesh", "growth", 1.2)
-        .set("mesh", "level_growth", 0.5)
+        .set("mesh", "growth", 0.5)
         .motion("press", 2.5)
 }
 
