@@ -1,10 +1,11 @@
 //! From surfaces to layered bodies of triangular prisms.
 //!
 //! The modules are listed in the order of the data flow: a [`Surface`] is read, checked and
-//! repaired, and then grown inward into a [`LayeredBody`].
+//! repaired, coarsened if asked, and then grown inward into a [`LayeredBody`].
 
 pub mod body;
 pub mod check;
+pub mod coarsen;
 pub mod distance;
 pub mod generate;
 pub mod growth;
@@ -21,6 +22,7 @@ pub mod write;
 
 pub use body::{CutFace, LayeredBody};
 pub use check::{SurfaceReport, Verdict, check_surface, examine};
+pub use coarsen::Coarsening;
 pub use distance::{SurfaceIndex, closest_on_triangle};
 pub use growth::{Growth, GrowthError, GrowthParams, LayerSpec, grow};
 pub use part::Part;

@@ -300,13 +300,18 @@ pub(crate) struct DampingTable {
     pub(crate) stiffness: Time,
 }
 
-/// Mesh size near the tool and lumps. The mesh is never made coarser than the body's own.
+/// Mesh size near the tool and lumps.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct MeshTable {
     /// Whether the mesh is refined near the tool and lumps; if false, it stays as it was grown.
     /// Default: true.
     pub(crate) refine: bool,
+    /// Whether triangles of the skin that are smaller than wanted are merged before the body is
+    /// grown, within a stated distance from the given skin. Default: true in real time if the skin
+    /// comes from a file and `refine` is true; else false.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) coarsen: Option<bool>,
     /// Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to
     /// 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, 0.4 times in real
     /// time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
@@ -347,6 +352,7 @@ impl Default for MeshTable {
     fn default() -> Self {
         Self {
             refine: true,
+            coarsen: None,
             near_tool: None,
             near_lumps: None,
             growth: None,

@@ -58,6 +58,9 @@ pub struct Damping {
 pub struct Mesh {
     /// Whether the mesh is refined; if false, it stays as it was grown.
     pub refine: bool,
+    /// Whether the skin is coarsened where it is finer than wanted, before it is grown; `None` is
+    /// automatic: in real time if the skin comes from a file and the mesh may be refined.
+    pub coarsen: Option<bool>,
     /// Wanted length of edges and height of levels under the tool; `None` is
     /// [automatic](Self::near_tool_of).
     pub near_tool: Option<f64>,

@@ -101,6 +101,7 @@ fn model(model: &Model) -> ModelTable {
 fn mesh(mesh: &Mesh) -> MeshTable {
     MeshTable {
         refine: mesh.refine,
+        coarsen: mesh.coarsen,
         near_tool: mesh.near_tool.map(Length::from_si),
         near_lumps: mesh.near_lumps.map(Length::from_si),
         growth: mesh.growth,

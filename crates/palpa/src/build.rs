@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
-use palpa_mesh::growth::{MAX_NODES, ScatteredThickness, Thickness as ThicknessField};
+use palpa_mesh::growth::{MAX_NODES, ScatteredThickness, Thickness as ThicknessField, grown_part};
 use palpa_mesh::{
     Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, Surface, SurfaceIndex, Vec3, grow,
     read_surface, repair,
@@ -14,6 +14,7 @@ use palpa_scene::{
 };
 
 use crate::note::Note;
+use crate::press::mesh::coarsening;
 
 /// A place further from the skin than this share of the body's size is refused: its frame or unit
 /// is probably wrong.
@@ -41,6 +42,15 @@ pub struct BuiltBody {
     pub notes: Vec<Note>,
 }
 
+/// Where a tool will press a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pressed<'a> {
+    /// At the scene's place, and at these distances from it along the scene's motion, m.
+    Along(&'a [f64]),
+    /// At any place.
+    Anywhere,
+}
+
 /// Reads or makes the surfaces of `scene` and grows them into layers.
 ///
 /// # Errors
@@ -55,12 +65,24 @@ pub fn build(scene: &Scene) -> anyhow::Result<BuiltBody> {
 /// # Errors
 /// As [`build`], and when the body has more nodes.
 pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody> {
+    build_for(scene, max_nodes, Pressed::Along(&[]))
+}
+
+/// As [`build_within`]. `pressed` says where a skin that is coarsened stays fine.
+///
+/// # Errors
+/// As [`build_within`].
+pub fn build_for(
+    scene: &Scene,
+    max_nodes: usize,
+    pressed: Pressed<'_>,
+) -> anyhow::Result<BuiltBody> {
     let mut notes = Vec::new();
     let (skin, bones) = surfaces(scene, &mut notes)?;
     // Vertex numbers refer to the surface as it was read, before repairs and cuts. From here on,
     // places are positions.
-    let press_at = point_of(&skin, &scene.press.target)?;
-    let lumps_at = scene
+    let mut press_at = point_of(&skin, &scene.press.target)?;
+    let mut lumps_at = scene
         .lumps
         .iter()
         .map(|lump| match &lump.place {
@@ -80,13 +102,33 @@ pub fn build_within(scene: &Scene, max_nodes: usize) -> anyhow::Result<BuiltBody
     };
     let on_skin = |p: Vec3| skin.points.get(nearest(&skin, p)).copied().unwrap_or(p);
     let cut_out = cut_out.map(|(centre, radius)| (on_skin(centre), radius));
-    let params = GrowthParams {
+    let mut params = GrowthParams {
         layers: layer_specs(scene)?,
         cut_out,
+        coarsening: None,
         max_nodes,
     };
+    if scene.mesh.coarsen == Some(true) {
+        // Places do not depend on the coarse skin.
+        let part = grown_part(&skin, cut_out);
+        let middle = nearest(&part, area_centroid(&part));
+        if let Some(middle) = part.points.get(middle) {
+            let at = *press_at.get_or_insert(*middle);
+            for at in &mut lumps_at {
+                at.get_or_insert(*middle);
+            }
+            params.coarsening = coarsening(scene, &part, at, pressed);
+        }
+    }
     let growth =
         grow(&skin, &bones, &params).map_err(|error| with_bone_name(error, &scene.body.bones))?;
+    if let Some(coarsened) = growth.coarsened {
+        notes.push(Note::SkinCoarsened {
+            n_given: coarsened.n_given,
+            n_vertices: coarsened.n_vertices,
+            deviation: coarsened.deviation,
+        });
+    }
     let n_overlaps = growth.report.n_base_overlaps;
     if n_overlaps > 0 {
         notes.push(Note::BaseOverlaps {

@@ -53,6 +53,15 @@ pub enum Note {
         /// Triangles that were turned outward.
         n_flipped: usize,
     },
+    /// The skin was coarsened where its triangles are smaller than wanted.
+    SkinCoarsened {
+        /// Number of vertices of the given skin.
+        n_given: usize,
+        /// Number of vertices of the coarse skin.
+        n_vertices: usize,
+        /// Largest distance of the coarse skin from the given one, m.
+        deviation: f64,
+    },
     /// Triangles of the body's base pass through each other.
     BaseOverlaps {
         /// Number of pairs of triangles.
@@ -324,6 +333,16 @@ impl fmt::Display for Note {
                     .collect();
                 write!(f, "{file}: repaired on the way in: {}", done.join(", "))
             }
+            Self::SkinCoarsened {
+                n_given,
+                n_vertices,
+                deviation,
+            } => write!(
+                f,
+                "the skin was coarsened from {n_given} to {n_vertices} vertices where it is finer than wanted; it is at most \
+                 {:.2} mm from the given skin; [mesh] coarsen = false keeps all vertices",
+                mm(deviation)
+            ),
             Self::BaseOverlaps { n_pairs } => write!(
                 f,
                 "the base of the body passes through itself ({n_pairs} pairs of triangles): look at section.png or the VTU \

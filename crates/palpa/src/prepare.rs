@@ -19,7 +19,7 @@ use palpa_mesh::growth::MAX_NODES;
 use palpa_mesh::{Surface, Vec3};
 use palpa_scene::{ContactTool, Scene};
 
-use crate::build::{BuiltBody, build_within};
+use crate::build::{BuiltBody, Pressed, build_for};
 use crate::continuum;
 use crate::note::{Note, in_words};
 use crate::press::Place;
@@ -81,7 +81,7 @@ impl Prepared {
     /// # Errors
     /// As [`Self::build`].
     pub fn with_params(scene: &Scene, params: &PrepareParams) -> anyhow::Result<Self> {
-        let grown = build_within(scene, params.max_nodes)?;
+        let grown = build_for(scene, params.max_nodes, Pressed::Along(&params.way))?;
         Self::on(scene, Arc::new(grown), &params.way)
     }
 

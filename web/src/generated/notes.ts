@@ -56,6 +56,24 @@ export interface components {
              */
             n_welded: number;
         } | {
+            /**
+             * Format: double
+             * @description Largest distance of the coarse skin from the given one, m.
+             */
+            deviation: number;
+            /** @constant */
+            kind: "skin_coarsened";
+            /**
+             * Format: uint
+             * @description Number of vertices of the given skin.
+             */
+            n_given: number;
+            /**
+             * Format: uint
+             * @description Number of vertices of the coarse skin.
+             */
+            n_vertices: number;
+        } | {
             /** @constant */
             kind: "base_overlaps";
             /**

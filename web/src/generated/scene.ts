@@ -341,13 +341,15 @@ export interface components {
              */
             transition?: string;
         };
-        /** @description Mesh size near the tool and lumps. The mesh is never made coarser than the body's own. */
+        /** @description Mesh size near the tool and lumps. */
         MeshTable: {
             /**
              * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here.
              * @example 3 %
              */
             accuracy?: string;
+            /** @description Whether triangles of the skin that are smaller than wanted are merged before the body is grown, within a stated distance from the given skin. Default: true in real time if the skin comes from a file and `refine` is true; else false. */
+            coarsen?: boolean;
             /**
              * Format: double
              * @description Increase of the wanted length of edges with the distance from the tool or lump, as a share of that distance, 0.02 to 5. Default: 0.5; 1.2 in real time.

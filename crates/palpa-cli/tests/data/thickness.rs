@@ -41,6 +41,7 @@ fn assert_kept(skin: &str, bones: &[Surface], n_levels: usize) {
     let params = GrowthParams {
         layers,
         cut_out: None,
+        coarsening: None,
         max_nodes: MAX_NODES,
     };
     let growth = grow(&read(skin), bones, &params).unwrap();

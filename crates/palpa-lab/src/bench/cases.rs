@@ -196,6 +196,7 @@ impl BenchShape {
                 let params = GrowthParams {
                     layers,
                     cut_out: None,
+                    coarsening: None,
                     max_nodes: palpa_mesh::growth::MAX_NODES,
                 };
                 grow(&skin, &[bone], &params)

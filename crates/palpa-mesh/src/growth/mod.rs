@@ -1,6 +1,7 @@
 //! Growth of a skin surface inward into a layered body (method, eq. 3.1, on real shapes).
 //!
 //! 1. Flat caps of a closed limb are found and removed. Their rims become cut faces.
+//!    If asked, the skin that remains is coarsened where it is finer than wanted.
 //! 2. Every skin vertex gets a *column*: a line inward that starts along the smoothed normal and
 //!    turns into the field of the rigid core (bones). Without bones it is straight.
 //! 3. Levels are placed on the columns. The lower side of a layer lies at the asked depth, which is
@@ -28,7 +29,7 @@ use thiserror::Error;
 pub use report::{GrowthReport, LayerReport, Moved, Spread, Worst};
 pub use thickness::{ScatteredThickness, Thickness};
 
-use crate::{LayeredBody, Surface, Vec3};
+use crate::{Coarsening, LayeredBody, Surface, SurfaceIndex, Vec3};
 use columns::{Column, Confinement};
 use core::RigidCore;
 use depth::{Depth, Place};
@@ -41,6 +42,9 @@ const LEAST_FILL_SHARE: f64 = 0.2;
 /// Least share of their thickness that the lower layers of a shortened column keep before the layers
 /// above them give way too.
 const LEAST_SHORTENED: f64 = 0.25;
+
+/// A skin that coarsening would rid of a smaller share of its vertices stays as it is given.
+const LEAST_COARSENED: f64 = 0.1;
 
 /// Largest number of nodes. The bars and factors of a larger body would not fit into memory.
 pub const MAX_NODES: usize = 2_000_000;
@@ -66,6 +70,8 @@ pub struct GrowthParams {
     pub layers: Vec<LayerSpec>,
     /// Keep only the part within this distance of a point: `(centre, radius)`, in metres.
     pub cut_out: Option<(Vec3, f64)>,
+    /// How the skin is coarsened before it is grown; `None` keeps all its vertices.
+    pub coarsening: Option<Coarsening>,
     /// Largest number of nodes. A larger body is refused before it is grown. At most [`MAX_NODES`].
     pub max_nodes: usize,
 }
@@ -83,6 +89,19 @@ pub struct Growth {
     /// Distance from the end of each column to the nearest bone, in metres, negative inside it.
     /// Empty if there are no bones. `[n_vertices]`
     pub stand_off: Vec<f64>,
+    /// How the skin was coarsened; `None` if all its vertices were kept.
+    pub coarsened: Option<CoarsenReport>,
+}
+
+/// How a skin was coarsened.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoarsenReport {
+    /// Number of vertices before, without those of flat caps and outside a cut-out.
+    pub n_given: usize,
+    /// Number of vertices afterwards.
+    pub n_vertices: usize,
+    /// Largest distance of the skin from the given one, m.
+    pub deviation: f64,
 }
 
 /// Reason why a body could not be grown.
@@ -212,12 +231,7 @@ pub fn grow(
         check_points(bone, &format!("bone {i}"))?;
     }
 
-    let caps = cut::find_caps(surface);
-    let mut is_cap = vec![false; surface.triangles.len()];
-    for &t in caps.iter().flatten() {
-        is_cap[t as usize] = true;
-    }
-    let mut skin = cut::without_triangles(surface, |t| is_cap[t]);
+    let (mut skin, n_caps) = without_caps(surface);
     let reaches_bone = params.layers.last().is_some_and(|l| l.thickness.is_none());
     if reaches_bone {
         core::check_inside(bones, &skin)?;
@@ -228,6 +242,11 @@ pub fn grow(
             return Err(GrowthError::EmptyCutOut { radius });
         }
     }
+    check_thickness(&skin, &params.layers)?;
+    let coarsened = match &params.coarsening {
+        Some(coarsening) => coarsened(&mut skin, bones, params, coarsening),
+        None => None,
+    };
     let n_levels = 1 + params.layers.iter().map(|l| l.n_levels).sum::<usize>();
     let max_nodes = params.max_nodes.min(MAX_NODES);
     if skin.points.len().saturating_mul(n_levels) > max_nodes {
@@ -243,7 +262,6 @@ pub fn grow(
     let rings = columns::one_rings(&skin);
     let confinement = Confinement::new(skin.points.len(), &cuts);
     let fixed_depth = |v: usize| fixed_thickness(&params.layers, skin.points[v]);
-    check_thickness(&skin, &params.layers)?;
     let mean_depth =
         (0..skin.points.len()).map(fixed_depth).sum::<f64>() / skin.points.len() as f64;
     let smoothing = if reaches_bone {
@@ -291,14 +309,63 @@ pub fn grow(
         core.as_ref(),
         &depth,
     )?;
-    Ok(report::finish(
-        body,
-        &params.layers,
-        outcome,
-        core.as_ref(),
-        &depth,
-        caps.len(),
-    ))
+    let mut growth = report::finish(body, &params.layers, outcome, core.as_ref(), &depth, n_caps);
+    growth.coarsened = coarsened;
+    Ok(growth)
+}
+
+/// The part of a surface from which columns grow if it is not coarsened: without flat caps, and
+/// within the cut-out, `(centre, radius)`, m.
+pub fn grown_part(surface: &Surface, cut_out: Option<(Vec3, f64)>) -> Surface {
+    let (skin, _) = without_caps(surface);
+    match cut_out {
+        Some((centre, radius)) => cut::cut_out(&skin, centre, radius),
+        None => skin,
+    }
+}
+
+/// The surface without its flat caps, and their number.
+fn without_caps(surface: &Surface) -> (Surface, usize) {
+    let caps = cut::find_caps(surface);
+    let mut is_cap = vec![false; surface.triangles.len()];
+    for &t in caps.iter().flatten() {
+        is_cap[t as usize] = true;
+    }
+    (cut::without_triangles(surface, |t| is_cap[t]), caps.len())
+}
+
+/// Coarsens the skin if that saves enough.
+fn coarsened(
+    skin: &mut Surface,
+    bones: &[Surface],
+    params: &GrowthParams,
+    coarsening: &Coarsening,
+) -> Option<CoarsenReport> {
+    let layers = &params.layers;
+    let reaches_bone = layers.last().is_some_and(|l| l.thickness.is_none());
+    let bones = if reaches_bone { bones } else { &[] };
+    let bones: Vec<SurfaceIndex> = bones.iter().map(SurfaceIndex::build).collect();
+    let thickness = |p: Vec3| {
+        let far = |bone: &SurfaceIndex| Some((bone.closest(p)?.point - p).norm());
+        let to_bone = bones.iter().filter_map(far);
+        let layered = if reaches_bone {
+            f64::INFINITY
+        } else {
+            fixed_thickness(layers, p)
+        };
+        to_bone.fold(layered, f64::min)
+    };
+    let coarse = coarsening.apply(skin, thickness);
+    let report = CoarsenReport {
+        n_given: skin.points.len(),
+        n_vertices: coarse.surface.points.len(),
+        deviation: coarse.deviation,
+    };
+    let is_worth_it = report.n_vertices as f64 <= (1.0 - LEAST_COARSENED) * report.n_given as f64;
+    is_worth_it.then(|| {
+        *skin = coarse.surface;
+        report
+    })
 }
 
 /// Sum of the thicknesses that the layers of given thickness ask for below a skin point. m

@@ -216,6 +216,7 @@ pub(super) fn finish(
         report,
         thinning,
         stand_off,
+        coarsened: None,
     }
 }
 

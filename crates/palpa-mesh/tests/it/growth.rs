@@ -33,6 +33,7 @@ fn params(layers: Vec<LayerSpec>) -> GrowthParams {
     GrowthParams {
         layers,
         cut_out: None,
+        coarsening: None,
         max_nodes: palpa_mesh::growth::MAX_NODES,
     }
 }
@@ -267,6 +268,7 @@ fn a_cut_out_keeps_the_part_round_its_centre() {
         &GrowthParams {
             layers: layers.clone(),
             cut_out: Some((centre, 0.04)),
+            coarsening: None,
             max_nodes: palpa_mesh::growth::MAX_NODES,
         },
     )
@@ -516,6 +518,7 @@ fn a_cut_out_has_the_core_of_the_whole() {
     let cut = GrowthParams {
         layers: limb_layers(),
         cut_out: Some((centre, 0.035)),
+        coarsening: None,
         max_nodes: palpa_mesh::growth::MAX_NODES,
     };
     let part = grow(&skin, &bones, &cut).unwrap();

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod check;
+mod coarsen;
 mod generate;
 mod growth;
 mod imprint;

@@ -88,6 +88,7 @@ pub(crate) fn grown(skin: &Surface, bones: &[Surface]) -> LayeredBody {
     let params = GrowthParams {
         layers: layers(),
         cut_out: None,
+        coarsening: None,
         max_nodes: palpa_mesh::growth::MAX_NODES,
     };
     grow(skin, bones, &params).unwrap().body
@@ -103,6 +104,7 @@ pub(crate) fn flat(skin: &Surface) -> LayeredBody {
             min_thickness: 1e-4,
         }],
         cut_out: None,
+        coarsening: None,
         max_nodes: palpa_mesh::growth::MAX_NODES,
     };
     grow(skin, &[], &params).unwrap().body

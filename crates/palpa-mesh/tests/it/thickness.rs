@@ -42,6 +42,7 @@ fn grown(skin: &Surface, bones: &[Surface], layers: &[LayerSpec]) -> Growth {
     let params = GrowthParams {
         layers: layers.to_vec(),
         cut_out: None,
+        coarsening: None,
         max_nodes: MAX_NODES,
     };
     grow(skin, bones, &params).unwrap()

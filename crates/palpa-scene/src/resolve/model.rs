@@ -67,6 +67,7 @@ impl Reader<'_> {
         }
         Ok(Mesh {
             refine: mesh.refine,
+            coarsen: mesh.coarsen,
             near_tool: edge("near_tool", mesh.near_tool)?,
             near_lumps: edge("near_lumps", mesh.near_lumps)?,
             growth: growth("growth", mesh.growth)?,

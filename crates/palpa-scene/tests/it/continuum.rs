@@ -95,6 +95,7 @@ fn everything_is_understood_and_survives_being_written() {
     assert_eq!((scene.model.alpha, scene.model.tolerance), (0.7, 1e-6));
     let mesh = Mesh {
         refine: false,
+        coarsen: Some(true),
         near_tool: Some(2e-3),
         near_lumps: Some(1.5e-3),
         growth: Some(0.5),

@@ -37,10 +37,10 @@ use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
 use palpa_mesh::Vec3;
-use palpa_scene::{Mesh, Scene};
+use palpa_scene::{Mesh, Scene, Skin as GivenSkin};
 use palpa_servo::Pose;
 
-use crate::build::{build_within, in_mm};
+use crate::build::{Pressed, build_for, in_mm};
 use crate::note::Note;
 use crate::prepare::Prepared;
 use crate::press::mesh::{Sizes, along_skin};
@@ -111,8 +111,14 @@ impl LiveScene {
         }
         let (scene, sizes) = coarser(scene);
         let scene = &scene;
-        let grown = Arc::new(build_within(scene, MOST_NODES).context("in real time")?);
         let way = if moves { Vec::new() } else { way(scene) };
+        let pressed = if moves {
+            Pressed::Anywhere
+        } else {
+            Pressed::Along(&way)
+        };
+        let grown = build_for(scene, MOST_NODES, pressed).context("in real time")?;
+        let grown = Arc::new(grown);
         let prepared = Arc::new(Prepared::with_sizes(scene, grown, sizes, &way)?);
         // The loop begins at rest, as the press does. Without tension that is the undeformed mesh,
         // so there is nothing to solve.
@@ -211,14 +217,17 @@ impl LiveScene {
 /// 0.15 contact radii. With half the growth of the edges it is the same; with one level less in soft fat,
 /// or one for the muscle, it is 2 to 3 % more. Prisms that a lump cuts have its share of the stiffness,
 /// so they need not be smaller than the lump. If the scene asks for an accuracy, all these sizes are
-/// smaller or larger. Returns the sizes near the tool with it: intervals deeper than one and a half
-/// contact radii may be higher than in a press.
+/// smaller or larger. A skin from a file is coarsened where it is finer than that; one made by formula
+/// has the spacing that the scene asks for. Returns the sizes near the tool with it: intervals deeper
+/// than one and a half contact radii may be higher than in a press.
 fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const EDGE_GROWTH: f64 = 1.2;
     const LUMP_SHARE: f64 = 1.5;
     const DEEP: f64 = 1.6;
     let mut scene = scene.clone();
     let mesh = &mut scene.mesh;
+    let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
+    mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     let accuracy = mesh.accuracy.unwrap_or(ACCURACY);
     let scale = (accuracy / ACCURACY).powf(1.0 / ORDER);
     mesh.near_tool = mesh.near_tool_at(&scene.tool, scale * EDGE_SHARE);

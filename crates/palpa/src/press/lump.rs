@@ -258,6 +258,7 @@ mod tests {
         let params = palpa_mesh::GrowthParams {
             layers: vec![layer],
             cut_out: None,
+            coarsening: None,
             max_nodes: palpa_mesh::growth::MAX_NODES,
         };
         palpa_mesh::grow(&skin, &[], &params).unwrap().body

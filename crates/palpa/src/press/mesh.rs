@@ -6,13 +6,14 @@ use palpa_mesh::refine::{
     Circle, RefineParams, Refined, Slide, along, imprint_circle, mean_depths, near_depth,
     near_points, parts_for, refine, slide_vertices, split_levels,
 };
-use palpa_mesh::{LayeredBody, Surface, SurfaceIndex, Vec3};
+use palpa_mesh::{Coarsening, LayeredBody, Surface, SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Target, Tool};
 
 use super::place::{is_between_vertices, mesh_size_near, note_overhang, reach};
 use super::{Place, nodes_under_disc};
-use crate::build::{BuiltBody, nearest};
+use crate::build::{BuiltBody, Pressed, nearest};
 use crate::note::{Note, xyz};
+use crate::skin::Skin;
 
 /// Largest number of levels that splitting may lead to: the cost grows with the cube of the number.
 const MOST_LEVELS: usize = 24;
@@ -28,6 +29,16 @@ const MOST_CONVERGENCE: f64 = 4.0;
 /// length. With this multiple of the wanted length as the request, the mean edge has the wanted
 /// length.
 const SLACK: f64 = 1.4;
+
+/// Largest distance of a coarsened skin from the given one: under the tool, m; its increase beyond, as a
+/// share of the distance; and away from the tool, m.
+const DEVIATION: f64 = 0.05e-3;
+const DEVIATION_GROWTH: f64 = 0.03;
+const DEVIATION_AWAY: f64 = 1e-3;
+/// The same where the tool may press anywhere, m.
+const DEVIATION_ANYWHERE: f64 = 0.15e-3;
+/// The same anywhere, as a share of the thickness of the tissue.
+const DEVIATION_OF_THICKNESS: f64 = 0.02;
 
 /// An interval that is too high by less than this factor is not split: a new level would run
 /// through the whole body.
@@ -326,14 +337,8 @@ fn refine_near(
     let body = &built.growth.body;
     let mut fine = Vec::new();
     if let Some(sizes) = sizes {
-        let (mut points, radius) =
-            footprint(scene, built.press_at, &place.direction, sizes.skin.at(0.0));
-        let along = along_skin(scene, &place.direction);
-        let index = SurfaceIndex::build(&body.skin);
-        for &far in way.iter().filter(|far| **far != 0.0) {
-            let over = built.press_at + along * far;
-            points.extend(index.closest(over).map(|closest| closest.point));
-        }
+        let pressed = (built.press_at, place.direction);
+        let (points, radius) = along_way(scene, &body.skin, pressed, sizes.skin.at(0.0), way);
         fine.push(Fine {
             is_rim: scene.tool.is_bonded() && points.len() == 1,
             points,
@@ -343,6 +348,58 @@ fn refine_near(
     }
     fine.extend(over_lumps(scene, body, lumps, notes));
     refined(scene, body, &fine)
+}
+
+/// Points of the skin that the tool presses at a place and along its way, `h` apart or less, and the
+/// radius around them that it reaches, m. `pressed` is the place and the direction of the press.
+fn along_way(
+    scene: &Scene,
+    skin: &Surface,
+    (at, direction): (Vec3, Unit<Vec3>),
+    h: f64,
+    way: &[f64],
+) -> (Vec<Vec3>, f64) {
+    let (mut points, radius) = footprint(scene, at, &direction, h);
+    let along = along_skin(scene, &direction);
+    let index = SurfaceIndex::build(skin);
+    for &far in way.iter().filter(|far| **far != 0.0) {
+        points.extend(index.closest(at + along * far).map(|closest| closest.point));
+    }
+    (points, radius)
+}
+
+/// How the skin from which the scene's body grows is coarsened: to the triangles that refinement would
+/// leave as they are. `at` is the place that the scene presses; `None` if it cannot be pressed there.
+pub(crate) fn coarsening(
+    scene: &Scene,
+    skin: &Surface,
+    at: Vec3,
+    pressed: Pressed<'_>,
+) -> Option<Coarsening> {
+    let mut coarsening = Coarsening {
+        fine: Vec::new(),
+        radius: 0.0,
+        edge: 0.0,
+        growth: 0.0,
+        deviation: DEVIATION,
+        deviation_growth: DEVIATION_GROWTH,
+        most_deviation: DEVIATION_ANYWHERE,
+        thickness_share: DEVIATION_OF_THICKNESS,
+        kept: vec![at],
+    };
+    if let (Pressed::Along(way), Some(sizes)) = (pressed, Sizes::of(scene)) {
+        let skin_index = Skin::new(skin);
+        let point = skin_index.nearest(at)?;
+        let inward = skin_index.inward(&point);
+        let direction = Unit::try_new(scene.press.direction.map_or(inward, Vec3::from), 0.0)?;
+        let size = sizes.skin.looser(SLACK);
+        let pressed = (point.at, direction);
+        (coarsening.fine, coarsening.radius) =
+            along_way(scene, skin, pressed, sizes.skin.at(0.0), way);
+        (coarsening.edge, coarsening.growth) = (size.h, size.growth);
+        coarsening.most_deviation = DEVIATION_AWAY;
+    }
+    Some(coarsening)
 }
 
 /// The body refined as requested, if the scene allows refinement.

@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod audit;
+mod coarsen;
 mod error_bar;
 mod live;
 mod machine;
