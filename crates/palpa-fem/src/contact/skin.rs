@@ -1,7 +1,9 @@
-//! How stiff the skin is under a single vertex: its column at rest, with the columns round it held.
+//! How stiff the skin is under a single vertex: its column at rest, with the columns round it held,
+//! and the shear modulus there.
 
 use crate::Mat3;
 use crate::assembly::stiffness_at_rest;
+use crate::element::Phase;
 use crate::model::Model;
 
 /// The shortest waves of a skin that yields by its own column's stiffness alone would grow under a
@@ -14,8 +16,8 @@ const STIFFER: f64 = 1.5;
 pub(crate) struct SkinStiffness {
     /// Pressure per penetration, `ε`, Pa/m. `[n_vertices]`
     pub(crate) normal: Vec<f64>,
-    /// Stiffness against a force along the skin, N/m. `[n_vertices]`
-    pub(crate) tangential: Vec<f64>,
+    /// Shear modulus of the tissue under the vertex, Pa. `[n_vertices]`
+    pub(crate) shear: Vec<f64>,
 }
 
 impl SkinStiffness {
@@ -27,18 +29,40 @@ impl SkinStiffness {
         for (v, normal) in normals.iter().enumerate() {
             let compliance = column(model, &blocks, v).try_inverse();
             let along = compliance.map_or(0.0, |c| normal.dot(&(c * normal)));
-            let across = compliance.map_or(0.0, |c| 0.5 * (c.trace() - along));
             let area = model.skin_areas[v];
             out.normal.push(if along > 0.0 && area > 0.0 {
                 STIFFER / (along * area)
             } else {
                 0.0
             });
-            out.tangential
-                .push(if across > 0.0 { 1.0 / across } else { 0.0 });
         }
+        out.shear = shear_moduli(model);
         out
     }
+}
+
+/// Mean shear modulus of the uppermost prisms round each vertex, Pa. `[n_vertices]`
+fn shear_moduli(model: &Model) -> Vec<f64> {
+    let n = model.body.n_vertices();
+    let (mut sums, mut counts) = (vec![0.0; n], vec![0.0; n]);
+    for (g, group) in model.structure.groups.iter().enumerate() {
+        let [from, to] = [g, g + 1].map(|g| model.first_phase[g] as usize);
+        let of = |phase: &Phase| {
+            let law = &model.materials[phase.material as usize].law;
+            let factor = phase.points.iter().sum::<f64>() / phase.points.len() as f64;
+            phase.volume * factor * law.shear_modulus()
+        };
+        let shear: f64 = model.phases[from..to].iter().map(of).sum();
+        for &t in &group.triangles[..usize::from(group.shape.n_wedges)] {
+            for v in model.body.skin.triangles[t as usize] {
+                sums[v as usize] += shear;
+                counts[v as usize] += 1.0;
+            }
+        }
+    }
+    (sums.iter().zip(&counts))
+        .map(|(sum, count)| sum / f64::max(*count, 1.0))
+        .collect()
 }
 
 /// Stiffness of the skin's node of a column, with the nodes below free and all other columns held.

@@ -1,6 +1,8 @@
 //! Contact in a solve: the pressures and forces of friction on the skin at the present displacements,
 //! how they change, and how far they are from the multipliers.
 
+use std::f64::consts::PI;
+
 use palpa_mesh::Vec3;
 
 use crate::Mat3;
@@ -15,6 +17,13 @@ use crate::system::Hold;
 
 /// A vertex that slips by less than this (m) is held.
 const LEAST_SLIP: f64 = 1e-12;
+/// Stiffness of a vertex against slip, over `G A/a`, with its area `A` and the radius `a` of the
+/// contact: about its share in that of a disc on a half-space, `8 G a/(2 − ν)`. The forces do not
+/// depend on it, but the search does: it decides which vertices stick by the friction that their
+/// slip would raise. With the stiffness of a vertex whose neighbours are held, which grows with the
+/// bulk modulus, nearly incompressible tissue seemed to slip everywhere, then everywhere backwards,
+/// and no step sideways converged.
+const SHEAR: f64 = 2.0;
 /// No slot.
 const NONE: u32 = u32::MAX;
 
@@ -36,7 +45,7 @@ enum Grip {
     None,
     /// Held at its anchor. The share of a displacement that moves it away from there.
     Sticks { share: f64 },
-    /// Slides: direction of friction, and its stiffness across it, N/m per N/m of the skin's.
+    /// Slides: direction of friction, and its stiffness across it, N/m per N/m against slip.
     Slips { along: Vec3, turn: f64, share: f64 },
 }
 
@@ -58,7 +67,7 @@ pub(super) struct Slot {
     pub(super) friction: Vec3,
     anchor: Vec3,
     grip: Grip,
-    /// Area at rest, m², and stiffness of the skin along its surface, N/m.
+    /// Area at rest, m², and stiffness against slip, N/m.
     area: f64,
     tangential: f64,
 }
@@ -91,6 +100,24 @@ pub(super) struct Origin {
     pub(super) tools: Vec<PosedTool>,
     pub(super) displacements: Vec<Vec3>,
     pub(super) touches: Vec<Touch>,
+    /// Radius of the contact of each tool, m: of a disc with the area that is pressed.
+    pub(super) radii: Vec<f64>,
+}
+
+impl Origin {
+    /// Finds the radii of `n_tools` contacts.
+    pub(super) fn measure(&mut self, model: &Model, n_tools: usize) {
+        self.radii.clear();
+        self.radii.resize(n_tools, 0.0);
+        for (touch, area) in self.touches.iter().zip(&model.skin_areas) {
+            if let Some(radius) = touch.tool().and_then(|tool| self.radii.get_mut(tool)) {
+                *radius += area / PI;
+            }
+        }
+        self.radii
+            .iter_mut()
+            .for_each(|radius| *radius = radius.sqrt());
+    }
 }
 
 /// The contacts of all tools at some displacements.
@@ -124,7 +151,7 @@ impl Contacts {
         held: &[Hold],
         (touches, origin): (&[Touch], &Origin),
     ) {
-        self.find(model, displacements, tools, held, touches);
+        self.find(model, displacements, tools, held, (touches, &origin.radii));
         self.press();
         for slot in &mut self.slots {
             let x = model.body.positions[slot.node] + displacements[slot.node];
@@ -145,7 +172,7 @@ impl Contacts {
         displacements: &[Vec3],
         tools: &[PosedTool],
         held: &[Hold],
-        touches: &[Touch],
+        (touches, radii): (&[Touch], &[f64]),
     ) {
         for slot in self.slots.drain(..) {
             self.slot_of[slot.vertex] = NONE;
@@ -195,7 +222,8 @@ impl Contacts {
                 if self.slot_of[v as usize] == NONE {
                     self.slot_of[v as usize] = self.slots.len() as u32;
                     let x = place(v);
-                    let slot = Slot::new(model, v as usize, tools, &x, &touches[v as usize]);
+                    let touch = &touches[v as usize];
+                    let slot = Slot::new(model, v as usize, (tools, radii), &x, touch);
                     self.slots.extend(slot);
                 }
             }
@@ -398,7 +426,7 @@ impl Slot {
     fn new(
         model: &Model,
         vertex: usize,
-        tools: &[PosedTool],
+        (tools, radii): (&[PosedTool], &[f64]),
         x: &Vec3,
         touch: &Touch,
     ) -> Option<Self> {
@@ -420,7 +448,8 @@ impl Slot {
             anchor: Vec3::zeros(),
             grip: Grip::None,
             area,
-            tangential: model.skin_stiffness.tangential[vertex],
+            tangential: SHEAR * model.skin_stiffness.shear[vertex] * area
+                / radii[tool].max((area / PI).sqrt()),
         })
     }
 

@@ -111,6 +111,7 @@ impl<'a> Newton<'a> {
         ws.origin.tools.extend_from_slice(load.tools_before);
         ws.origin.displacements.clone_from(&state.displacements);
         ws.origin.touches.clone_from(&state.touches);
+        ws.origin.measure(model, load.tools.len());
         ws.spring = 0.0;
         ws.given.clone_from(&model.supports);
         for &(node, _) in load.held {

@@ -18,6 +18,7 @@ mod columns;
 mod cone;
 mod contact;
 mod economy;
+mod friction;
 mod half_space;
 mod layer;
 mod lump_map;
@@ -238,6 +239,20 @@ static CASES: &[Case] = &[
         source: "exact (Sneddon)",
         needs_reference: false,
         run: cone::run,
+    },
+    Case {
+        name: "mindlin",
+        title: "sphere moved sideways on a half-space, partial slip, forth and back",
+        source: "Cattaneo, Mindlin and Deresiewicz",
+        needs_reference: false,
+        run: friction::mindlin,
+    },
+    Case {
+        name: "spence",
+        title: "sphere with friction pressed on a half-space",
+        source: "Spence's problem, solved on rings to 0.05 %",
+        needs_reference: false,
+        run: friction::spence,
     },
     Case {
         name: "A1",

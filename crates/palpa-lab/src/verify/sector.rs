@@ -1,4 +1,4 @@
-//! A sixth of a round body or an eighth of a square one, between two planes of symmetry.
+//! A sixth or a half of a round body or an eighth of a square one, between planes of symmetry.
 //!
 //! ```text
 //!            .·'\           rings of vertices about the corner; the one round the inner disc is a polygon with the
@@ -17,6 +17,8 @@ use palpa_mesh::{CutFace, LayeredBody, Surface, Vec3};
 pub(crate) enum Outline {
     /// A disc: a sixth of it.
     Round,
+    /// A disc: a half of it, for tools that move along x.
+    Half,
     /// A square: an eighth of it, from the middle of a side to a corner.
     Square,
 }
@@ -26,6 +28,7 @@ impl Outline {
     pub(crate) fn n_sectors(self) -> f64 {
         match self {
             Self::Round => 6.0,
+            Self::Half => 2.0,
             Self::Square => 8.0,
         }
     }
@@ -114,7 +117,7 @@ impl Sector {
         for x in &grading.divide(0.0, width - ring, 1)[1..] {
             let share = x / (width - ring);
             let radius = |angle: f64| match outline {
-                Outline::Round => ring + x,
+                Outline::Round | Outline::Half => ring + x,
                 Outline::Square => ring + share * (width / angle.cos() - ring),
             };
             inner = add_ring(&mut skin, inner, edges_at(ring + x).max(3), angle, radius);
@@ -139,7 +142,7 @@ impl Sector {
             layer_names: (1..=thicknesses.len())
                 .map(|l| format!("layer {l}"))
                 .collect(),
-            cut_faces: sides(&skin, angle),
+            cut_faces: sides(&skin, outline),
             skin,
         };
         let mut supports = Supports::on_base(&body);
@@ -236,10 +239,14 @@ fn add_ring(
     outer
 }
 
-/// The two straight sides, as cut faces.
-fn sides(skin: &Surface, angle: f64) -> Vec<CutFace> {
-    [0.0, angle]
-        .map(|angle: f64| {
+/// The straight sides, as cut faces: two, or the one of a half.
+fn sides(skin: &Surface, outline: Outline) -> Vec<CutFace> {
+    let angles: &[f64] = match outline {
+        Outline::Half => &[0.0],
+        Outline::Round | Outline::Square => &[0.0, outline.angle()],
+    };
+    (angles.iter())
+        .map(|&angle| {
             let (sin, cos) = angle.sin_cos();
             let along = Vec3::new(cos, sin, 0.0);
             let vertices = (0..skin.points.len() as u32).filter(|&v| {
@@ -254,5 +261,5 @@ fn sides(skin: &Surface, angle: f64) -> Vec<CutFace> {
                 is_flat: true,
             }
         })
-        .to_vec()
+        .collect()
 }

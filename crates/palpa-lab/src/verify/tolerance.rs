@@ -41,6 +41,15 @@ pub const MISMATCH: f64 = 2e-4;
 pub const PENETRATION: f64 = 0.15;
 /// Force with friction with different load steps.
 pub const FRICTION_STEPS: f64 = 0.01;
+/// Tangential force of a sphere that slips in part, as a share of the friction.
+pub const PARTIAL_SLIP: f64 = 0.03;
+/// Force of a sphere that slips in part, over that without friction.
+pub const FRICTION_STIFFENS: f64 = 0.002;
+/// Force of a sphere that sticks, over that without friction.
+pub const ADHESION: f64 = 0.03;
+/// Radius of the disc that sticks, as a share of the radius of contact. Edges are a sixth of it and
+/// more.
+pub const STICKING: f64 = 0.1;
 /// Elastic force with different load steps.
 pub const LOAD_STEPS: f64 = 0.001;
 

@@ -3,7 +3,7 @@
 use palpa_lab::verify::{Case, Options, VerifyError, cases, tolerance};
 
 /// Cases that take long without optimisation; `make test-slow` runs all.
-const SLOW: [&str; 3] = ["cone", "contact", "small lump"];
+const SLOW: [&str; 5] = ["cone", "contact", "mindlin", "spence", "small lump"];
 
 #[test]
 fn cases_by_formula_pass() {
@@ -92,6 +92,10 @@ fn tolerances_are_those_that_were_promised() {
         ("law of contact", MISMATCH, 2e-4),
         ("penetration, edges", PENETRATION, 0.15),
         ("load steps with friction", FRICTION_STEPS, 0.01),
+        ("partial slip", PARTIAL_SLIP, 0.03),
+        ("friction against no friction", FRICTION_STIFFENS, 0.002),
+        ("adhesion against no friction", ADHESION, 0.03),
+        ("disc that sticks, contact radii", STICKING, 0.1),
         ("load steps", LOAD_STEPS, 0.001),
     ] {
         assert!(found <= promised, "{name}: {found} instead of {promised}");

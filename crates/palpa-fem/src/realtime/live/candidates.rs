@@ -160,7 +160,7 @@ impl Live {
     /// Finds the triangles that press or are near a tool, with their vertices, and the
     /// tools' clearance. The candidates are sorted by vertex.
     pub(super) fn find_candidates(&mut self, dt: f64) {
-        let reach = (FASTEST * 2.0 * dt).clamp(LEAST_REACH, self.params.reach);
+        let reach = (FASTEST * 2.0 * dt).min(self.params.reach).max(LEAST_REACH);
         self.place_skin();
         self.search.covered = reach;
         self.find_spots(reach);
