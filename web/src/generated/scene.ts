@@ -344,7 +344,7 @@ export interface components {
         /** @description Mesh size near the tool and lumps. */
         MeshTable: {
             /**
-             * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here.
+             * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here. In real time nothing is measured before: all default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3.
              * @example 3 %
              */
             accuracy?: string;
@@ -382,7 +382,7 @@ export interface components {
              */
             near_lumps?: string;
             /**
-             * @description Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, a third in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
+             * @description Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, 0.4 times in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
              * @example 1.5 mm
              */
             near_tool?: string;
