@@ -105,12 +105,12 @@ impl Problem {
         }
     }
 
-    /// Computes the forces of the straight press. Returns them with the number of nodes of the
-    /// mesh.
+    /// Computes the forces of the straight press, to `deepest` (m) or as deep as the ride goes. Returns
+    /// them with the number of nodes of the mesh.
     ///
     /// # Errors
     /// If the body cannot be computed with, or if a step does not converge.
-    pub fn compute(self) -> Result<(Vec<Known>, usize), RefinedError> {
+    pub fn compute(self, deepest: f64) -> Result<(Vec<Known>, usize), RefinedError> {
         let like = cases()
             .iter()
             .find(|case| case.problem == self)
@@ -119,7 +119,7 @@ impl Problem {
         let shape = self.shape([centre.x, centre.y]);
         let case = BenchCase {
             shape,
-            way: [like.way[0], 0.0],
+            way: [like.way[0].min(deepest), 0.0],
             tissue: if like.tissue == Tissue::Relaxing {
                 Tissue::Elastic
             } else {

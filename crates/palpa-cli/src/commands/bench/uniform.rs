@@ -23,7 +23,7 @@ pub(super) fn refined(chosen: &[&BenchCase], context: &Context) -> anyhow::Resul
         if !chosen.iter().any(|case| case.problem == problem) {
             continue;
         }
-        let (forces, nodes) = problem.compute()?;
+        let (forces, nodes) = problem.compute(f64::INFINITY)?;
         context.say(format_args!(
             "{problem:?}, {nodes} nodes: depth mm, force N, recorded N"
         ))?;
