@@ -145,7 +145,7 @@ pub(super) fn across(log: &Log, along: &Vec3, ways: &[Vec<OnWay>], subtitle: &st
         let value = |force: [f64; 3]| Vec3::from(force).dot(direction);
         let felt = thinned(log).map(|t| {
             let device = &t.devices[0];
-            let is_felt = device.force != [0.0; 3];
+            let is_felt = device.force.iter().any(|f| *f != 0.0);
             // A point that is not finite is a gap.
             let force = if is_felt {
                 value(device.force)
