@@ -4,7 +4,7 @@ use palpa_fem::Outcome;
 use serde::Serialize;
 
 use super::cases::{BenchCase, BenchGrading, BenchShape, Tissue, cases};
-use super::ride::{Known, Ride, converged};
+use super::ride::{Known, Ride, converged_press};
 use palpa_fem::FemError;
 
 /// A problem without its mesh: body and tool.
@@ -119,7 +119,7 @@ impl Problem {
         let shape = self.shape([centre.x, centre.y]);
         let case = BenchCase {
             shape,
-            way: [like.way[0].min(deepest), 0.0],
+            way: [like.way[0], 0.0],
             tissue: if like.tissue == Tissue::Relaxing {
                 Tissue::Elastic
             } else {
@@ -128,13 +128,14 @@ impl Problem {
             ..like.clone()
         };
         let model = case.model()?;
+        let ride = like.ride();
         let ride = Ride {
             stroke: 0.0,
-            ..like.ride()
+            depth: ride.depth.min(deepest),
+            ..ride
         };
-        let known = converged(&model, &ride, f64::INFINITY, 1)
+        let pressed = converged_press(&model, &ride)
             .map_err(|(at, outcome)| RefinedError::Outcome { at, outcome })?;
-        let pressed = known.into_iter().filter(|known| known.is_press).collect();
         Ok((pressed, model.n_nodes()))
     }
 }

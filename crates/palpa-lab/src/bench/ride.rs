@@ -106,16 +106,33 @@ pub fn converged(
     speed: f64,
     every: usize,
 ) -> Result<Vec<Known>, (f64, Outcome)> {
+    let deepest = ride.depth + ABOVE;
+    let places = ride.judged().into_iter().enumerate();
+    let places = places.filter(|(i, s)| i.is_multiple_of(every) || (s - deepest).abs() < 1e-9);
+    converged_at(model, ride, speed, places.map(|(_, s)| s))
+}
+
+/// As [`converged`], of the press alone.
+///
+/// # Errors
+/// As [`converged`].
+pub fn converged_press(model: &Model, ride: &Ride) -> Result<Vec<Known>, (f64, Outcome)> {
+    let deepest = ride.depth + ABOVE;
+    let places = ride.judged().into_iter().filter(|s| *s <= deepest + 1e-9);
+    converged_at(model, ride, f64::INFINITY, places)
+}
+
+fn converged_at(
+    model: &Model,
+    ride: &Ride,
+    speed: f64,
+    places: impl Iterator<Item = f64>,
+) -> Result<Vec<Known>, (f64, Outcome)> {
     let (mut state, mut ws) = (State::new(model), Workspace::new(model));
     let (mut before, mut s_before): (Vec<PosedTool>, f64) = (Vec::new(), ABOVE);
     let deepest = ride.depth + ABOVE;
     let mut known = Vec::new();
-    let places = ride.judged();
-    for (i, &s) in places.iter().enumerate() {
-        let is_deepest = (s - deepest).abs() < 1e-9;
-        if !(i.is_multiple_of(every) || is_deepest) {
-            continue;
-        }
+    for s in places {
         let (depth, tool) = ride.at_length(s);
         let tools = vec![tool];
         let load = Load {
