@@ -62,8 +62,12 @@ fn a_coarsened_skin_gives_the_force_of_the_given_one() {
     println!("{given} N on {n_given} vertices, {coarse} N on {n_coarse}");
     assert!(2 * n_coarse < n_given, "{n_coarse} of {n_given}");
     assert!(given > 0.05, "{given} N");
-    // Edges beside the tool are longer, which is most of the difference.
-    assert!((coarse / given - 1.0).abs() < 0.01, "{coarse} N, {given} N");
+    // Found: 0.7 %; between 0.1 and 1.2 % on other limbs and with other growths, because the
+    // triangles beside the contact differ.
+    assert!(
+        (coarse / given - 1.0).abs() < 0.01,
+        "{coarse} N, {given} N"
+    );
 }
 
 #[test]
