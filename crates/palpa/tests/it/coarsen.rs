@@ -64,10 +64,7 @@ fn a_coarsened_skin_gives_the_force_of_the_given_one() {
     assert!(given > 0.05, "{given} N");
     // Found: 0.7 %; between 0.1 and 1.2 % on other limbs and with other growths, because the
     // triangles beside the contact differ.
-    assert!(
-        (coarse / given - 1.0).abs() < 0.01,
-        "{coarse} N, {given} N"
-    );
+    assert!((coarse / given - 1.0).abs() < 0.01, "{coarse} N, {given} N");
 }
 
 #[test]
