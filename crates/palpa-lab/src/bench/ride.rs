@@ -44,12 +44,17 @@ pub struct Ride {
 impl Ride {
     /// Length of the path, m.
     pub fn length(&self) -> f64 {
-        2.0 * (self.depth + ABOVE) + self.stroke
+        2.0 * self.down() + self.stroke
+    }
+
+    /// Length of the way down, m: the position where the sphere first reaches its depth.
+    fn down(&self) -> f64 {
+        self.depth + ABOVE
     }
 
     /// Depth (m) and pose of the tool at the position `s` along the path (m).
     fn at_length(&self, s: f64) -> (f64, PosedTool) {
-        let down = self.depth + ABOVE;
+        let down = self.down();
         let (x, depth) = if s <= down {
             (0.0, s - ABOVE)
         } else if s <= down + self.stroke {
@@ -106,7 +111,7 @@ pub fn converged(
     speed: f64,
     every: usize,
 ) -> Result<Vec<Known>, (f64, Outcome)> {
-    let deepest = ride.depth + ABOVE;
+    let deepest = ride.down();
     let places = ride.judged().into_iter().enumerate();
     let places = places.filter(|(i, s)| i.is_multiple_of(every) || (s - deepest).abs() < 1e-9);
     converged_at(model, ride, speed, places.map(|(_, s)| s))
@@ -117,7 +122,7 @@ pub fn converged(
 /// # Errors
 /// As [`converged`].
 pub fn converged_press(model: &Model, ride: &Ride) -> Result<Vec<Known>, (f64, Outcome)> {
-    let deepest = ride.depth + ABOVE;
+    let deepest = ride.down();
     let places = ride.judged().into_iter().filter(|s| *s <= deepest + 1e-9);
     converged_at(model, ride, f64::INFINITY, places)
 }
@@ -130,7 +135,7 @@ fn converged_at(
 ) -> Result<Vec<Known>, (f64, Outcome)> {
     let (mut state, mut ws) = (State::new(model), Workspace::new(model));
     let (mut before, mut s_before): (Vec<PosedTool>, f64) = (Vec::new(), ABOVE);
-    let deepest = ride.depth + ABOVE;
+    let deepest = ride.down();
     let mut known = Vec::new();
     for s in places {
         let (depth, tool) = ride.at_length(s);

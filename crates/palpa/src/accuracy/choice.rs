@@ -26,7 +26,7 @@ const NEAR_SHARE: f64 = 0.65;
 const AIM: f64 = 0.9;
 /// Expected order of a contribution in its size: at the sharp edge of a bonded disc, and else.
 const EDGE_ORDER: f64 = 1.0;
-const ORDER: f64 = 1.5;
+pub(crate) const ORDER: f64 = 1.5;
 /// Range of factors on a size from one mesh to the next.
 const FACTORS: (f64, f64) = (0.6, 1.4);
 /// Factor on sizes whose probe found no equilibrium, or on all if the press found none. Since

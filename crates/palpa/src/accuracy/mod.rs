@@ -22,6 +22,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+pub(crate) use self::choice::ORDER;
 pub use self::choice::{End, Goal, MeshChoice, Round, choose_mesh};
 pub use self::descent::{Descent, Stops};
 pub use self::lumps::{LumpChange, change_by_lumps};

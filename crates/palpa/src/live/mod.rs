@@ -40,6 +40,7 @@ use palpa_mesh::Vec3;
 use palpa_scene::{Mesh, Scene, Skin as GivenSkin};
 use palpa_servo::Pose;
 
+use crate::accuracy::ORDER;
 use crate::build::{Pressed, build_for, in_mm};
 use crate::note::Note;
 use crate::prepare::Prepared;
@@ -59,10 +60,8 @@ pub const GOOD_TRAVEL: f64 = 0.2e-3;
 const MOST_NODES: usize = 80_000;
 /// Default length of the edges under the tool, as a share of its contact radius.
 pub const EDGE_SHARE: f64 = 0.4;
-/// Error of the force, as a share, that the default mesh is made for, and the order in which errors
-/// fall with all sizes of a mesh.
+/// Error of the force, as a share, that the default mesh is made for.
 pub const ACCURACY: f64 = 0.03;
-const ORDER: f64 = 1.5;
 /// Distance between the points along the hand's way at which the body is refined, m.
 const WAY_STEP: f64 = 4e-3;
 
