@@ -528,6 +528,82 @@ fn a_body_at_rest_is_let_be_and_wakes_when_touched() {
 }
 
 #[test]
+fn a_tool_that_stays_costs_nothing_until_it_moves_or_the_tissue_relaxes() {
+    const DT: f64 = 0.005;
+    let term = PronyTerm { g: 0.5, tau: 10.0 };
+    let viscous = Prony::new(vec![term], Moduli::Instantaneous, true).unwrap();
+    let tool = sphere(0.3);
+    let step = |live: &mut Live, depth: f64| {
+        let report = live.step(&at(tool, 0.0, 0.0, depth), DT);
+        if let Some(job) = live.take_job() {
+            live.install(job.run());
+        }
+        report
+    };
+    for (prony, mode) in [None, Some(&viscous)]
+        .into_iter()
+        .flat_map(|prony| MODES.map(|mode| (prony, mode)))
+    {
+        let what = format!("viscous: {}, {mode:?}", prony.is_some());
+        let model = model_of(13, false, prony);
+        let mut live = Live::new(model, &at(tool, 0.0, 0.0, -1e-3), params(mode)).unwrap();
+        for k in 1..=30 {
+            step(&mut live, 0.1e-3 * f64::from(k));
+        }
+        for _ in 0..40 {
+            step(&mut live, 3e-3);
+        }
+        let (force, before) = (live.tool_force(0), live.displacements().to_vec());
+        assert!(force.norm() > 0.1, "{what}: {force} N");
+        for _ in 0..20 {
+            let report = step(&mut live, 3e-3);
+            assert_eq!(report.iterations == 0, prony.is_none(), "{what}");
+            assert!(report.n_active > 0, "{what}: it still presses");
+        }
+        if prony.is_some() {
+            assert!(
+                live.tool_force(0).norm() < force.norm(),
+                "{what}: it relaxes"
+            );
+            continue;
+        }
+        assert_eq!(live.tool_force(0), force, "{what}");
+        assert_eq!(live.displacements(), before, "{what}");
+        let report = step(&mut live, 3.1e-3);
+        assert!(report.iterations > 0, "{what}");
+        assert!(live.tool_force(0).norm() > 1.01 * force.norm(), "{what}");
+    }
+}
+
+#[test]
+fn a_pressed_tool_that_leaps_is_followed_in_short_steps() {
+    let tool = sphere(0.0);
+    for mode in MODES {
+        let mut live =
+            Live::new(model(13, false), &at(tool, 0.0, 0.0, -1e-3), params(mode)).unwrap();
+        let (_, _) = follow(
+            &mut live,
+            (1..=20).map(|k| at(tool, 0.0, 0.0, 0.1e-3 * f64::from(k))),
+        );
+        let target = at(tool, 2e-3, 0.0, 4e-3);
+        let mut n_behind = 0;
+        loop {
+            let report = live.step(&target, 5e-3);
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+            if report.outcome == StepOutcome::Arrived {
+                break;
+            }
+            assert_eq!(report.outcome, StepOutcome::Behind, "{mode:?}");
+            n_behind += 1;
+            assert!(n_behind < 10, "{mode:?}: it never gets there");
+        }
+        assert!(n_behind >= 4, "{mode:?}: {n_behind} steps");
+    }
+}
+
+#[test]
 fn the_local_model_tells_the_force_of_a_small_further_press() {
     let model = model(19, false);
     let tool = sphere(0.0);

@@ -8,14 +8,15 @@ use palpa_fem::realtime::FineBodies;
 use palpa_fem::{FemError, Model, ModelParams};
 use palpa_mesh::Vec3;
 
-use super::zone_radius;
 use crate::build::nearest;
 use crate::continuum;
 use crate::prepare::Prepared;
 use crate::press::mesh::CoarseBody;
 
-/// The fine part of the mesh is larger than a zone by this margin, m.
-const MARGIN: f64 = 15e-3;
+/// The fine part of the mesh is larger than the contact by this margin, m: the tool may go about half
+/// of it until the mesh ahead of it must be ready. Beside the fine part, where there is no contact, edges
+/// grow as in a mesh that does not move.
+const MARGIN: f64 = 14e-3;
 /// Largest number of meshes that are kept for reuse.
 const MOST_KEPT: usize = 24;
 
@@ -51,7 +52,7 @@ impl FineScene {
                 prepared.lumps(),
                 prepared.mesh.sizes,
             )?,
-            radius: zone_radius(scene) + MARGIN,
+            radius: scene.tool.contact_radius() + MARGIN,
             kept: Mutex::default(),
             prepared,
         })

@@ -357,9 +357,10 @@ fn zone_wall(log: &Log) -> Option<f64> {
     times.get(times.len() * 9 / 10).copied()
 }
 
-/// Rate of the steps with contact, each until the next step begins, 1/s.
+/// Rate of the steps with contact in which something moved, each until the next step begins, 1/s.
 fn rate_in_contact(steps: &[StepRecord]) -> Option<f64> {
-    let pairs = steps.windows(2).filter(|pair| pair[0].n_contacts > 0);
+    let worked = |step: &StepRecord| step.n_contacts > 0 && step.iterations > 0;
+    let pairs = steps.windows(2).filter(|pair| worked(&pair[0]));
     let time: f64 = pairs.clone().map(|pair| pair[1].now - pair[0].now).sum();
     (time > 0.0).then(|| pairs.count() as f64 / time)
 }

@@ -10,6 +10,9 @@ use crate::posed_tool::PosedTool;
 const EDGE: f64 = 0.95;
 /// Weight of the last step in the smoothed movement.
 const NEW: f64 = 0.2;
+/// Longest move of a tool that presses, m. After a step that took long the tools are far ahead; several
+/// steps catch up with them sooner than one that goes so far that its iterations do not converge.
+const LONGEST_PRESSED: f64 = 0.5e-3;
 
 /// The tools on the way to their targets.
 #[derive(Debug)]
@@ -69,7 +72,13 @@ impl Live {
     /// target.
     pub(super) fn move_tools(&mut self, targets: &[PosedTool]) -> bool {
         let held = self.held_direction();
-        let most = (self.params.longest_move * self.recovery.pace).max(self.course.clearance);
+        let is_pressed = self.problem.pressing().next().is_some();
+        let longest = if is_pressed {
+            self.params.longest_move.min(LONGEST_PRESSED)
+        } else {
+            self.params.longest_move
+        };
+        let most = (longest * self.recovery.pace).max(self.course.clearance);
         self.course.advance(targets, held, most)
     }
 

@@ -272,10 +272,20 @@ impl Live {
             && self.plan.zone.iter().all(|n| move_of(n[0]) <= STILL)
     }
 
+    /// Whether a step with this report left nothing to do while the tools that press stay where they are.
+    pub(super) fn is_settled_now(&self, report: &LiveReport) -> bool {
+        report.n_candidates > 0
+            && report.n_far == 0
+            && report.outcome == StepOutcome::Arrived
+            && report.residual.max(report.outside) <= STILL_SHARE * self.params.tolerance
+            && !self.model.has_memory
+    }
+
     /// Marks the forces as unknown, and the factor as that of another body. Call it when the body has
     /// moved to another state or has another zone.
     pub(super) fn forget_forces(&mut self) {
         self.known = Known::Nothing;
+        self.settled = None;
         self.kept = Kept::NONE;
         self.beyond.is_settled = false;
     }

@@ -108,6 +108,8 @@ pub struct Live {
     singles: Vec<u32>,
     skin: SkinForces,
     known: Known,
+    /// The report of the last step, if it left nothing to do while the tools stay where they are.
+    settled: Option<LiveReport>,
     kept: Kept,
     course: Course,
     recovery: Recovery,
@@ -218,6 +220,7 @@ impl Live {
             skin: come.skin,
             singles,
             known: Known::Nothing,
+            settled: None,
             kept: Kept::NONE,
             course: Course::new(tools),
             springs: Springs::NONE,

@@ -18,8 +18,8 @@ pub struct LiveParams {
     /// Distance of the tool from the zone's centre at which a new zone is requested, as a share of
     /// the radius.
     pub leave: f64,
-    /// Longest move of a tool near the skin in one step, m. A longer move is divided over several
-    /// steps, so that a tool cannot jump through the skin.
+    /// Longest move of a tool near the skin in one step, m; half a millimetre at most where it presses. A
+    /// longer move is divided over several steps, so that a tool cannot jump through the skin.
     pub longest_move: f64,
     /// Change of the indentation after which a new stiffness of the exterior is requested, m.
     pub stale: f64,

@@ -22,7 +22,8 @@ pub enum StepOutcome {
 pub struct LiveReport {
     /// The outcome.
     pub outcome: StepOutcome,
-    /// Newton iterations; 0 while nothing touches a body at rest.
+    /// Newton iterations; 0 while nothing touches a body at rest, and while tools that press do not
+    /// move and the body is in equilibrium with them.
     pub iterations: usize,
     /// Residual of the zone: unbalanced forces relative to the tools' force.
     pub residual: f64,

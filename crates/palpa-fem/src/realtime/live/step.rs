@@ -26,6 +26,10 @@ impl Live {
     /// the time since the last step, s.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.begin_step(tools, dt);
+        if let Some(settled) = self.settled_under(tools) {
+            self.ask(dt);
+            return settled;
+        }
         self.iterations(dt, &mut report);
         let verdict = self.judge(&mut report);
         if verdict != Verdict::Lost {
@@ -51,8 +55,20 @@ impl Live {
         if report.outcome != StepOutcome::Failed {
             self.commit_memory(dt);
         }
+        self.settled = (verdict == Verdict::Good && self.is_settled_now(&report)).then_some(report);
         self.ask(dt);
         report
+    }
+
+    /// The report of a step in which nothing happens: the tools press as in the last one, which left
+    /// the body in equilibrium.
+    fn settled_under(&self, tools: &[PosedTool]) -> Option<LiveReport> {
+        let has_stayed = self.problem.tools_before == tools;
+        let settled = self.settled.filter(|_| has_stayed)?;
+        Some(LiveReport {
+            iterations: 0,
+            ..settled
+        })
     }
 
     /// Moves the tools, and updates viscous materials for the duration of the step.

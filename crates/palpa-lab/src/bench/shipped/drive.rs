@@ -223,7 +223,8 @@ impl Loop {
             }
             self.job = Some((end + late, done));
         }
-        if self.working.n_contacts > 0 {
+        // A step in which nothing moves costs nothing, and counts for nothing.
+        if self.working.n_contacts > 0 && result.iterations > 0 {
             driven.times.push(time);
             driven.n_behind += usize::from(result.status == StepStatus::Behind);
             driven.n_unfinished += usize::from(result.status == StepStatus::Unfinished);
