@@ -19,13 +19,12 @@ pub(super) fn measure_all(
             break;
         }
         progress.set_message(case.name.clone());
-        let row = measure(case, params, || !context.is_interrupted());
-        if context.is_interrupted() {
-            break;
+        match measure(case, params, || !context.is_interrupted()) {
+            // What an interrupted case measured until then is its row.
+            Ok(row) => report.shipped.push(row),
+            Err(_) if context.is_interrupted() => break,
+            Err(error) => return Err(error.context(format!("case \"{}\"", case.name))),
         }
-        report
-            .shipped
-            .push(row.map_err(|e| e.context(format!("case \"{}\"", case.name)))?);
         progress.inc(1);
     }
     progress.finish_and_clear();

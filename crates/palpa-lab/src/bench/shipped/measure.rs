@@ -164,6 +164,10 @@ fn audit(
         let found = kept.iter().zip(mesh.follow(&way, goes_on));
         let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
         forces.extend(found.map(|(_, force)| force));
+        if !goes_on() {
+            // These were not solved, so they have not failed.
+            forces.retain(Option::is_some);
+        }
     } else {
         on_loop = Some(Reference::on(prepared)?);
         for stop in &of_chosen {

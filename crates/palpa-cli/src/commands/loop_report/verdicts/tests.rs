@@ -61,6 +61,7 @@ fn quiet() -> (Run, Log) {
         published: true,
         n_contacts: 20,
         status: StepStatus::Converged as u8,
+        iterations: 1,
         zone: 1,
         mesh: 1,
         ..StepRecord::default()
