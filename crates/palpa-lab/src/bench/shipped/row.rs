@@ -11,8 +11,8 @@ pub struct ShippedRow {
     pub accuracy: f64,
     /// Nodes of the loop's mesh, the mean over the places.
     pub nodes: usize,
-    /// Steps with a vertex near the tool per second of their CPU time, patch and installed results of
-    /// the background included.
+    /// Steps with a vertex near the tool in which something moved, per second of their CPU time, patch
+    /// and installed results of the background included.
     pub steps_per_s_mean: f64,
     /// 99th percentile of that time.
     pub step_ms_p99: f64,
