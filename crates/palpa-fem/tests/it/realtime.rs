@@ -581,7 +581,7 @@ fn a_pressed_tool_that_leaps_is_followed_in_short_steps() {
     for mode in MODES {
         let mut live =
             Live::new(model(13, false), &at(tool, 0.0, 0.0, -1e-3), params(mode)).unwrap();
-        let (_, _) = follow(
+        follow(
             &mut live,
             (1..=20).map(|k| at(tool, 0.0, 0.0, 0.1e-3 * f64::from(k))),
         );

@@ -7,16 +7,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use palpa_fem::realtime::FineBodies;
 use palpa_fem::{FemError, Model, ModelParams};
 use palpa_mesh::Vec3;
+use palpa_scene::Scene;
 
 use crate::build::nearest;
 use crate::continuum;
 use crate::prepare::Prepared;
 use crate::press::mesh::CoarseBody;
 
-/// The fine part of the mesh is larger than the contact by this margin, m: the tool may go about half
-/// of it until the mesh ahead of it must be ready. Beside the fine part, where there is no contact, edges
-/// grow as in a mesh that does not move.
-const MARGIN: f64 = 14e-3;
+/// The fine part of the mesh is larger than what the tool presses by this margin, m: the tool may go
+/// about half of it until the mesh ahead of it must be ready. Beside the fine part, where there is no contact,
+/// edges grow as in a mesh that does not move.
+const MARGIN: f64 = 12e-3;
 /// Largest number of meshes that are kept for reuse.
 const MOST_KEPT: usize = 24;
 
@@ -52,7 +53,7 @@ impl FineScene {
                 prepared.lumps(),
                 prepared.mesh.sizes,
             )?,
-            radius: scene.tool.contact_radius() + MARGIN,
+            radius: pressed_radius(scene) + MARGIN,
             kept: Mutex::default(),
             prepared,
         })
@@ -78,6 +79,15 @@ impl FineScene {
         };
         Model::build(&body, &self.prepared.materials, &supports, params)
     }
+}
+
+/// Radius of the skin that the tool presses at the depth of the scene's motion, m.
+fn pressed_radius(scene: &Scene) -> f64 {
+    let radius = scene.tool.contact_radius();
+    scene.tool.contact().map_or(radius, |tool| {
+        let ([x, y], round) = tool.shape.reach(scene.motion.depth);
+        x.hypot(y) + round
+    })
 }
 
 impl FineBodies for FineScene {

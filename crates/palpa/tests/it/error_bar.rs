@@ -59,6 +59,21 @@ fn the_bar_of_the_live_mesh_is_that_of_a_press_there_on_the_same_mesh() {
     assert!((bar.direction + Vec3::z()).norm() < 1e-9);
 }
 
+/// A mesh that moves is fine under the whole of a long tool, with room to go.
+#[test]
+fn a_mesh_that_moves_is_fine_under_a_long_tool() {
+    let text = block()
+        .sized([120.0, 60.0, 20.0], 10.0)
+        .set("mesh", "moves", true)
+        .set("tool", "shape", "capsule")
+        .set("tool", "radius", "5 mm")
+        .set("tool", "length", "40 mm")
+        .motion("press", 3.0);
+    let live = LiveScene::build(&parse(&text)).unwrap();
+    let fine = FineScene::new(Arc::clone(&live.prepared)).unwrap();
+    assert!(fine.radius() > 30e-3, "{} m", fine.radius());
+}
+
 /// A mesh that moves is probed as it is where the tool is, and a finer one has a smaller bar.
 #[test]
 fn a_mesh_that_moves_is_judged_where_it_is_fine() {

@@ -128,7 +128,7 @@ pub(super) struct TissueFigures {
     unfinished: u64,
     /// Share of the steps with contact that did not reach their tolerance.
     pub(super) unfinished_share: f64,
-    /// Number of steps with contact.
+    /// Number of steps with contact in which something moved.
     pub(super) touching: u64,
     /// Number of steps that did not reach the tool.
     behind: u64,
@@ -159,8 +159,7 @@ impl TissueFigures {
             let steps = log.steps.iter();
             steps.filter(move |s| s.status == wanted as u8)
         };
-        let touches = |s: &&StepRecord| s.n_contacts > 0;
-        let touching = log.steps.iter().filter(touches).count();
+        let touching = log.steps.iter().filter(|s| has_worked(s)).count();
         let share = |n: usize| n as f64 / touching.max(1) as f64;
         let behind = status(StepStatus::Behind).count();
         let unfinished = status(StepStatus::Unfinished);
@@ -183,7 +182,7 @@ impl TissueFigures {
             step_cpu_us: report.step_cpu.into(),
             step_wall_us: report.step_wall.into(),
             held_back: report.held_back,
-            unfinished_share: share(unfinished.clone().filter(touches).count()),
+            unfinished_share: share(unfinished.clone().filter(|s| has_worked(s)).count()),
             unfinished: unfinished.count() as u64,
             touching: touching as u64,
             behind: behind as u64,
@@ -357,10 +356,15 @@ fn zone_wall(log: &Log) -> Option<f64> {
     times.get(times.len() * 9 / 10).copied()
 }
 
+/// Whether a step had contact and something to do. A body that a tool presses without moving is left as
+/// it is, a thousand times a second: such steps would hide the others.
+fn has_worked(step: &StepRecord) -> bool {
+    step.n_contacts > 0 && step.iterations > 0
+}
+
 /// Rate of the steps with contact in which something moved, each until the next step begins, 1/s.
 fn rate_in_contact(steps: &[StepRecord]) -> Option<f64> {
-    let worked = |step: &StepRecord| step.n_contacts > 0 && step.iterations > 0;
-    let pairs = steps.windows(2).filter(|pair| worked(&pair[0]));
+    let pairs = steps.windows(2).filter(|pair| has_worked(&pair[0]));
     let time: f64 = pairs.clone().map(|pair| pair[1].now - pair[0].now).sum();
     (time > 0.0).then(|| pairs.count() as f64 / time)
 }

@@ -300,11 +300,11 @@ fn judge_tissue(t: &TissueFigures, nodes: usize, judge: &mut Judge) {
             )
         },
     );
-    let failed = t.held_back as f64 / t.steps.max(1) as f64;
+    let failed = t.held_back as f64 / t.touching.max(1) as f64;
     judge.at_most(Guarantee::FailedSteps, failed, MOST_BEHIND, Unit::Share, || {
         format!(
-            "{} of {} steps of the tissue failed and were not felt; press less deep, or make the mesh finer there",
-            t.held_back, t.steps
+            "{} of {} steps of the tissue with contact failed and were not felt; press less deep, or make the mesh finer there",
+            t.held_back, t.touching
         )
     });
     let (hand, steps) = (t.motion_mm_per_s, t.fastest_by_steps_mm_per_s);

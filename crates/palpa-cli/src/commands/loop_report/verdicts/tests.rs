@@ -235,6 +235,18 @@ fn steps_that_do_not_converge_or_reach_the_tool_are_not_good() {
     assert_eq!(with(StepStatus::Behind, 50), [Guarantee::Behind]);
     let failed = broken(|run, _| run.report.held_back = 100);
     assert_eq!(failed, [Guarantee::FailedSteps]);
+    // A long hold, whose steps have nothing to do, hides none of them.
+    let held = broken(|run, log| {
+        let n = log.steps.len();
+        for step in &mut log.steps[n / 4..] {
+            step.iterations = 0;
+        }
+        for step in log.steps[..n / 4].iter_mut().step_by(50) {
+            step.status = StepStatus::Behind as u8;
+        }
+        run.report.held_back = n as u64 / 200;
+    });
+    assert_eq!(held, [Guarantee::Behind, Guarantee::FailedSteps]);
 }
 
 #[test]
