@@ -172,22 +172,35 @@ impl ContactProblem {
         self.comply(&mut clusters, &mut out.compliance);
         self.give_way(&mut clusters, &mut out.compliance);
         let is_factored = self.factor_newton();
-        out.tools.clear();
+        self.describe_tools(tools, is_factored, &mut out.tools);
+        self.clusters = clusters;
+    }
+
+    /// A local model without contacts, with the forces alone.
+    pub(super) fn no_local_model(&mut self, tools: &[PosedTool], out: &mut LocalModel) {
+        out.contacts.clear();
+        out.compliance.clear();
+        self.describe_tools(tools, false, &mut out.tools);
+    }
+
+    /// The tools with their forces, and with their stiffness if [`Self::factor_newton`] has found it.
+    fn describe_tools(&mut self, tools: &[PosedTool], is_factored: bool, out: &mut Vec<LocalTool>) {
+        out.clear();
         for (t, tool) in tools.iter().enumerate() {
             let own = self.candidates.iter().filter(|c| c.tool as usize == t);
             let force = -own.map(Candidate::force).sum::<Vec3>();
-            out.tools.push(LocalTool {
+            let stiffness = if is_factored {
+                self.tool_stiffness(t)
+            } else {
+                Mat3::zeros()
+            };
+            out.push(LocalTool {
                 pose: tool.pose,
                 friction: tool.tool.friction(),
                 force,
-                stiffness: if is_factored {
-                    self.tool_stiffness(t)
-                } else {
-                    Mat3::zeros()
-                },
+                stiffness,
             });
         }
-        self.clusters = clusters;
     }
 
     /// Finds how far tools are from those candidates that do not press.
@@ -356,9 +369,10 @@ impl ContactProblem {
             shares[at] * candidate.normal.dot(normal)
         };
         for (j, cj) in all.iter().enumerate() {
-            let first = &self.candidates[usize::from(members[cj.first])];
-            if first.pressure == 0.0 {
-                let own = normals[j] * normals[j].transpose() / first.yielding;
+            let first = usize::from(members[cj.first]);
+            if row_of[first] == usize::MAX {
+                let yielding = self.candidates[first].yielding;
+                let own = normals[j] * normals[j].transpose() / yielding;
                 add_block(compliance, n, (j, j), &own);
                 continue;
             }

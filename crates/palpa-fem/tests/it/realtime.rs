@@ -696,6 +696,46 @@ fn a_step_too_far_backs_off_and_recovers() {
 }
 
 #[test]
+fn a_patch_after_a_failed_step_is_empty_and_the_force_is_that_of_the_state_returned_to() {
+    let model = model(13, false);
+    let mut n_failed = 0;
+    for (mode, friction, leap) in [
+        (MODES[0], 0.0, 25e-3),
+        (MODES[1], 0.0, 31e-3),
+        (MODES[1], 0.5, 28e-3),
+        (MODES[2], 0.0, 28e-3),
+        (MODES[2], 0.0, 31e-3),
+    ] {
+        let tool = sphere(friction);
+        let start = at(tool, 0.0, 0.0, 0.0);
+        let mut live = Live::new(Arc::clone(&model), &start, params(mode)).unwrap();
+        let mut local = LocalModel::default();
+        let mut forces = vec![Vec3::zeros()];
+        let course = [3e-3; 8].into_iter().chain([leap; 60]).chain([3e-3; 60]);
+        for depth in course {
+            let report = live.step(&at(tool, 0.0, 0.0, depth), 0.002);
+            live.local_model(60, &mut local);
+            let force = live.tool_force(0);
+            let sum: Vec3 = local.contacts.iter().map(|c| c.force).sum();
+            assert!((local.tools[0].force - force).norm() == 0.0);
+            if report.outcome == StepOutcome::Failed {
+                n_failed += 1;
+                assert!(local.contacts.is_empty() && local.compliance.is_empty());
+                let returned = |was: &Vec3| (was - force).norm() <= 1e-9 * force.norm();
+                assert!(forces.iter().any(returned), "{force}");
+            } else {
+                forces.push(force);
+                assert!((sum + force).norm() <= 1e-9 * force.norm().max(1.0));
+            }
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+        }
+    }
+    assert!(n_failed >= 5, "{n_failed}");
+}
+
+#[test]
 fn the_same_steps_and_jobs_give_the_same_bits() {
     let model = model(13, false);
     let tool = sphere(0.3);

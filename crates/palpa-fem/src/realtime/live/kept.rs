@@ -46,6 +46,11 @@ impl Kept {
         horizon: 0.0,
     };
 
+    /// Whether candidates and compliance belong together.
+    pub(super) fn has_contact(&self) -> bool {
+        self.has_contact
+    }
+
     fn is_worn(&self) -> bool {
         self.n_extra >= MOST_EXTRA
     }

@@ -268,8 +268,13 @@ impl Live {
     }
 
     /// The local model at the tools' present place, with at most `most` contacts; beyond that,
-    /// neighbours that press are merged.
+    /// neighbours that press are merged. After a failed step there is none: it has no contacts, and
+    /// the forces are those of the state that the body has returned to.
     pub fn local_model(&mut self, most: usize, out: &mut LocalModel) {
+        if !self.kept.has_contact() {
+            self.problem.no_local_model(&self.course.tools, out);
+            return;
+        }
         let skin = &self.model.body.skin.points;
         self.problem
             .local_model(&self.course.tools, skin, most, out);

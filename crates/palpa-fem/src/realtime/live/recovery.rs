@@ -2,6 +2,8 @@
 
 use palpa_mesh::Vec3;
 
+use super::super::MOST_CANDIDATES;
+use super::super::candidate::Candidate;
 use super::Live;
 use super::candidates::SkinForces;
 use super::pressed::nearest_vertex;
@@ -24,6 +26,8 @@ pub(super) struct Recovery {
     displacements: Vec<Vec3>,
     /// Contact forces of that state.
     skin: SkinForces,
+    /// The candidates with these forces. Those of a failed step may be of any size and sign.
+    candidates: Vec<Candidate>,
     /// Tools of that state.
     tools: Vec<PosedTool>,
     /// Limit of a step's move, as a share of the longest move, 1/64 to 1.
@@ -37,6 +41,7 @@ impl Recovery {
         Self {
             displacements: displacements.to_vec(),
             skin: skin.clone(),
+            candidates: Vec::with_capacity(MOST_CANDIDATES),
             tools: tools.to_vec(),
             pace: 1.0,
             n_failed: 0,
@@ -71,6 +76,7 @@ impl Live {
         for v in 0..self.model.body.n_vertices() {
             good.skin.copy(v, &self.skin);
         }
+        good.candidates.clone_from(&self.problem.candidates);
         good.tools.copy_from_slice(&self.course.tools);
     }
 
@@ -101,6 +107,8 @@ impl Live {
         for v in 0..self.model.body.n_vertices() {
             self.skin.copy(v, &good.skin);
         }
+        self.problem.clear();
+        self.problem.candidates.clone_from(&good.candidates);
         self.course.tools.copy_from_slice(&good.tools);
         self.course.clearance = 0.0;
         self.springs.take_off();
@@ -113,6 +121,7 @@ impl Live {
         self.recovery.n_failed = 0;
         self.lie_down();
         self.skin.clear_all();
+        self.problem.clear();
         self.springs.take_off();
         self.forget_forces();
         self.jobs.ask_for_factor();
