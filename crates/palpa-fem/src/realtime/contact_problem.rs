@@ -210,7 +210,7 @@ impl ContactProblem {
     }
 
     /// What the pressures at the points, as they are now, add across the normals of the candidates.
-    fn turn_aside(&mut self) {
+    pub(super) fn turn_aside(&mut self) {
         for candidate in &mut self.candidates {
             candidate.aside = Vec3::zeros();
         }

@@ -161,7 +161,7 @@ fn a_body_under_tension_begins_again_at_rest() {
                 }
             }
             sum += n_again;
-            // A pressed tool goes 0.5 mm a step, so the way out takes a hundred.
+            // A pressed tool goes 0.7 mm a step, so the way out takes a hundred.
             let away = at(tool, X, 0.0, -8e-3);
             for _ in 0..160 {
                 live.step(&away, DT);

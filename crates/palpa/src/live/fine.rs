@@ -82,7 +82,7 @@ impl FineScene {
 }
 
 /// Radius of the skin that the tool presses at the depth of the scene's motion, m.
-fn pressed_radius(scene: &Scene) -> f64 {
+pub(super) fn pressed_radius(scene: &Scene) -> f64 {
     let radius = scene.tool.contact_radius();
     scene.tool.contact().map_or(radius, |tool| {
         let ([x, y], round) = tool.shape.reach(scene.motion.depth);

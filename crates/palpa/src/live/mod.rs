@@ -48,9 +48,11 @@ use crate::press::mesh::{Sizes, along_skin};
 use crate::press::tissue::{note_mesh, note_tension};
 use crate::skin::Skin;
 
-/// Radius of the zone as a multiple of contact radius plus depth, and its least value, m. The zone
-/// should contain the contact and the tissue beside it that deforms.
-const ZONE_RADII: f64 = 1.2;
+/// Radius of the zone as a multiple of contact radius plus depth, its least value as a multiple of what
+/// the tool presses, and its least value, m. The factor of the zone is most of the time of a step, so it
+/// is no larger than it must be: it contains the contact where the tool is on its way to the next zone.
+const ZONE_RADII: f64 = 0.8;
+const PRESSED_RADII: f64 = 1.35;
 const LEAST_ZONE: f64 = 12e-3;
 /// Distance that a tool may move in one step of the tissue, m, so that the force at the device
 /// stays within about 2 % of the converged one: see "Force while moving" in docs/realtime.md.
@@ -254,7 +256,9 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
 /// Radius of a zone that contains the contact at the hand's depth, m.
 fn zone_radius(scene: &Scene) -> f64 {
     let radius = scene.tool.contact_radius();
-    (ZONE_RADII * (radius + scene.motion.depth)).max(LEAST_ZONE)
+    (ZONE_RADII * (radius + scene.motion.depth))
+        .max(PRESSED_RADII * fine::pressed_radius(scene))
+        .max(LEAST_ZONE)
 }
 
 /// Positions of the tool along its way across the skin, relative to the pressed place, m.

@@ -96,6 +96,8 @@ impl Live {
                 self.refactor(report)?;
             }
         }
+        // Where the tool has moved along the skin, its pressure turns before anything else changes.
+        self.problem.turn_aside();
         self.right_side();
         let x = &mut self.ws.x;
         self.inside.substitute(&plan, x);
