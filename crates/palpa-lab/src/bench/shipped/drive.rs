@@ -26,6 +26,15 @@ const LONGEST: f64 = 0.02;
 /// Time before the hand begins, s, in which the force ramps up.
 const BEGIN: f64 = 0.7;
 
+/// The time that steps and jobs of the background take in virtual time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Duration {
+    /// Their own CPU time on this core.
+    Own,
+    /// None: what the loop would do on a machine without limits.
+    Zero,
+}
+
 /// Part of the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
@@ -46,6 +55,8 @@ pub struct Felt {
     pub tool: PosedTool,
     /// Commanded force, in the scene's frame, N.
     pub force: Vec3,
+    /// Whether the law gives the whole force; otherwise it lets go, or comes back from that.
+    pub is_whole: bool,
     /// Depth of the device below the first touch at the place, m.
     pub depth: f64,
     /// Part of the way.
@@ -68,7 +79,7 @@ pub struct Driven {
     pub n_unfinished: usize,
     /// Steps whose patch was held back.
     pub n_failed: usize,
-    /// The force in each tick at full gain.
+    /// The force in each tick from the beginning of the motion.
     pub felt: Vec<Felt>,
 }
 
@@ -76,13 +87,13 @@ pub struct Driven {
 ///
 /// # Errors
 /// If the body cannot be factored.
-pub fn drive(scene: &Scene, live: &LiveScene) -> anyhow::Result<Driven> {
+pub fn drive(scene: &Scene, live: &LiveScene, takes: Duration) -> anyhow::Result<Driven> {
     let path = once_from(live.start, scene, &live.scene_from_device);
     let shipped = open_device(&scene.device, Path::from(live.start))?;
     let mut device = Scripted::new(path.clone(), shipped.spec());
     let params = servo_params(&*shipped);
     let mut servo = Box::new(Servo::new(&params, &[shipped.spec()]));
-    let mut run = Loop::new(live.tissue()?);
+    let mut run = Loop::new(live.tissue()?, takes);
     let mut driven = Driven {
         duration: path.duration(),
         ..Driven::default()
@@ -99,12 +110,13 @@ pub fn drive(scene: &Scene, live: &LiveScene) -> anyhow::Result<Driven> {
         run.steps(tick, now, tool, &mut driven);
         let report = servo.tick(now, &[Some(state)], &mut run.patches, &mut command);
         stretch = report.tools[0].stretch;
-        if report.gain >= 1.0 {
+        if now >= BEGIN {
             let frame = &live.scene_from_device.rotation;
             driven.felt.push(Felt {
                 time: now,
                 tool: live.posed(position + stretch),
                 force: frame.transform_vector(&command[0].force),
+                is_whole: report.gain >= 1.0,
                 depth: -position.z - scene.motion.above,
                 part: part(&path, now - BEGIN),
             });
@@ -141,6 +153,7 @@ fn part(path: &Path, time: f64) -> Part {
 /// The tissue and its background in virtual time.
 struct Loop {
     tissue: LiveTissue,
+    takes: Duration,
     patches: Latest,
     /// The patch that is made, and the time at which it is ready, s.
     working: Box<palpa_servo::ContactPatch>,
@@ -154,10 +167,11 @@ struct Loop {
 }
 
 impl Loop {
-    fn new(mut tissue: LiveTissue) -> Self {
+    fn new(mut tissue: LiveTissue, takes: Duration) -> Self {
         tissue.prepare();
         Self {
             tissue,
+            takes,
             patches: Latest::new(),
             working: empty_patch(),
             ready_at: None,
@@ -187,6 +201,14 @@ impl Loop {
         }
     }
 
+    /// Time that work takes which began at this reading of the thread's CPU clock, s.
+    fn since(&self, clock: f64) -> f64 {
+        match self.takes {
+            Duration::Own => thread_cpu() - clock,
+            Duration::Zero => 0.0,
+        }
+    }
+
     fn one_step(&mut self, tick: u64, now: f64, start: f64, tool: Vec3, driven: &mut Driven) {
         let elapsed = start - self.last_start;
         self.last_start = start;
@@ -208,7 +230,7 @@ impl Loop {
         }
         let result = self.tissue.step(&input, &mut self.working);
         let work = self.job.is_none().then(|| self.tissue.take_job()).flatten();
-        let time = thread_cpu() - clock;
+        let time = self.since(clock);
         (self.working.id, self.working.sampled_at) = (self.step, now);
         self.working.period = self.period;
         let end = start + time;
@@ -217,7 +239,7 @@ impl Loop {
         if let Some(work) = work {
             let clock = thread_cpu();
             let done = LiveTissue::run(work);
-            let late = thread_cpu() - clock;
+            let late = self.since(clock);
             if now > BEGIN {
                 driven.background += late;
             }
@@ -230,5 +252,48 @@ impl Loop {
             driven.n_unfinished += usize::from(result.status == StepStatus::Unfinished);
         }
         driven.n_failed += usize::from(!result.status.is_published());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+        [body]
+        generator = { kind = "block", size = ["60 mm", "60 mm", "20 mm"], spacing = "10 mm" }
+        [[layer]]
+        tissue = { name = "gel", young = "10 kPa", poisson = 0.45 }
+        [tool]
+        shape = "sphere"
+        radius = "8 mm"
+        [device]
+        preset = "falcon"
+        [motion]
+        kind = "stroke"
+        depth = "3 mm"
+        speed = "50 mm/s"
+        length = "6 mm"
+    "#;
+
+    #[test]
+    fn a_way_with_steps_that_take_no_time_is_the_same_each_time_and_has_every_tick() {
+        let scene = Scene::parse(SCENE, std::path::Path::new(".")).unwrap();
+        let live = LiveScene::build(&scene).unwrap();
+        let drive = || drive(&scene, &live, Duration::Zero).unwrap();
+        let (first, second) = (drive(), drive());
+        let forces = |driven: &Driven| -> Vec<[u64; 3]> {
+            let bits = |f: &Felt| [f.force.x, f.force.y, f.force.z].map(f64::to_bits);
+            driven.felt.iter().map(bits).collect()
+        };
+        assert_eq!(forces(&first), forces(&second));
+        let n_ticks = (first.duration / PERIOD).ceil() as usize;
+        assert!(first.felt.len().abs_diff(n_ticks) <= 1, "{n_ticks}");
+        assert!(first.felt.iter().all(|felt| felt.is_whole));
+        for part in [Part::Press, Part::Stroke, Part::Lift] {
+            let of_part = first.felt.iter().filter(|felt| felt.part == part);
+            let largest = of_part.map(|felt| felt.force.norm()).fold(0.0, f64::max);
+            assert!(largest > 0.1, "{part:?}: {largest} N");
+        }
     }
 }

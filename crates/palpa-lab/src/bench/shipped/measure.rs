@@ -6,15 +6,18 @@ use palpa::audit::{
     quantile, relaxes, thinned,
 };
 use palpa::live::{ACCURACY, LiveScene};
+use palpa_mesh::Vec3;
 use rayon::prelude::*;
 
-use super::drive::{Driven, Felt, Part, drive};
+use super::drive::{Driven, Duration, Felt, Part, drive};
 use super::places::{Spot, draw_spots};
 use super::{ShippedCase, ShippedRow};
 
 /// Poses are drawn from this depth on, m.
 const FROM_DEPTH: f64 = 2e-3;
 const SEED: u64 = 7;
+/// Ticks of each part of a way in which the force is compared with that of steps that take no time.
+const TICKS: usize = 100;
 
 /// How much is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,19 +65,28 @@ pub fn measure(
     };
     let (mut times, mut ways, mut n_nodes) = (Vec::new(), Vec::new(), 0);
     let (mut duration, mut background) = (0.0, 0.0);
+    let mut moving: Vec<Moving> = Vec::new();
     let spots = draw_spots(case, params.n_places)?;
     for (spot, live) in &spots {
         if !goes_on() {
             break;
         }
         let scene = spot.scene(&case.scene);
-        let driven = drive(&scene, live)?;
+        let driven = drive(&scene, live, Duration::Own)?;
+        let ideal = drive(&scene, live, Duration::Zero)?;
         note(&mut row, spot, &driven);
+        let ticks = drawn(&ideal.felt, TICKS, ways.len());
+        moving.extend(ticks.iter().map(|&i| Moving {
+            part: ideal.felt[i].part,
+            error: share(driven.felt[i].force, ideal.felt[i].force),
+            is_whole: driven.felt[i].is_whole,
+        }));
+        let poses = drawn(&ideal.felt, params.n_poses, ways.len());
         n_nodes += live.model.n_nodes();
         duration += driven.duration;
         background += driven.background;
         times.extend(driven.times);
-        ways.push((live, driven.felt));
+        ways.push((live, driven.felt, poses));
     }
     anyhow::ensure!(row.n_places > 0, "no place was measured");
     row.nodes = n_nodes / row.n_places;
@@ -85,9 +97,10 @@ pub fn measure(
     row.step_ms_p99 = quantile(&times, 0.99).unwrap_or(f64::NAN) * 1e3;
     row.background_cpu_share = background / duration;
     row.steps_cpu_share = whole / duration;
-    let audits = ways.par_iter().enumerate().map(|(k, (live, felt))| {
+    enter_motion(&mut row, &moving);
+    let audits = ways.par_iter().enumerate().map(|(k, (live, felt, poses))| {
         if goes_on() {
-            audit(felt, live, params, k, &goes_on)
+            audit(felt, live, poses, k, &goes_on)
         } else {
             Ok(Audit::default())
         }
@@ -132,15 +145,21 @@ fn enter_errors(row: &mut ShippedRow, audited: &[Audited]) {
     row.mesh_error_p95 = quantile(&of_mesh, 0.95);
 }
 
+/// The force in a tick, compared with that of steps that take no time.
+struct Moving {
+    part: Part,
+    error: f64,
+    is_whole: bool,
+}
+
 /// Solves poses of a way again.
 fn audit(
     felt: &[Felt],
     live: &LiveScene,
-    params: &MeasureParams,
+    chosen: &[usize],
     k: usize,
     goes_on: &impl Fn() -> bool,
 ) -> anyhow::Result<Audit> {
-    let chosen = drawn(felt, params.n_poses, k);
     let mut audit = Audit::default();
     let Some(&last) = chosen.last() else {
         return Ok(audit);
@@ -157,7 +176,7 @@ fn audit(
     let mut on_loop = None;
     if has_history(scene) {
         let longest_time = relaxes(scene).then_some(LONGEST_TIME);
-        let kept = thinned(&stops[..=last], &chosen, LONGEST_WAY, longest_time);
+        let kept = thinned(&stops[..=last], chosen, LONGEST_WAY, longest_time);
         let way: Vec<Stop> = kept.iter().map(|&i| stops[i]).collect();
         let mesh = Reference::along(prepared, &of_chosen, REFERENCE_SHARE)?;
         audit.nodes = Some(mesh.n_nodes());
@@ -183,7 +202,7 @@ fn audit(
     }
     let poses = chosen.iter().zip(forces).map(|(&i, force)| {
         let felt = &felt[i];
-        let error = |found: palpa_mesh::Vec3| Some((found - force?).norm() / force?.norm());
+        let error = |found: Vec3| Some(share(found, force?));
         let on_loop = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
         Audited {
             part: felt.part,
@@ -195,6 +214,29 @@ fn audit(
     Ok(audit)
 }
 
+/// Difference between two forces, as a share of the second.
+fn share(found: Vec3, expected: Vec3) -> f64 {
+    (found - expected).norm() / expected.norm()
+}
+
+/// Enters by how much the force differs from that of steps that take no time.
+fn enter_motion(row: &mut ShippedRow, moving: &[Moving]) {
+    let of = |keep: &dyn Fn(&Moving) -> bool| {
+        let mut errors: Vec<f64> = moving.iter().filter(|m| keep(m)).map(|m| m.error).collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    };
+    let all = of(&|_| true);
+    let of_part = |part: Part| quantile(&of(&|m| m.part == part), 0.95);
+    row.motion_error_p95 = quantile(&all, 0.95);
+    row.motion_error_max = quantile(&all, 1.0);
+    row.motion_error_p95_press = of_part(Part::Press);
+    row.motion_error_p95_stroke = of_part(Part::Stroke);
+    row.motion_error_p95_lift = of_part(Part::Lift);
+    let n_let_go = moving.iter().filter(|m| !m.is_whole).count();
+    row.let_go_share = n_let_go as f64 / moving.len().max(1) as f64;
+}
+
 fn stop(felt: &Felt) -> Stop {
     Stop {
         tool: felt.tool,
@@ -202,7 +244,8 @@ fn stop(felt: &Felt) -> Stop {
     }
 }
 
-/// `n` poses of each part of a way, at random, spread over the part. Indices, ascending.
+/// `n` poses of each part of a way, at random, spread over the part: where the force of steps that take
+/// no time is firm. Indices, ascending.
 fn drawn(felt: &[Felt], n: usize, k: usize) -> Vec<usize> {
     let largest = felt.iter().map(|f| f.force.norm()).fold(0.0, f64::max);
     let mut rng = Rng::with_seed(SEED + k as u64);

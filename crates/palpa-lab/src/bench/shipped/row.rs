@@ -30,6 +30,19 @@ pub struct ShippedRow {
     /// 95th percentile of the part of the error that the loop's mesh has in it: static forces on
     /// that mesh. `None` if the way matters.
     pub mesh_error_p95: Option<f64>,
+    /// 95th percentile of the difference between the force and that of the same way with steps that take
+    /// no time, as a share of the latter, over ticks drawn evenly on the parts of each way.
+    pub motion_error_p95: Option<f64>,
+    /// The largest such difference.
+    pub motion_error_max: Option<f64>,
+    /// The 95th percentile on the way down.
+    pub motion_error_p95_press: Option<f64>,
+    /// The 95th percentile on the way across the skin.
+    pub motion_error_p95_stroke: Option<f64>,
+    /// The 95th percentile on the way up.
+    pub motion_error_p95_lift: Option<f64>,
+    /// Share of these ticks in which the law let the force go in part, or came back from that.
+    pub let_go_share: f64,
     /// Number of poses.
     pub n_poses: usize,
     /// Number of poses without a static equilibrium.
