@@ -78,12 +78,11 @@ test('a recording equals what was shown, tick by tick, and replays', async (t) =
   const greatest = rows.reduce((most, row) => (row.force > most.force ? row : most));
   for (const time of [greatest.time, 0, 0.9 * greatest.time]) {
     await slider.fill(time.toFixed(3));
-    const seen = await palpa.reads(`the moment ${time}`, ({ tick }) => {
+    // The body's own last frame may still be shown, and its ticks began anew when the recording ended.
+    await palpa.reads(`the moment ${time} with its force`, ({ tick, newtons }) => {
       const row = byTick.get(tick);
-      return row !== undefined && Math.abs(row.time - Math.max(time, rows[0].time)) < FRAME;
+      return row !== undefined && Math.abs(row.time - Math.max(time, rows[0].time)) < FRAME && Math.abs(row.force - newtons) <= 1e-9 * Math.max(newtons, 1e-9);
     });
-    const row = byTick.get(seen.tick);
-    assert.ok(row && Math.abs(row.force - seen.newtons) <= 1e-9 * Math.max(seen.newtons, 1e-9), `tick ${seen.tick}: shown ${seen.newtons} N, recorded ${row?.force} N`);
   }
   // By keys, too.
   await slider.focus();
