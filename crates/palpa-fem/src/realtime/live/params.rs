@@ -18,7 +18,7 @@ pub struct LiveParams {
     /// Distance of the tool from the zone's centre at which a new zone is requested, as a share of
     /// the radius.
     pub leave: f64,
-    /// Longest move of a tool near the skin in one step, m; 0.7 mm at most where it presses. A
+    /// Longest move of a tool near the skin in one step, m; where it presses, it goes less. A
     /// longer move is divided over several steps, so that a tool cannot jump through the skin.
     pub longest_move: f64,
     /// Change of the indentation after which a new stiffness of the exterior is requested, m.

@@ -28,7 +28,7 @@ const BEGIN: f64 = 0.7;
 
 /// The time that steps and jobs of the background take in virtual time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Duration {
+pub enum StepTime {
     /// Their own CPU time on this core.
     Own,
     /// None: what the loop would do on a machine without limits.
@@ -87,7 +87,7 @@ pub struct Driven {
 ///
 /// # Errors
 /// If the body cannot be factored.
-pub fn drive(scene: &Scene, live: &LiveScene, takes: Duration) -> anyhow::Result<Driven> {
+pub fn drive(scene: &Scene, live: &LiveScene, takes: StepTime) -> anyhow::Result<Driven> {
     let path = once_from(live.start, scene, &live.scene_from_device);
     let shipped = open_device(&scene.device, Path::from(live.start))?;
     let mut device = Scripted::new(path.clone(), shipped.spec());
@@ -153,7 +153,7 @@ fn part(path: &Path, time: f64) -> Part {
 /// The tissue and its background in virtual time.
 struct Loop {
     tissue: LiveTissue,
-    takes: Duration,
+    takes: StepTime,
     patches: Latest,
     /// The patch that is made, and the time at which it is ready, s.
     working: Box<palpa_servo::ContactPatch>,
@@ -167,7 +167,7 @@ struct Loop {
 }
 
 impl Loop {
-    fn new(mut tissue: LiveTissue, takes: Duration) -> Self {
+    fn new(mut tissue: LiveTissue, takes: StepTime) -> Self {
         tissue.prepare();
         Self {
             tissue,
@@ -204,8 +204,8 @@ impl Loop {
     /// Time that work takes which began at this reading of the thread's CPU clock, s.
     fn since(&self, clock: f64) -> f64 {
         match self.takes {
-            Duration::Own => thread_cpu() - clock,
-            Duration::Zero => 0.0,
+            StepTime::Own => thread_cpu() - clock,
+            StepTime::Zero => 0.0,
         }
     }
 
@@ -280,7 +280,7 @@ mod tests {
     fn a_way_with_steps_that_take_no_time_is_the_same_each_time_and_has_every_tick() {
         let scene = Scene::parse(SCENE, std::path::Path::new(".")).unwrap();
         let live = LiveScene::build(&scene).unwrap();
-        let drive = || drive(&scene, &live, Duration::Zero).unwrap();
+        let drive = || drive(&scene, &live, StepTime::Zero).unwrap();
         let (first, second) = (drive(), drive());
         let forces = |driven: &Driven| -> Vec<[u64; 3]> {
             let bits = |f: &Felt| [f.force.x, f.force.y, f.force.z].map(f64::to_bits);

@@ -9,7 +9,7 @@ use palpa::live::{ACCURACY, LiveScene};
 use palpa_mesh::Vec3;
 use rayon::prelude::*;
 
-use super::drive::{Driven, Duration, Felt, Part, drive};
+use super::drive::{Driven, Felt, Part, StepTime, drive};
 use super::places::{Spot, draw_spots};
 use super::{ShippedCase, ShippedRow};
 
@@ -72,8 +72,8 @@ pub fn measure(
             break;
         }
         let scene = spot.scene(&case.scene);
-        let driven = drive(&scene, live, Duration::Own)?;
-        let ideal = drive(&scene, live, Duration::Zero)?;
+        let driven = drive(&scene, live, StepTime::Own)?;
+        let ideal = drive(&scene, live, StepTime::Zero)?;
         note(&mut row, spot, &driven);
         let ticks = drawn(&ideal.felt, TICKS, ways.len());
         moving.extend(ticks.iter().map(|&i| Moving {
@@ -124,25 +124,47 @@ fn note(row: &mut ShippedRow, spot: &Spot, driven: &Driven) {
 }
 
 fn enter_errors(row: &mut ShippedRow, audited: &[Audited]) {
-    let sorted = |errors: &mut dyn Iterator<Item = f64>| {
-        let mut errors: Vec<f64> = errors.collect();
-        errors.sort_by(f64::total_cmp);
-        errors
-    };
-    let all = sorted(&mut audited.iter().filter_map(|pose| pose.error));
-    row.n_poses = all.len();
-    row.n_poses_failed = audited.len() - all.len();
-    row.total_error_p95 = quantile(&all, 0.95);
-    row.total_error_max = quantile(&all, 1.0);
-    let of_part = |part: Part| {
-        let of_part = audited.iter().filter(|pose| pose.part == part);
-        quantile(&sorted(&mut of_part.filter_map(|pose| pose.error)), 0.95)
-    };
-    row.total_error_p95_press = of_part(Part::Press);
-    row.total_error_p95_stroke = of_part(Part::Stroke);
-    row.total_error_p95_lift = of_part(Part::Lift);
-    let of_mesh = sorted(&mut audited.iter().filter_map(|pose| pose.mesh_error));
-    row.mesh_error_p95 = quantile(&of_mesh, 0.95);
+    let of_poses = audited.iter().map(|pose| Some((pose.part, pose.error?)));
+    let errors: Vec<(Part, f64)> = of_poses.flatten().collect();
+    row.n_poses = errors.len();
+    row.n_poses_failed = audited.len() - errors.len();
+    let largest = Largest::of(&errors);
+    row.total_error_p95 = largest.p95;
+    row.total_error_max = largest.max;
+    [
+        row.total_error_p95_press,
+        row.total_error_p95_stroke,
+        row.total_error_p95_lift,
+    ] = largest.p95_of_parts;
+    row.mesh_error_p95 = quantile_of(audited.iter().filter_map(|pose| pose.mesh_error), 0.95);
+}
+
+/// The large ones of some errors.
+struct Largest {
+    p95: Option<f64>,
+    max: Option<f64>,
+    /// 95th percentiles down, across and up.
+    p95_of_parts: [Option<f64>; 3],
+}
+
+impl Largest {
+    fn of(errors: &[(Part, f64)]) -> Self {
+        let all = || errors.iter().map(|(_, error)| *error);
+        Self {
+            p95: quantile_of(all(), 0.95),
+            max: quantile_of(all(), 1.0),
+            p95_of_parts: [Part::Press, Part::Stroke, Part::Lift].map(|part| {
+                let of_part = errors.iter().filter(|(of, _)| *of == part);
+                quantile_of(of_part.map(|(_, error)| *error), 0.95)
+            }),
+        }
+    }
+}
+
+fn quantile_of(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    quantile(&values, share)
 }
 
 /// The force in a tick, compared with that of steps that take no time.
@@ -221,18 +243,15 @@ fn share(found: Vec3, expected: Vec3) -> f64 {
 
 /// Enters by how much the force differs from that of steps that take no time.
 fn enter_motion(row: &mut ShippedRow, moving: &[Moving]) {
-    let of = |keep: &dyn Fn(&Moving) -> bool| {
-        let mut errors: Vec<f64> = moving.iter().filter(|m| keep(m)).map(|m| m.error).collect();
-        errors.sort_by(f64::total_cmp);
-        errors
-    };
-    let all = of(&|_| true);
-    let of_part = |part: Part| quantile(&of(&|m| m.part == part), 0.95);
-    row.motion_error_p95 = quantile(&all, 0.95);
-    row.motion_error_max = quantile(&all, 1.0);
-    row.motion_error_p95_press = of_part(Part::Press);
-    row.motion_error_p95_stroke = of_part(Part::Stroke);
-    row.motion_error_p95_lift = of_part(Part::Lift);
+    let errors: Vec<(Part, f64)> = moving.iter().map(|m| (m.part, m.error)).collect();
+    let largest = Largest::of(&errors);
+    row.motion_error_p95 = largest.p95;
+    row.motion_error_max = largest.max;
+    [
+        row.motion_error_p95_press,
+        row.motion_error_p95_stroke,
+        row.motion_error_p95_lift,
+    ] = largest.p95_of_parts;
     let n_let_go = moving.iter().filter(|m| !m.is_whole).count();
     row.let_go_share = n_let_go as f64 / moving.len().max(1) as f64;
 }
