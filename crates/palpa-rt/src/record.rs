@@ -131,7 +131,7 @@ record! {
         job_taken: bool,
         /// Status of the step as a number, in the order of `StepStatus`.
         status: u8,
-        /// Whether its patch was published.
+        /// Whether it handed over a patch: a new one, or the last one again.
         published: bool,
         /// Whether its patch was spoilt on purpose: 1 if NaN was written into it.
         spoilt: u8,

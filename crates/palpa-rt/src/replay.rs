@@ -220,7 +220,7 @@ impl<T: Tissue> Run<'_, T> {
         let input = logged.input();
         let patch = &mut *self.patches.next;
         let result = self.tissue.step(&input, patch);
-        stamp(patch, &input);
+        stamp(patch, &input, &result);
         if logged.spoilt == 1 {
             spoil(patch);
         }

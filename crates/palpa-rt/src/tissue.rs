@@ -39,16 +39,15 @@ pub enum StepStatus {
     /// The step did not reach the poses of the tools; the patch belongs to the poses that it
     /// reached.
     Behind = 2,
-    /// The forces are not fit to be felt yet, as after a change of zone; the patch is not
-    /// published.
+    /// The forces are not fit to be felt yet, as after a change of zone; there is no new patch.
     Settling = 3,
-    /// There is no usable state; the patch is not published.
+    /// There is no usable state, and no new patch.
     Failed = 4,
 }
 
 impl StepStatus {
-    /// Whether the patch of such a step is sent to the 1 kHz loop.
-    pub fn is_published(self) -> bool {
+    /// Whether such a step makes a new patch for the 1 kHz loop.
+    pub fn has_patch(self) -> bool {
         matches!(self, Self::Converged | Self::Unfinished | Self::Behind)
     }
 
@@ -58,8 +57,8 @@ impl StepStatus {
             Self::Converged => "converged",
             Self::Unfinished => "unfinished",
             Self::Behind => "behind the tool",
-            Self::Settling => "settling, patch held back",
-            Self::Failed => "failed, patch held back",
+            Self::Settling => "settling, no new patch",
+            Self::Failed => "failed, no new patch",
         }
     }
 }
@@ -82,6 +81,17 @@ pub struct TissueStep {
     pub mesh: u64,
     /// Stored energy, J.
     pub energy: f64,
+    /// Without a new patch, the last one may be handed over again, so that the loop goes on with it and
+    /// knows that the tissue still runs: the time at which the poses of that patch were taken, s. `None`
+    /// if the patch is new, or if there is none to go on with.
+    pub kept_from: Option<f64>,
+}
+
+impl TissueStep {
+    /// Whether the patch is sent to the 1 kHz loop.
+    pub fn is_published(&self) -> bool {
+        self.status.has_patch() || self.kept_from.is_some()
+    }
 }
 
 /// A body under tools, as seen by the engine.
@@ -98,8 +108,8 @@ pub trait Tissue: Send {
     /// per-thread data.
     fn prepare(&mut self) {}
 
-    /// Moves the tissue on and writes the patch in place. It must write every part that is used,
-    /// because the slot holds an older patch.
+    /// Moves the tissue on and writes the patch in place, the last one again if there is no new one. It
+    /// must write every part that is used, because the slot holds an older patch.
     ///
     /// The engine stamps the patch's `id`, `sampled_at` and `period` afterwards.
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep;

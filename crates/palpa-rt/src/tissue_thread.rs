@@ -77,7 +77,7 @@ pub struct TissueStats {
     pub background: Histogram,
     /// Background jobs that panicked.
     pub jobs_panicked: AtomicU64,
-    /// Steps whose patch was not published.
+    /// Steps without a new patch.
     pub held_back: AtomicU64,
     /// Steps not recorded because the ring was full.
     pub lost_records: AtomicU64,
@@ -223,7 +223,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         }
         let patch = self.patches.slot();
         let result = self.tissue.step(&input, patch);
-        stamp(patch, &input);
+        stamp(patch, &input, &result);
         let is_spoilt = self.faults.take_spoil();
         if is_spoilt {
             spoil(patch);
@@ -238,7 +238,8 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         }
         if record.published {
             self.patches.publish();
-        } else {
+        }
+        if !result.status.has_patch() {
             self.stats.held_back.fetch_add(1, Ordering::Relaxed);
         }
         record.installed = job_end == JobEnd::Installed;
@@ -335,9 +336,9 @@ pub(crate) fn run_background<T: Tissue>(
 }
 
 /// Writes the stamps that the engine knows and the tissue does not.
-pub(crate) fn stamp(patch: &mut ContactPatch, input: &TissueInput) {
+pub(crate) fn stamp(patch: &mut ContactPatch, input: &TissueInput, result: &TissueStep) {
     patch.id = input.step;
-    patch.sampled_at = input.sampled_at;
+    patch.sampled_at = result.kept_from.unwrap_or(input.sampled_at);
     patch.period = input.period;
 }
 
@@ -365,7 +366,7 @@ pub(crate) fn step_record(
         period: input.period,
         n_tools: input.n_tools as u32,
         status: result.status as u8,
-        published: result.status.is_published(),
+        published: result.is_published(),
         iterations: result.iterations,
         residual: result.residual,
         factor: result.factor,

@@ -144,7 +144,7 @@ fn run(case: &Case, live: &LiveScene, friction: f64, device: usize, grip: usize)
     let mut held_back = 0;
     let mut tissue = live.tissue().unwrap();
     let ticks = rehearse(&mut tissue, &mut device, &params, |_, _, step| {
-        held_back += u32::from(!step.status.is_published());
+        held_back += u32::from(!step.status.has_patch());
     });
     let forces: Vec<Vec3> = ticks.iter().map(|t| t.force).collect();
     let still = ticks.len() - STILL;

@@ -16,12 +16,6 @@ use crate::batch::{Batches, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
-/// First shift of a zone that is not positive definite, relative to its diagonal; its growth
-/// factor; and the largest number of increases.
-const FIRST_SHIFT: f32 = 1e-3;
-const SHIFT_GROWTH: f32 = 4.0;
-const MOST_SHIFTS: usize = 8;
-
 /// The zone's prisms and factor.
 #[derive(Debug)]
 pub(super) struct Inside {
@@ -109,46 +103,25 @@ impl Inside {
         }
     }
 
-    /// Factors the zone. If it is not positive definite, adds a growing share of the diagonal until
-    /// it is. Returns that share.
-    pub(super) fn factor(
+    /// Factors the zone.
+    pub(super) fn factor(&mut self, plan: &Plan, outside: &Outside) -> Result<(), Trouble> {
+        let exterior = Some(&outside.factor);
+        let (blocks, scratch) = (&self.blocks, &mut self.scratch);
+        let result = self.factor.factor(&plan.tree, blocks, exterior, scratch);
+        result.map_err(|_| Trouble::Singular)
+    }
+
+    /// Factors the zone, and raises its diagonal where it is not positive definite. Returns the number
+    /// of entries that were raised.
+    pub(super) fn factor_raised(
         &mut self,
-        model: &Model,
-        pattern: &ColumnPattern,
         plan: &Plan,
         outside: &Outside,
-        may_shift: bool,
-    ) -> Result<f32, Trouble> {
-        let mut shift = 0.0;
-        for attempt in 0..=MOST_SHIFTS {
-            let exterior = Some(&outside.factor);
-            let result = self
-                .factor
-                .factor(&plan.tree, &self.blocks, exterior, &mut self.scratch);
-            if result.is_ok() {
-                return Ok(shift);
-            }
-            if !may_shift {
-                break;
-            }
-            let next = if attempt == 0 {
-                FIRST_SHIFT
-            } else {
-                shift * SHIFT_GROWTH
-            };
-            for &[node, _] in &plan.zone {
-                let (v, l) = (
-                    node as usize / model.body.n_levels,
-                    node as usize % model.body.n_levels,
-                );
-                let block = &mut self.blocks[pattern.own(v) + 2 * l];
-                for d in [0, 4, 8] {
-                    block[d] = (block[d].abs() / (1.0 + shift)) * (1.0 + next);
-                }
-            }
-            shift = next;
-        }
-        Err(Trouble::Singular)
+    ) -> Result<usize, Trouble> {
+        let exterior = Some(&outside.factor);
+        let (blocks, scratch) = (&self.blocks, &mut self.scratch);
+        let result = (self.factor).factor_raised(&plan.tree, blocks, exterior, scratch);
+        result.map_err(|_| Trouble::Singular)
     }
 
     /// Clears the blocks of the zone's prisms.

@@ -46,7 +46,7 @@ pub struct Report {
     pub step_cpu: Quantiles,
     /// Wall time of a step, s.
     pub step_wall: Quantiles,
-    /// Steps whose patch was not published.
+    /// Steps without a new patch.
     pub held_back: u64,
     /// CPU time of each background job, s.
     pub jobs: Quantiles,

@@ -193,6 +193,28 @@ fn steps_that_fail_are_held_back_and_said() {
 }
 
 #[test]
+fn a_tissue_whose_steps_fail_goes_on_with_its_last_patch() {
+    let mut bed = Bed::new();
+    bed.falters_every = Some(9);
+    let (report, log) = faulty(&bed, |engine, hand| {
+        until_felt(hand);
+        until("steps failed", || engine.snapshot().step.step > 900);
+        until_felt(hand);
+    });
+    assert!(report.held_back > 500, "{}", report.held_back);
+    assert!(log.steps.iter().all(|s| s.published));
+    // The age of a patch is that of the step that made it.
+    let mut n_old = 0;
+    for e in log.ticks.iter().filter(|e| e.tick.patch > 9) {
+        let made = |s: &&palpa_rt::StepRecord| s.step <= e.tick.patch && s.step % 9 < 3;
+        let made = log.steps.iter().rev().find(made).unwrap();
+        assert_eq!(e.tick.patch_age, e.tick.now - made.sampled_at);
+        n_old += u32::from(made.step < e.tick.patch);
+    }
+    assert!(n_old > 100, "{n_old}");
+}
+
+#[test]
 fn a_job_that_panics_is_said_and_the_next_one_runs() {
     let mut bed = Bed::new();
     bed.panics_in = Some(3);

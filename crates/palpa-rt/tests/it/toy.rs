@@ -28,8 +28,11 @@ pub(crate) struct Bed {
     scale: f64,
     factor: u64,
     steps: u64,
-    /// Which step says that it failed.
+    /// From which step on 20 steps say that they failed.
     pub(crate) fails_at: Option<u64>,
+    /// Of so many steps each, the last six fail and hand over the last patch again.
+    pub(crate) falters_every: Option<u64>,
+    last: Option<Box<ContactPatch>>,
     /// Which job panics.
     pub(crate) panics_in: Option<u64>,
     jobs: u64,
@@ -46,6 +49,8 @@ impl Bed {
             factor: 0,
             steps: 0,
             fails_at: None,
+            falters_every: None,
+            last: None,
             panics_in: None,
             jobs: 0,
             waiter: None,
@@ -62,6 +67,16 @@ impl Tissue for Bed {
             waiter.unpark();
         }
         self.steps += 1;
+        let falters = self.falters_every.is_some_and(|n| self.steps % n >= n - 6);
+        if let (true, Some(last)) = (falters, &self.last) {
+            patch.clone_from(last);
+            return TissueStep {
+                status: StepStatus::Failed,
+                mesh: 1,
+                kept_from: Some(last.sampled_at),
+                ..TissueStep::default()
+            };
+        }
         patch.n_tools = input.n_tools;
         patch.n_contacts = 0;
         let mut energy = 0.0;
@@ -123,6 +138,11 @@ impl Tissue for Bed {
                 stiffness: if k == 0 { stiffness } else { Mat3::zeros() },
             };
         }
+        if self.falters_every.is_some() {
+            let last = self.last.get_or_insert_with(palpa_rt::empty_patch);
+            (**last).clone_from(patch);
+            last.sampled_at = input.sampled_at;
+        }
         TissueStep {
             status: match self.fails_at {
                 Some(step) if (step..step + 20).contains(&self.steps) => StepStatus::Failed,
@@ -134,6 +154,7 @@ impl Tissue for Bed {
             zone: 0,
             mesh: 1,
             energy,
+            kept_from: None,
         }
     }
 

@@ -9,7 +9,9 @@
 use std::ops::Range;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::cholesky::llt::factor::{
+    LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
@@ -22,11 +24,23 @@ use super::tree::{Front, FrontPair, Half, Tree};
 use crate::Singular;
 use crate::blocks::Block;
 
+/// In a factor whose diagonal may be raised: the least pivot, as a share of the diagonal's own entry. Smaller
+/// ones make the update of their front so large that those of the next are not positive.
+const LEAST_PIVOT: f64 = 0.1;
+/// Share of their own values by which the entries of a front's diagonal are raised first, and factor on it
+/// each time that this was not enough; and the largest.
+const RAISED_FIRST: f64 = 0.25;
+const RAISED_AGAIN: f64 = 4.0;
+const RAISED_MOST: f64 = 1e3;
+/// Entries smaller than this share of the largest of their front count as so large.
+const LEAST_ENTRY: f64 = 1e-3;
+
 /// Scratch memory for factoring; its contents do not matter between calls.
 pub struct FactorScratch<T> {
     updates: Vec<T>,
     /// For the trunk, then for each branch if branches are factored at the same time.
     memory: Vec<MemBuffer>,
+    raised: Raised,
 }
 
 impl<T> std::fmt::Debug for FactorScratch<T> {
@@ -43,6 +57,7 @@ impl<T: Number> FactorScratch<T> {
         Self {
             updates: vec![T::default(); tree.scratch[half as usize]],
             memory: vec![memory_for::<T>(tree, tree.range(half))],
+            raised: Raised::new(tree, half),
         }
     }
 
@@ -103,6 +118,7 @@ impl<T: Number> Exterior<T> {
             blocks,
             &mut self.panels,
             None,
+            false,
             scratch,
         )?;
         for front in &tree.fronts[tree.range(Half::Exterior)] {
@@ -148,7 +164,28 @@ impl<T: Number> Zone<T> {
         scratch: &mut FactorScratch<T>,
     ) -> Result<(), Singular> {
         let schur = exterior.map(|e| &e.schur[..]);
-        eliminate_half(tree, Half::Zone, blocks, &mut self.panels, schur, scratch)
+        let panels = &mut self.panels;
+        eliminate_half(tree, Half::Zone, blocks, panels, schur, false, scratch)
+    }
+
+    /// As [`Self::factor`], but where the matrix is not positive definite, or only just, its diagonal is
+    /// raised until it is: only in the fronts where elimination would stop, by a share of its own values.
+    /// Returns the number of entries that were raised. Each attempt costs the elimination of a front.
+    ///
+    /// # Errors
+    /// When the matrix is not finite, or would have to be raised by too much; the factor must then not
+    /// be used.
+    pub fn factor_raised(
+        &mut self,
+        tree: &Tree,
+        blocks: &[Block<T>],
+        exterior: Option<&Exterior<T>>,
+        scratch: &mut FactorScratch<T>,
+    ) -> Result<usize, Singular> {
+        let schur = exterior.map(|e| &e.schur[..]);
+        let panels = &mut self.panels;
+        eliminate_half(tree, Half::Zone, blocks, panels, schur, true, scratch)?;
+        Ok(scratch.raised.n)
     }
 }
 
@@ -185,12 +222,18 @@ fn eliminate_half<T: Number>(
     blocks: &[Block<T>],
     panels: &mut [T],
     schur: Option<&[T]>,
+    may_raise: bool,
     scratch: &mut FactorScratch<T>,
 ) -> Result<(), Singular> {
     let branches = &tree.branches[half as usize];
-    let FactorScratch { updates, memory } = scratch;
+    let FactorScratch {
+        updates,
+        memory,
+        raised,
+    } = scratch;
+    raised.n = 0;
     let (trunk_memory, branch_memory) = memory.split_at_mut(1);
-    let is_parallel = branch_memory.len() == branches.len() && branches.len() > 1;
+    let is_parallel = branch_memory.len() == branches.len() && branches.len() > 1 && !may_raise;
     if is_parallel {
         let rooms = rooms(tree, branches, panels, updates, branch_memory);
         (rooms.into_par_iter().zip(branches)).try_for_each(|(mut room, branch)| {
@@ -205,6 +248,7 @@ fn eliminate_half<T: Number>(
         updates,
         first_update: 0,
         memory: &mut trunk_memory[0],
+        raised: may_raise.then_some(raised),
     };
     let mut left = branches.iter().peekable();
     for f in tree.range(half) {
@@ -225,6 +269,61 @@ struct Room<'a, T> {
     updates: &'a mut [T],
     first_update: usize,
     memory: &'a mut MemBuffer,
+    /// What is raised on the diagonal; `None` if nothing may be.
+    raised: Option<&'a mut Raised>,
+}
+
+/// How the diagonals of fronts are raised.
+#[derive(Debug)]
+struct Raised {
+    /// Share of their own values by which the entries of the present front are.
+    share: f64,
+    /// Number of entries of all fronts that are raised.
+    n: usize,
+    /// The diagonal of the front before it is raised.
+    diagonal: Vec<f64>,
+}
+
+impl Raised {
+    /// For a tree's half.
+    fn new(tree: &Tree, half: Half) -> Self {
+        let widths = tree.fronts[tree.range(half)].iter().map(|f| f.own.len());
+        Self {
+            share: 0.0,
+            n: 0,
+            diagonal: Vec::with_capacity(widths.max().unwrap_or(0) * tree.width),
+        }
+    }
+
+    /// Notes the diagonal of a panel that children have not been added to, and raises it.
+    fn raise<T: Number>(&mut self, panel: &mut [T], height: usize) {
+        self.diagonal.clear();
+        let columns = panel.chunks_exact(height).enumerate();
+        let entries = columns.map(|(i, column)| column[i].wide().abs());
+        self.diagonal.extend(entries);
+        let largest = self.diagonal.iter().copied().fold(0.0, f64::max);
+        for (i, entry) in self.diagonal.iter_mut().enumerate() {
+            *entry = entry.max(LEAST_ENTRY * largest);
+            panel[i * height + i] += T::nearest(self.share * *entry);
+        }
+    }
+
+    /// Whether all pivots of a factored panel are large enough.
+    fn is_firm<T: Number>(&self, panel: &[T], height: usize) -> bool {
+        let mut columns = panel.chunks_exact(height).zip(&self.diagonal).enumerate();
+        columns.all(|(i, (column, entry))| column[i].wide().powi(2) >= LEAST_PIVOT * entry)
+    }
+
+    /// Raises the present front further. Returns false if that is too much.
+    fn grow(&mut self) -> bool {
+        if self.share == 0.0 {
+            self.share = RAISED_FIRST;
+            self.n += self.diagonal.len();
+        } else {
+            self.share *= RAISED_AGAIN;
+        }
+        self.share <= RAISED_MOST
+    }
 }
 
 /// Divides memory among branches.
@@ -262,6 +361,7 @@ fn rooms<'a, T>(
                 updates: own_updates,
                 first_update: update,
                 memory,
+                raised: None,
             };
             panel = first_panel + n_panels;
             update = end;
@@ -285,27 +385,45 @@ fn eliminate<T: Number>(
     let height = own + border;
     let panel = &mut room.panels[front.panel - room.first_panel..][..height * own];
     let update_of = |front: &Front| front.update.saturating_sub(room.first_update);
-    match schur.filter(|_| front.own == tree.ring) {
-        // The ring has no border, so its panel is as large as the Schur complement.
-        Some(schur) => panel.copy_from_slice(schur),
-        None => panel.fill(T::default()),
+    if let Some(raised) = &mut room.raised {
+        raised.share = 0.0;
     }
-    put_pairs(tree, &front.pairs, blocks, panel, height);
-    for child in children(tree, front) {
-        let size = child.border.len() * b;
-        let update = &room.updates[update_of(child)..][..size * size];
-        add_update(b, &child.to_parent, update, 0, panel, height);
+    loop {
+        match schur.filter(|_| front.own == tree.ring) {
+            // The ring has no border, so its panel is as large as the Schur complement.
+            Some(schur) => panel.copy_from_slice(schur),
+            None => panel.fill(T::default()),
+        }
+        put_pairs(tree, &front.pairs, blocks, panel, height);
+        if let Some(raised) = &mut room.raised {
+            raised.raise(panel, height);
+        }
+        for child in children(tree, front) {
+            let size = child.border.len() * b;
+            let update = &room.updates[update_of(child)..][..size * size];
+            add_update(b, &child.to_parent, update, 0, panel, height);
+        }
+        let top = MatMut::from_column_major_slice_mut(panel, height, own).subrows_mut(0, own);
+        let result = cholesky_in_place(
+            top,
+            LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(room.memory),
+            faer::Spec::default(),
+        );
+        let Some(raised) = &mut room.raised else {
+            result.map_err(|_| Singular)?;
+            break;
+        };
+        if result.is_ok() && raised.is_firm(panel, height) {
+            break;
+        }
+        if !raised.grow() {
+            return Err(Singular);
+        }
     }
-    let (mut top, bottom) =
+    let (top, bottom) =
         MatMut::from_column_major_slice_mut(panel, height, own).split_at_row_mut(own);
-    cholesky_in_place(
-        top.rb_mut(),
-        faer::linalg::cholesky::llt::factor::LltRegularization::default(),
-        Par::Seq,
-        MemStack::new(room.memory),
-        faer::Spec::default(),
-    )
-    .map_err(|_| Singular)?;
     if (0..own).any(|i| !top[(i, i)].wide().is_finite()) {
         return Err(Singular);
     }

@@ -6,7 +6,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use palpa_sparse::fronts::{
     Compliance, Exterior, FactorScratch, FarCompliance, Half, Number, Push, SolveScratch, Tree,
-    Zone, back_substitute, back_substitute_to, fronts_above, substitute,
+    Zone, back_substitute, back_substitute_to, fronts_above, least_pivot, substitute,
 };
 use palpa_sparse::{Block, ColumnPattern};
 
@@ -395,6 +395,56 @@ fn a_matrix_that_is_not_positive_definite_is_refused() {
             "{bad}"
         );
     }
+}
+
+#[test]
+fn a_matrix_that_is_not_positive_definite_is_raised_until_it_is() {
+    let case = case(6, 6, 2, false, 2.0);
+    let tree = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    let [mut inner, outer] = blocks(&case, 1);
+    let mut exterior = Exterior::<f64>::new(&tree);
+    let mut outside = FactorScratch::new(&tree, Half::Exterior);
+    exterior.factor(&tree, &outer, &mut outside).unwrap();
+    let mut inside = FactorScratch::new(&tree, Half::Zone);
+    let mut raised = Zone::<f64>::new(&tree);
+    let kept = Some(&exterior);
+    // Where there is nothing to raise, the factor is the same.
+    let mut plain = Zone::<f64>::new(&tree);
+    plain.factor(&tree, &inner, kept, &mut inside).unwrap();
+    let n = raised.factor_raised(&tree, &inner, kept, &mut inside);
+    assert_eq!(n, Ok(0));
+    let pivots = |zone: &Zone<f64>, inner: &[Block<f64>]| {
+        let [own, rest] = [inner, &outer[..]].map(|blocks| diagonal(&case.pattern, &tree, blocks));
+        let both: Vec<f64> = own.iter().zip(rest).map(|(a, b)| a + b).collect();
+        least_pivot(&tree, Half::Zone, zone, &both)
+    };
+    assert_eq!(
+        pivots(&raised, &inner).to_bits(),
+        pivots(&plain, &inner).to_bits()
+    );
+    // One unknown pulls the wrong way: the fronts with it are raised.
+    let middle = case.zone.iter().position(|&z| z).unwrap();
+    inner[case.pattern.own(middle)][0] *= -1.0;
+    assert!(plain.factor(&tree, &inner, kept, &mut inside).is_err());
+    let n = (raised.factor_raised(&tree, &inner, kept, &mut inside)).unwrap();
+    assert!((1..case.pattern.n_dofs()).contains(&n), "{n} were raised");
+    assert!(pivots(&raised, &inner).abs() > 1e-3);
+    inner[case.pattern.own(middle)][0] = f64::NAN;
+    let n = raised.factor_raised(&tree, &inner, kept, &mut inside);
+    assert!(n.is_err(), "{n:?}");
+}
+
+/// The diagonal of a matrix, in the order of elimination.
+fn diagonal(pattern: &ColumnPattern, tree: &Tree, blocks: &[Block<f64>]) -> Vec<f64> {
+    let mut diagonal = vec![0.0; pattern.n_dofs()];
+    for v in 0..pattern.n_columns() {
+        for l in 0..pattern.n_levels() {
+            let block = &blocks[pattern.own(v) + 2 * l];
+            let first = tree.first_dof(v) + 3 * l;
+            diagonal[first..first + 3].copy_from_slice(&[block[0], block[4], block[8]]);
+        }
+    }
+    diagonal
 }
 
 /// The numbers of a factor and of a solution, of a tree large enough to have branches.

@@ -21,7 +21,11 @@ pub struct LiveTissue {
     tolerance: f64,
     /// The tools with their poses at the last step; kept to reuse its memory.
     posed: Vec<PosedTool>,
+    /// The local model of the last step that is fit to be felt, with the number of its mesh and the
+    /// time at which its poses were taken, s; `None` before the first.
     local: LocalModel,
+    local_mesh: u64,
+    local_from: Option<f64>,
     last: Option<LiveReport>,
     watch: Option<Watch>,
 }
@@ -53,6 +57,8 @@ impl LiveTissue {
             tolerance,
             posed,
             local,
+            local_mesh: 0,
+            local_from: None,
             last: None,
             watch: None,
         }
@@ -124,7 +130,7 @@ impl LiveTissue {
             };
         }
         // Marks the vertices with their mesh: the same number in another mesh is another vertex.
-        let mesh = ((self.body.n_meshes()[0] % 16) as u32) << 27;
+        let mesh = ((self.local_mesh % 16) as u32) << 27;
         let n = self.local.contacts.len().min(MAX_CONTACTS);
         patch.n_contacts = n;
         for (out, contact) in patch.contacts.iter_mut().zip(&self.local.contacts) {
@@ -169,24 +175,30 @@ impl Tissue for LiveTissue {
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
         let report = self.body.step(&self.posed, input.dt);
-        self.body
-            .live_mut()
-            .local_model(MAX_CONTACTS, &mut self.local);
+        // Triangles left out bear nothing, so the force is too small.
+        let is_finished = report.residual <= self.tolerance && report.n_left_out == 0;
+        let status = match report.outcome {
+            StepOutcome::Arrived if is_finished => StepStatus::Converged,
+            StepOutcome::Arrived => StepStatus::Unfinished,
+            StepOutcome::Behind => StepStatus::Behind,
+            StepOutcome::BackedOff => StepStatus::Settling,
+            StepOutcome::Failed => StepStatus::Failed,
+        };
+        if status.has_patch() {
+            self.body
+                .live_mut()
+                .local_model(MAX_CONTACTS, &mut self.local);
+            self.local_mesh = self.body.n_meshes()[0];
+            self.local_from = Some(input.sampled_at);
+        }
         self.fill(patch);
         self.last = Some(report);
         if let Some(watch) = &mut self.watch {
             watch.look(input.step, input.now, &self.body, self.posed.first());
         }
-        // Triangles left out bear nothing, so the force is too small.
-        let is_finished = report.residual <= self.tolerance && report.n_left_out == 0;
         TissueStep {
-            status: match report.outcome {
-                StepOutcome::Arrived if is_finished => StepStatus::Converged,
-                StepOutcome::Arrived => StepStatus::Unfinished,
-                StepOutcome::Behind => StepStatus::Behind,
-                StepOutcome::BackedOff => StepStatus::Settling,
-                StepOutcome::Failed => StepStatus::Failed,
-            },
+            status,
+            kept_from: self.local_from.filter(|_| !status.has_patch()),
             iterations: report.iterations as u32,
             residual: report.residual,
             factor: report.factor,

@@ -100,7 +100,7 @@ pub fn rehearse<T: Tissue>(
             };
             let done = tissue.step(&input, &mut working);
             (working.id, working.sampled_at, working.period) = (step, now, input.period);
-            is_made = done.status.is_published();
+            is_made = done.status.has_patch();
             each_step(tissue, &input, &done);
             if job.is_none()
                 && let Some(work) = tissue.take_job()

@@ -24,7 +24,7 @@ const USABLE: f64 = 0.7;
 /// What is kept, and for how long.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kept {
-    /// Whether the factor is of the present zone and without a shift of its diagonal.
+    /// Whether the factor is of the present zone.
     has_factor: bool,
     /// Iterations beyond the first of each step since the factor was computed.
     n_extra: usize,
@@ -63,8 +63,8 @@ impl Kept {
     }
 
     /// Called with a new factor. Candidates need a new compliance then.
-    pub(super) fn renew_factor(&mut self, shift: f32) {
-        self.has_factor = shift == 0.0;
+    pub(super) fn renew_factor(&mut self) {
+        self.has_factor = true;
         self.n_extra = 0;
     }
 }
@@ -98,9 +98,9 @@ impl Live {
     }
 
     /// The kind of the next iteration of a step, whose last left `residual` after one with `before`.
-    pub(super) fn next_pass(&mut self, residual: f64, before: f64, shift: f32) -> Pass {
+    pub(super) fn next_pass(&mut self, residual: f64, before: f64) -> Pass {
         self.kept.n_extra += 1;
-        if residual < ROUGH.min(SLOW * before) && shift == 0.0 {
+        if residual < ROUGH.min(SLOW * before) {
             Pass::Near
         } else {
             self.kept.n_extra = MOST_EXTRA;

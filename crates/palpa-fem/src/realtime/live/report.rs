@@ -25,6 +25,9 @@ pub struct LiveReport {
     /// Newton iterations; 0 while nothing touches a body at rest, and while tools that press do not
     /// move and the body is in equilibrium with them.
     pub iterations: usize,
+    /// Factors of the zone's stiffness that were computed, those that failed included. They are most of
+    /// a step's cost.
+    pub n_factors: usize,
     /// Residual of the zone: unbalanced forces relative to the tools' force.
     pub residual: f64,
     /// Residual of a followed exterior: unbalanced forces relative to the tools' force.
@@ -41,8 +44,9 @@ pub struct LiveReport {
     pub n_far: usize,
     /// Whether the contact forces satisfy the law of contact.
     pub is_contact_settled: bool,
-    /// Shift of the diagonal that the zone's stiffness needed, as a share of the diagonal.
-    pub shift: f32,
+    /// Number of unknowns at which the zone's stiffness had to be raised, because it was not positive
+    /// definite.
+    pub n_raised: usize,
     /// Stiffness of the springs that held the vertices under the tools during the solve, relative
     /// to the skin's own stiffness. Their forces have been removed from the result.
     pub spring: f64,

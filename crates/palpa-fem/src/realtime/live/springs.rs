@@ -63,13 +63,14 @@ impl Springs {
         if was_eased {
             self.patience = (2 * self.patience).min(PATIENCE[1]);
         }
-        self.share = (self.share * GROWTH).max(FIRST);
+        self.share = (self.share * GROWTH).clamp(FIRST, MOST);
     }
 
-    /// Called after the zone was factored with these springs and this shift of its diagonal.
-    fn settle(&mut self, usual: f64, shift: f32) {
-        if shift > 0.0 {
-            // The springs did not help. If kept, they would stiffen the skin for a hundred steps.
+    /// Called after the zone was factored with these springs, with so many entries of its diagonal
+    /// raised.
+    fn settle(&mut self, usual: f64, n_raised: usize) {
+        if n_raised > 0 {
+            // They do not help. If kept, they would hold the skin for a hundred steps.
             self.share = usual;
         }
         if self.share == 0.0 {
@@ -79,10 +80,11 @@ impl Springs {
 }
 
 impl Live {
-    /// Assembles and factors the zone's stiffness, with springs as soft as possible.
+    /// Assembles and factors the zone's stiffness, with springs as soft as possible. Where stiffer
+    /// ones do not make it positive definite, its diagonal is raised: two factors at most.
     pub(super) fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
         let (model, pattern, plan) = (&*self.model, &*self.pattern, &*self.plan);
-        let (inside, springs) = (&mut self.inside, &mut self.springs);
+        let inside = &mut self.inside;
         inside.assemble(
             model,
             &self.memory,
@@ -93,31 +95,38 @@ impl Live {
         let pressed = self.problem.pressing().filter(|c| !c.is_far);
         let pressed = pressed.map(|c| c.vertex);
         let size = inside.skin_stiffness(pattern, pressed);
-        let mut was_eased = springs.ease();
-        let (mut there, usual) = (0.0, springs.share);
-        loop {
-            let stiffness = springs.share * size;
-            for candidate in &mut self.problem.candidates {
-                candidate.support = if candidate.pressure > 0.0 && !candidate.is_far {
-                    stiffness
-                } else {
-                    0.0
-                };
-            }
-            inside.add_springs(pattern, &self.problem.candidates, stiffness - there);
-            there = stiffness;
-            let may_shift = size == 0.0 || springs.share >= MOST;
-            match inside.factor(model, pattern, plan, &self.outside, may_shift) {
-                Ok(shift) => {
-                    report.shift = report.shift.max(shift);
-                    report.spring = springs.share;
-                    springs.settle(usual, shift);
-                    self.kept.renew_factor(shift);
-                    return Ok(());
-                }
-                Err(trouble) if may_shift => return Err(trouble),
-                Err(_) => springs.stiffen(std::mem::take(&mut was_eased)),
-            }
+        let was_eased = self.springs.ease();
+        let usual = self.springs.share;
+        let before = usual * size;
+        self.hold_pressed(size, 0.0);
+        report.n_factors += 1;
+        let n_raised = if self.inside.factor(&self.plan, &self.outside).is_ok() {
+            0
+        } else {
+            self.springs.stiffen(was_eased);
+            self.hold_pressed(size, before);
+            report.n_factors += 1;
+            self.inside.factor_raised(&self.plan, &self.outside)?
+        };
+        report.n_raised = report.n_raised.max(n_raised);
+        report.spring = self.springs.share;
+        self.springs.settle(usual, n_raised);
+        self.kept.renew_factor();
+        Ok(())
+    }
+
+    /// Puts springs under the pressing vertices of the zone, whose own stiffness is `size` and whose
+    /// springs were `before`, N/m.
+    fn hold_pressed(&mut self, size: f64, before: f64) {
+        let stiffness = self.springs.share * size;
+        for candidate in &mut self.problem.candidates {
+            candidate.support = if candidate.pressure > 0.0 && !candidate.is_far {
+                stiffness
+            } else {
+                0.0
+            };
         }
+        let candidates = &self.problem.candidates;
+        (self.inside).add_springs(&self.pattern, candidates, stiffness - before);
     }
 }

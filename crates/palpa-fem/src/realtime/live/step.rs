@@ -13,7 +13,7 @@ const LOST: f64 = 0.6;
 /// The verdict on a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
-    /// Near equilibrium, with the body's unmodified stiffness.
+    /// Near equilibrium.
     Good,
     /// Good enough to continue from, but not to return to or to render.
     Rough,
@@ -67,6 +67,7 @@ impl Live {
         let settled = self.settled.filter(|_| has_stayed)?;
         Some(LiveReport {
             iterations: 0,
+            n_factors: 0,
             ..settled
         })
     }
@@ -96,6 +97,7 @@ impl Live {
                 StepOutcome::Arrived
             },
             iterations: 0,
+            n_factors: 0,
             residual: 0.0,
             outside: 0.0,
             n_active: 0,
@@ -103,7 +105,7 @@ impl Live {
             n_left_out: 0,
             n_far: 0,
             is_contact_settled: true,
-            shift: 0.0,
+            n_raised: 0,
             spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
@@ -117,7 +119,7 @@ impl Live {
             let pass = if report.iterations == 0 {
                 self.first_pass()
             } else {
-                self.next_pass(report.residual, before, report.shift)
+                self.next_pass(report.residual, before)
             };
             before = if report.iterations == 0 {
                 f64::INFINITY
@@ -149,7 +151,7 @@ impl Live {
             return Verdict::Lost;
         }
         let is_far = report.residual.max(report.outside) > ROUGH;
-        if is_far || report.shift > 0.0 || !report.is_contact_settled {
+        if is_far || !report.is_contact_settled {
             Verdict::Rough
         } else {
             Verdict::Good

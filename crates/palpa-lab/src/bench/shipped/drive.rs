@@ -27,10 +27,19 @@ const LONGEST: f64 = 0.02;
 const BEGIN: f64 = 0.7;
 
 /// The time that steps and jobs of the background take in virtual time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepTime {
     /// Their own CPU time on this core.
     Own,
+    /// By what they do, so that the forces are the same on every machine, s.
+    Counted {
+        /// A factor of the zone.
+        factor: f64,
+        /// An iteration.
+        iteration: f64,
+        /// A job of the background.
+        job: f64,
+    },
     /// None: what the loop would do on a machine without limits.
     Zero,
 }
@@ -201,10 +210,24 @@ impl Loop {
         }
     }
 
-    /// Time that work takes which began at this reading of the thread's CPU clock, s.
-    fn since(&self, clock: f64) -> f64 {
+    /// Time that a step takes which began at this reading of the thread's CPU clock, s.
+    fn time_of_step(&self, clock: f64) -> f64 {
         match self.takes {
             StepTime::Own => thread_cpu() - clock,
+            StepTime::Counted {
+                factor, iteration, ..
+            } => self.tissue.last().map_or(0.0, |last| {
+                last.n_factors as f64 * factor + last.iterations as f64 * iteration
+            }),
+            StepTime::Zero => 0.0,
+        }
+    }
+
+    /// Time that a job takes which began at this reading of the thread's CPU clock, s.
+    fn time_of_job(&self, clock: f64) -> f64 {
+        match self.takes {
+            StepTime::Own => thread_cpu() - clock,
+            StepTime::Counted { job, .. } => job,
             StepTime::Zero => 0.0,
         }
     }
@@ -230,16 +253,17 @@ impl Loop {
         }
         let result = self.tissue.step(&input, &mut self.working);
         let work = self.job.is_none().then(|| self.tissue.take_job()).flatten();
-        let time = self.since(clock);
-        (self.working.id, self.working.sampled_at) = (self.step, now);
+        let time = self.time_of_step(clock);
+        let sampled_at = result.kept_from.unwrap_or(now);
+        (self.working.id, self.working.sampled_at) = (self.step, sampled_at);
         self.working.period = self.period;
         let end = start + time;
-        self.ready_at = result.status.is_published().then_some(end);
+        self.ready_at = result.is_published().then_some(end);
         self.free_at = end.max(start + SHORTEST);
         if let Some(work) = work {
             let clock = thread_cpu();
             let done = LiveTissue::run(work);
-            let late = self.since(clock);
+            let late = self.time_of_job(clock);
             if now > BEGIN {
                 driven.background += late;
             }
@@ -251,7 +275,7 @@ impl Loop {
             driven.n_behind += usize::from(result.status == StepStatus::Behind);
             driven.n_unfinished += usize::from(result.status == StepStatus::Unfinished);
         }
-        driven.n_failed += usize::from(!result.status.is_published());
+        driven.n_failed += usize::from(!result.status.has_patch());
     }
 }
 
