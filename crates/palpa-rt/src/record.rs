@@ -119,7 +119,8 @@ record! {
         period: f64,
         /// Number of tools.
         n_tools: u32,
-        /// Positions of the tools, m, one after the other.
+        /// Positions of the tools, m, one after the other: ahead of those that were taken, where the
+        /// patch will serve.
         positions: [f64; 3 * palpa_servo::MAX_TOOLS],
         /// Orientations of the tools, quaternions i, j, k, w, one after the other.
         orientations: [f64; 4 * palpa_servo::MAX_TOOLS],

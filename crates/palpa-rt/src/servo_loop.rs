@@ -126,6 +126,10 @@ impl ServoLoop {
         for (stretch, tool) in self.now.stretch.iter_mut().zip(&report.tools) {
             *stretch = tool.stretch;
         }
+        let velocities = &mut self.now.sample.velocities;
+        for (velocity, tool) in velocities.iter_mut().zip(&report.tools) {
+            *velocity = tool.velocity;
+        }
         self.write(now);
         self.notice(now, &report);
         let mut entry = TickEntry {

@@ -20,10 +20,28 @@ pub struct TissueInput {
     pub dt: f64,
     /// Expected time from patch to patch, s.
     pub period: f64,
-    /// Poses of the tools; entries from `n_tools` on are not used.
+    /// Poses of the tools, [ahead] of those that were taken; entries from `n_tools` on are not used.
     pub poses: [Pose; MAX_TOOLS],
     /// Number of tools.
     pub n_tools: usize,
+}
+
+/// Time by which a step looks ahead of the poses that were taken, in patch periods: its patch comes one
+/// period later and serves for another, and both are longer than usual where the step needs a new factor.
+const LEAD: f64 = 2.0;
+/// Largest such time, s, and way of a tool in it, m.
+const LONGEST_LEAD: f64 = 0.025;
+const LONGEST_WAY: f64 = 1e-3;
+
+/// About where a tool with this velocity, m/s, will be while the patch of the next step serves, if patches
+/// come every `period`, s. There the linear model of the tissue is best.
+pub fn ahead(mut pose: Pose, velocity: &Vec3, period: f64) -> Pose {
+    let way = velocity * (LEAD * period).min(LONGEST_LEAD);
+    let length = way.norm();
+    if length.is_finite() {
+        pose.translation.vector += way * (LONGEST_WAY / length.max(LONGEST_WAY));
+    }
+    pose
 }
 
 /// Status of a step.
@@ -224,6 +242,21 @@ impl Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_looks_ahead_of_a_tool_that_moves_and_never_far() {
+        let at = |velocity: [f64; 3], period: f64| {
+            let pose = ahead(Pose::translation(0.1, 0.0, 0.0), &velocity.into(), period);
+            pose.translation.vector - Vec3::new(0.1, 0.0, 0.0)
+        };
+        assert_eq!(at([0.0; 3], 0.01), Vec3::zeros());
+        let near = at([0.0, 0.05, 0.0], 2e-3);
+        assert!((near - Vec3::new(0.0, 2e-4, 0.0)).norm() < 1e-12, "{near}");
+        let far = at([0.0, 0.0, -10.0], 0.1);
+        assert!((far - Vec3::new(0.0, 0.0, -1e-3)).norm() < 1e-12, "{far}");
+        assert_eq!(at([f64::NAN, 0.0, 0.0], 0.01), Vec3::zeros());
+        assert_eq!(at([f64::INFINITY, 0.0, 0.0], 0.01), Vec3::zeros());
+    }
 
     #[test]
     fn the_hash_sees_every_bit_that_counts_and_no_other() {

@@ -7,9 +7,9 @@ use crate::{
     histogram::Histogram,
     mailbox::{Reader, Writer},
     record::StepRecord,
-    tissue::{StepStatus, Tissue, TissueInput, TissueStep, patch_hash},
+    tissue::{StepStatus, Tissue, TissueInput, TissueStep, ahead, patch_hash},
 };
-use palpa_servo::{ContactPatch, MAX_TOOLS, Pose};
+use palpa_servo::{ContactPatch, MAX_TOOLS, Pose, Vec3};
 use rtrb::{Consumer, Producer};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -52,6 +52,8 @@ pub(crate) struct PoseSample {
     pub(crate) tick: u64,
     pub(crate) time: f64,
     pub(crate) poses: [Pose; MAX_TOOLS],
+    /// Velocities of the tools, m/s.
+    pub(crate) velocities: [Vec3; MAX_TOOLS],
     pub(crate) n_tools: usize,
 }
 
@@ -61,6 +63,7 @@ impl PoseSample {
             tick: 0,
             time: 0.0,
             poses: [Pose::identity(); MAX_TOOLS],
+            velocities: [Vec3::zeros(); MAX_TOOLS],
             n_tools: 0,
         }
     }
@@ -213,7 +216,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             now,
             dt: elapsed.min(self.params.max_dt),
             period,
-            poses: sample.poses,
+            poses: std::array::from_fn(|k| ahead(sample.poses[k], &sample.velocities[k], period)),
             n_tools: sample.n_tools,
         };
         if self.faults.take_panic() {

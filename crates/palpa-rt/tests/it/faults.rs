@@ -208,7 +208,8 @@ fn a_tissue_whose_steps_fail_goes_on_with_its_last_patch() {
     for e in log.ticks.iter().filter(|e| e.tick.patch > 9) {
         let made = |s: &&palpa_rt::StepRecord| s.step <= e.tick.patch && s.step % 9 < 3;
         let made = log.steps.iter().rev().find(made).unwrap();
-        assert_eq!(e.tick.patch_age, e.tick.now - made.sampled_at);
+        let age = e.tick.now - made.sampled_at;
+        assert_eq!(e.tick.patch_age.to_bits(), age.to_bits(), "{}", e.tick.tick);
         n_old += u32::from(made.step < e.tick.patch);
     }
     assert!(n_old > 100, "{n_old}");

@@ -9,7 +9,7 @@
 //! machine.
 
 use palpa_device::{HapticDevice, Latest};
-use palpa_rt::{Tissue, TissueInput};
+use palpa_rt::{Tissue, TissueInput, ahead};
 use palpa_servo::{
     DeviceState, ForceCommand, MAX_TOOLS, Pose, Servo, ServoParams, TickReport, Vec3,
 };
@@ -67,7 +67,7 @@ pub fn rehearse<T: Tissue>(
     let mut is_made = false;
     let mut job: Option<(u64, T::Done)> = None;
     let mut position = Vec3::zeros();
-    let mut stretch = Vec3::zeros();
+    let (mut stretch, mut velocity) = (Vec3::zeros(), Vec3::zeros());
     let mut step = 0;
     let mut ticks = Vec::with_capacity(n_ticks as usize);
     tissue.prepare();
@@ -88,14 +88,16 @@ pub fn rehearse<T: Tissue>(
                 tissue.install(done);
             }
             let tool = position + stretch;
+            let patch_period = every as f64 * period;
+            let pose = Pose::translation(tool.x, tool.y, tool.z);
             let input = TissueInput {
                 step,
                 tick,
                 sampled_at: now,
                 now,
-                dt: every as f64 * period,
-                period: every as f64 * period,
-                poses: [Pose::translation(tool.x, tool.y, tool.z); MAX_TOOLS],
+                dt: patch_period,
+                period: patch_period,
+                poses: [ahead(pose, &velocity, patch_period); MAX_TOOLS],
                 n_tools: 1,
             };
             let done = tissue.step(&input, &mut working);
@@ -110,7 +112,7 @@ pub fn rehearse<T: Tissue>(
         }
         let mut command = [ForceCommand::ZERO];
         let report = servo.tick(now, &[state], &mut patches, &mut command);
-        stretch = report.tools[0].stretch;
+        (stretch, velocity) = (report.tools[0].stretch, report.tools[0].velocity);
         // A device that is away cannot receive the command.
         let _ = device.write(now, &command[0]);
         ticks.push(RehearsalTick {

@@ -100,9 +100,13 @@ impl Pose<'_> {
         Vec3::from(self.tick.devices[0].tissue_force) != Vec3::zeros()
     }
 
+    /// Place of the tool in that tick, in the device's frame: that of the device, and the stretch of the
+    /// coupling along the force. The step itself looks ahead.
     fn position(&self) -> Vec3 {
-        let [x, y, z, ..] = self.step.positions;
-        Vec3::new(x, y, z)
+        let device = &self.tick.devices[0];
+        let force = Vec3::from(device.tissue_force);
+        let along = force.try_normalize(0.0).unwrap_or_default();
+        Vec3::from(device.position) + along * device.stretch
     }
 
     fn stop(&self, live: &LiveScene) -> Stop {
@@ -461,17 +465,17 @@ mod tests {
                 is_there: true,
                 force: [0.0, 0.0, force],
                 tissue_force: [0.0, 0.0, force],
+                position: [0.0, 0.0, -1e-4 * n as f64],
                 ..DeviceRecord::default()
             };
             log.ticks.push(entry);
             if n.is_multiple_of(2) {
-                let mut step = StepRecord {
+                let step = StepRecord {
                     step: n / 2,
                     tick: n,
                     sampled_at: now,
                     ..StepRecord::default()
                 };
-                step.positions[2] = -1e-4 * n as f64;
                 log.steps.push(step);
             }
         }

@@ -10,7 +10,7 @@
 //! the machine does not count, since CPU time is measured; nor do waits.
 
 use palpa::live::{LiveScene, LiveTissue, once_from, open_device, servo_params};
-use palpa::rt::{StepStatus, Tissue, TissueInput, empty_patch, thread_cpu};
+use palpa::rt::{StepStatus, Tissue, TissueInput, ahead, empty_patch, thread_cpu};
 use palpa_device::{Latest, Path, Scripted};
 use palpa_fem::PosedTool;
 use palpa_mesh::Vec3;
@@ -107,7 +107,7 @@ pub fn drive(scene: &Scene, live: &LiveScene, takes: StepTime) -> anyhow::Result
         duration: path.duration(),
         ..Driven::default()
     };
-    let mut stretch = Vec3::zeros();
+    let (mut stretch, mut velocity) = (Vec3::zeros(), Vec3::zeros());
     let mut command = [ForceCommand::ZERO];
     let n = ((BEGIN + path.duration()) / PERIOD).ceil() as u64;
     for tick in 0..n {
@@ -116,9 +116,9 @@ pub fn drive(scene: &Scene, live: &LiveScene, takes: StepTime) -> anyhow::Result
         let state = read(&mut device, now);
         let position = state.pose.translation.vector;
         let tool = position + stretch;
-        run.steps(tick, now, tool, &mut driven);
+        run.steps(tick, now, (tool, velocity), &mut driven);
         let report = servo.tick(now, &[Some(state)], &mut run.patches, &mut command);
-        stretch = report.tools[0].stretch;
+        (stretch, velocity) = (report.tools[0].stretch, report.tools[0].velocity);
         if now >= BEGIN {
             let frame = &live.scene_from_device.rotation;
             driven.felt.push(Felt {
@@ -200,8 +200,8 @@ impl Loop {
         }
     }
 
-    /// The steps that begin before the next tick, with the tool of this one.
-    fn steps(&mut self, tick: u64, now: f64, tool: Vec3, driven: &mut Driven) {
+    /// The steps that begin before the next tick, with the tool of this one: its place and velocity.
+    fn steps(&mut self, tick: u64, now: f64, tool: (Vec3, Vec3), driven: &mut Driven) {
         while self.free_at < now + PERIOD {
             let start = self.free_at.max(now);
             // Its memory is the working patch's: an earlier one is handed over before.
@@ -232,7 +232,14 @@ impl Loop {
         }
     }
 
-    fn one_step(&mut self, tick: u64, now: f64, start: f64, tool: Vec3, driven: &mut Driven) {
+    fn one_step(
+        &mut self,
+        tick: u64,
+        now: f64,
+        start: f64,
+        (tool, velocity): (Vec3, Vec3),
+        driven: &mut Driven,
+    ) {
         let elapsed = start - self.last_start;
         self.last_start = start;
         self.period += 0.1 * (elapsed.min(LONGEST) - self.period);
@@ -244,7 +251,11 @@ impl Loop {
             now: start,
             dt: elapsed.min(LONGEST),
             period: self.period,
-            poses: [Pose::translation(tool.x, tool.y, tool.z); MAX_TOOLS],
+            poses: [ahead(
+                Pose::translation(tool.x, tool.y, tool.z),
+                &velocity,
+                self.period,
+            ); MAX_TOOLS],
             n_tools: 1,
         };
         let clock = thread_cpu();
