@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod bench;
+mod fast_hands;
 mod faults;
 mod lump_stroke;
 mod moving;

@@ -86,7 +86,7 @@ pub struct Driven {
     pub n_behind: usize,
     /// Steps with contact that did not converge.
     pub n_unfinished: usize,
-    /// Steps whose patch was held back.
+    /// Steps without a new patch.
     pub n_failed: usize,
     /// The force in each tick from the beginning of the motion.
     pub felt: Vec<Felt>,

@@ -15,7 +15,7 @@ mod places;
 mod row;
 
 pub use cases::{ShippedCase, Variant, shipped_cases};
-pub use drive::{Driven, Felt, Part, drive};
+pub use drive::{Driven, Felt, Part, StepTime, drive};
 pub use measure::{MeasureParams, measure};
 pub use places::{Spot, draw_spots};
 pub use row::ShippedRow;
