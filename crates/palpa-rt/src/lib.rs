@@ -105,5 +105,7 @@ pub use replay::{ForceDifference, ReplayParams, ReplayReport, Verdict, replay, r
 pub use servo_loop::{LoopStats, ServoLoop, TickEntry};
 pub use smoothness::{ForceReport, ForceStats};
 pub use threads::{Granted, Priority, Wish, lock_memory};
-pub use tissue::{StepStatus, Tissue, TissueInput, TissueStep, ahead, empty_patch, patch_hash};
+pub use tissue::{
+    StepStatus, Tissue, TissueInput, TissueStep, ahead, empty_patch, patch_hash, stamp,
+};
 pub use tissue_thread::{TissueParams, TissueStats};

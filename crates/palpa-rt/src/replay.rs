@@ -6,8 +6,8 @@ use crate::{
     machine::{Difference, Effect, Machine},
     record::{DeviceRecord, StepRecord},
     servo_loop::TickEntry,
-    tissue::{Tissue, TissueInput, empty_patch},
-    tissue_thread::{spoil, stamp, step_record},
+    tissue::{Tissue, TissueInput, empty_patch, stamp},
+    tissue_thread::{spoil, step_record},
 };
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use palpa_servo::{ContactPatch, DeviceState, ForceCommand, MAX_TOOLS, PatchSource, Pose, Servo};

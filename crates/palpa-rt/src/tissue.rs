@@ -146,6 +146,13 @@ pub trait Tissue: Send {
     fn job_failed(&mut self);
 }
 
+/// Writes the stamps of a patch, which the tissue does not know.
+pub fn stamp(patch: &mut ContactPatch, input: &TissueInput, result: &TissueStep) {
+    patch.id = input.step;
+    patch.sampled_at = result.kept_from.unwrap_or(input.sampled_at);
+    patch.period = input.period;
+}
+
 /// A boxed patch that was never written (`id` 0); its memory is allocated and touched.
 #[expect(
     clippy::large_stack_arrays,

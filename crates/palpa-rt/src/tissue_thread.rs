@@ -7,7 +7,7 @@ use crate::{
     histogram::Histogram,
     mailbox::{Reader, Writer},
     record::StepRecord,
-    tissue::{StepStatus, Tissue, TissueInput, TissueStep, ahead, patch_hash},
+    tissue::{StepStatus, Tissue, TissueInput, TissueStep, ahead, patch_hash, stamp},
 };
 use palpa_servo::{ContactPatch, MAX_TOOLS, Pose, Vec3};
 use rtrb::{Consumer, Producer};
@@ -336,13 +336,6 @@ pub(crate) fn run_background<T: Tissue>(
             rest(Duration::from_millis(20));
         }
     }
-}
-
-/// Writes the stamps that the engine knows and the tissue does not.
-pub(crate) fn stamp(patch: &mut ContactPatch, input: &TissueInput, result: &TissueStep) {
-    patch.id = input.step;
-    patch.sampled_at = result.kept_from.unwrap_or(input.sampled_at);
-    patch.period = input.period;
 }
 
 /// Causes the fault of [`FaultHooks::spoil_patches`].

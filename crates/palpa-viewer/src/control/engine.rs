@@ -175,9 +175,9 @@ pub enum StepResult {
     Unfinished,
     /// The step did not reach the poses of the tools.
     Behind,
-    /// The forces are not fit to be felt yet; the patch is not published.
+    /// The forces are not fit to be felt yet; the last patch serves on.
     Settling,
-    /// There is no usable state; the patch is not published.
+    /// There is no usable state; the last patch serves on.
     Failed,
 }
 

@@ -21,10 +21,10 @@ pub struct LiveTissue {
     tolerance: f64,
     /// The tools with their poses at the last step; kept to reuse its memory.
     posed: Vec<PosedTool>,
-    /// The local model of the last step that is fit to be felt, with the number of its mesh and the
-    /// time at which its poses were taken, s; `None` before the first.
+    /// The local model of the last step that is fit to be felt, and the number of its mesh.
     local: LocalModel,
     local_mesh: u64,
+    /// The time at which its poses were taken, s; `None` before the first such step.
     local_from: Option<f64>,
     last: Option<LiveReport>,
     watch: Option<Watch>,

@@ -9,7 +9,7 @@
 //! machine.
 
 use palpa_device::{HapticDevice, Latest};
-use palpa_rt::{Tissue, TissueInput, ahead};
+use palpa_rt::{Tissue, TissueInput, ahead, stamp};
 use palpa_servo::{
     DeviceState, ForceCommand, MAX_TOOLS, Pose, Servo, ServoParams, TickReport, Vec3,
 };
@@ -101,7 +101,7 @@ pub fn rehearse<T: Tissue>(
                 n_tools: 1,
             };
             let done = tissue.step(&input, &mut working);
-            (working.id, working.sampled_at, working.period) = (step, now, input.period);
+            stamp(&mut working, &input, &done);
             is_made = done.status.has_patch();
             each_step(tissue, &input, &done);
             if job.is_none()

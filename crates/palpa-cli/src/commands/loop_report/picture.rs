@@ -95,7 +95,7 @@ fn missing(log: &Log) -> Vec<[f64; 2]> {
     let behind = log
         .steps
         .iter()
-        .filter(|s| s.n_contacts > 0 && (s.status >= StepStatus::Behind as u8));
+        .filter(|s| s.n_contacts > 0 && s.status >= StepStatus::Behind as u8);
     let behind = behind.map(|s| [s.now, s.now + s.wall]);
     let stale = log.ticks.iter().filter(|t| {
         let bits = u16::try_from(t.tick.faults).unwrap_or(0);

@@ -9,8 +9,7 @@ pub enum StepOutcome {
     /// is that of the place reached.
     Behind,
     /// The step was cut short because tissue would have turned inside out, or it ended far from
-    /// equilibrium, or its matrix had to be changed before it could be factored. The next steps
-    /// continue from here. The local model must not be rendered.
+    /// equilibrium, or the contact did not settle. The next steps continue from here. The local model must not be rendered.
     BackedOff,
     /// The step was discarded. The state is the last good one, or rest after several failures in a
     /// row, and the tools are followed more slowly from there.

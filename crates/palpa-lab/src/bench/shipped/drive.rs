@@ -10,7 +10,7 @@
 //! the machine does not count, since CPU time is measured; nor do waits.
 
 use palpa::live::{LiveScene, LiveTissue, once_from, open_device, servo_params};
-use palpa::rt::{StepStatus, Tissue, TissueInput, ahead, empty_patch, thread_cpu};
+use palpa::rt::{StepStatus, Tissue, TissueInput, ahead, empty_patch, stamp, thread_cpu};
 use palpa_device::{Latest, Path, Scripted};
 use palpa_fem::PosedTool;
 use palpa_mesh::Vec3;
@@ -265,9 +265,7 @@ impl Loop {
         let result = self.tissue.step(&input, &mut self.working);
         let work = self.job.is_none().then(|| self.tissue.take_job()).flatten();
         let time = self.time_of_step(clock);
-        let sampled_at = result.kept_from.unwrap_or(now);
-        (self.working.id, self.working.sampled_at) = (self.step, sampled_at);
-        self.working.period = self.period;
+        stamp(&mut self.working, &input, &result);
         let end = start + time;
         self.ready_at = result.is_published().then_some(end);
         self.free_at = end.max(start + SHORTEST);
