@@ -14,13 +14,20 @@ pub struct Model {
     pub kind: ModelKind,
     /// Share of the deviatoric strain that two paired prisms average, 0 to 0.95. A larger share is
     /// softer and more accurate on a coarse mesh, but a node that is pressed alone can then move
-    /// against its neighbours.
-    pub alpha: f64,
+    /// against its neighbours. `None` is [automatic](Self::alpha).
+    pub alpha: Option<f64>,
     /// Whether inertia and damping are included.
     pub dynamics: Dynamics,
     /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
     /// forces in the body.
     pub tolerance: f64,
+}
+
+impl Model {
+    /// Share of the deviatoric strain that two paired prisms average, as given or by default: 0.8.
+    pub fn alpha(&self) -> f64 {
+        self.alpha.unwrap_or(0.8)
+    }
 }
 
 /// The models of the body.

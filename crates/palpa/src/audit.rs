@@ -270,5 +270,7 @@ fn finer(scene: &Scene, at: Vec3) -> Scene {
     scene.press.depth = scene.press.depth.min(1e-3);
     scene.mesh.refine = true;
     scene.mesh.max_vertices = MOST_NODES;
+    // That of the loop is for wide triangles.
+    scene.model.alpha = None;
     scene
 }

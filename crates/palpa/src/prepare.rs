@@ -197,7 +197,7 @@ impl Prepared {
             return Ok(Arc::clone(model));
         }
         let params = ModelParams {
-            alpha: self.scene.model.alpha,
+            alpha: self.scene.model.alpha(),
         };
         let model = Model::build(&self.mesh.body, &self.materials, &self.supports, params)?;
         Ok(Arc::clone(self.model.get_or_init(|| Arc::new(model))))

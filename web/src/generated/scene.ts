@@ -43,7 +43,6 @@ export interface components {
             /**
              * @description The model of the body.
              * @default {
-             *       "alpha": 0.8,
              *       "dynamics": "quasi-static",
              *       "kind": "tissue",
              *       "tolerance": 0.00001
@@ -382,7 +381,7 @@ export interface components {
              */
             near_lumps?: string;
             /**
-             * @description Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, 0.4 times in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
+             * @description Wanted length of edges and height of levels under the tool (at the rim of a disc), 0.1 mm to 100 mm. Default: a quarter of the contact radius (0.3 times it under a box, 0.45 times in real time), at most 0.8 times the edge radius, limited to 0.5 mm to 10 mm. A node has no default.
              * @example 1.5 mm
              */
             near_tool?: string;
@@ -398,8 +397,7 @@ export interface components {
         ModelTable: {
             /**
              * Format: double
-             * @description Share of the strain that two paired prisms average, 0 to 0.95. A larger share is softer and more accurate on a coarse mesh, but a node that is pressed alone can then move against its neighbours. Default: 0.8.
-             * @default 0.8
+             * @description Share of the strain that two paired prisms average, 0 to 0.95. A larger share is softer and more accurate on a coarse mesh, but a node that is pressed alone can then move against its neighbours. Default: 0.8; in real time, where triangles are wide, 0.65.
              */
             alpha?: number;
             /** @description Damping in addition to relaxation; only with dynamics = "implicit". Default: none. */

@@ -5,7 +5,6 @@ use palpa_sparse::fronts::{
     Exterior, FactorScratch, Half, SolveScratch, back_substitute_to, substitute,
 };
 use palpa_sparse::{Block, ColumnPattern};
-use pulp::{Simd, WithSimd};
 
 use super::plan::{Plan, Trouble};
 use crate::batch::{Batches, Tangent};
@@ -62,7 +61,7 @@ impl Outside {
             *x += right;
         }
         if has_moved {
-            subtract_symmetric(self.factor.schur(), n, moves, ring);
+            self.factor.subtract_response(moves, ring);
         }
     }
 
@@ -276,57 +275,6 @@ impl Workshop {
             blocks: vec![[0.0; 9]; pattern.n_blocks() + 1],
             scratch: FactorScratch::new(&plan.tree, Half::Exterior),
             x: vec![0.0; model.structure.n_dofs()],
-        }
-    }
-}
-
-/// `y −= A x` for a symmetric matrix given by its lower triangle, column by column.
-fn subtract_symmetric(a: &[f32], n: usize, x: &[f32], y: &mut [f32]) {
-    pulp::Arch::new().dispatch(SubtractSymmetric { a, n, x, y });
-}
-
-// A struct, so that it is compiled for the machine's vectors: a closure is not always inlined where
-// it is called.
-struct SubtractSymmetric<'a> {
-    a: &'a [f32],
-    n: usize,
-    x: &'a [f32],
-    y: &'a mut [f32],
-}
-
-#[expect(
-    clippy::inline_always,
-    reason = "what runs in the machine's vectors must be compiled with their instructions, in their caller"
-)]
-impl WithSimd for SubtractSymmetric<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self { a, n, x, y } = self;
-        for j in 0..n {
-            let column = &a[j * n + j + 1..(j + 1) * n];
-            let factor = x[j];
-            let (_, below) = y.split_at_mut(j + 1);
-            let mut lanes = [0.0_f32; 16];
-            let chunks = column.len() / 16 * 16;
-            for (k, (a, x)) in column[..chunks]
-                .chunks_exact(16)
-                .zip(x[j + 1..].chunks_exact(16))
-                .enumerate()
-            {
-                let y = &mut below[16 * k..16 * k + 16];
-                for i in 0..16 {
-                    y[i] -= a[i] * factor;
-                    lanes[i] += a[i] * x[i];
-                }
-            }
-            let mut sum: f32 = lanes.iter().sum();
-            for k in chunks..column.len() {
-                below[k] -= column[k] * factor;
-                sum += column[k] * x[j + 1 + k];
-            }
-            y[j] -= a[j * n + j] * factor + sum;
         }
     }
 }

@@ -2,10 +2,19 @@
 //! neighbours.
 
 use std::collections::{HashMap, VecDeque};
+use std::f64::consts::SQRT_2;
 
 use super::RefineParams;
 use super::origin::Origins;
 use crate::{Surface, Vec3};
+
+/// Sizes above the wanted one by less than this factor are not too large.
+const ROUNDING: f64 = 1.0 + 1e-9;
+/// Where triangles may be divided into two, the size of a triangle is twice the root of its area, the longest
+/// side of a right triangle with equal legs; of a slender one, this share of its longest side.
+const SLENDER: f64 = 0.75;
+/// Sides of at least this share of the longest one may be divided.
+const LONG_SIDE: f64 = 0.8;
 
 /// A triangle of the forest.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +25,8 @@ struct Tree {
     depth: u32,
     /// Whether it was divided. If not, it is a leaf.
     is_split: bool,
-    /// Whether it is larger than wanted.
-    is_too_large: bool,
+    /// Its size as a multiple of the wanted one.
+    excess: f64,
 }
 
 /// Divided triangles over a skin. The leaves obey two rules, so that the green closure exists and
@@ -39,6 +48,8 @@ pub(super) struct Forest {
     /// Leaves that are larger than wanted, level by level, so that a limit omits the finest
     /// divisions.
     wanted: VecDeque<u32>,
+    /// See [`RefineParams::divides_in_two`].
+    divides_in_two: bool,
 }
 
 impl Forest {
@@ -52,6 +63,7 @@ impl Forest {
             leaf_of: HashMap::with_capacity(3 * skin.triangles.len()),
             forced: Vec::new(),
             wanted: VecDeque::new(),
+            divides_in_two: false,
         };
         for (t, &corners) in skin.triangles.iter().enumerate() {
             forest.plant(corners, t as u32, 0);
@@ -65,6 +77,7 @@ impl Forest {
         params: &RefineParams,
         wanted: impl Fn(u32, &[Vec3; 3]) -> f64,
     ) {
+        self.divides_in_two = params.divides_in_two;
         for leaf in 0..self.trees.len() as u32 {
             self.measure(leaf, &wanted);
         }
@@ -85,12 +98,73 @@ impl Forest {
             // The rules take precedence over the limit of depth. If a leaf is forced beyond it, its
             // neighbours are at the limit.
             let breaks_rule = self.breaks_rule(tree.corners);
-            if breaks_rule || (tree.is_too_large && tree.depth < params.max_depth) {
+            if breaks_rule || (tree.excess > self.limit() && tree.depth < params.max_depth) {
                 for child in self.split(leaf) {
                     self.measure(child, &wanted);
                 }
             }
         }
+        if self.divides_in_two {
+            self.bisect(params);
+        }
+    }
+
+    /// Multiple of the wanted size from which a leaf is divided into four.
+    fn limit(&self) -> f64 {
+        if self.divides_in_two {
+            SQRT_2 * ROUNDING
+        } else {
+            1.0
+        }
+    }
+
+    /// Divides leaves that are still larger than wanted into two, the largest first.
+    fn bisect(&mut self, params: &RefineParams) {
+        let is_large = |tree: &Tree| !tree.is_split && tree.excess > ROUNDING;
+        let mut large: Vec<u32> = (0..self.trees.len() as u32)
+            .filter(|&leaf| is_large(&self.trees[leaf as usize]))
+            .collect();
+        large.sort_by(|&a, &b| {
+            let excess = |leaf: u32| self.trees[leaf as usize].excess;
+            excess(b).total_cmp(&excess(a))
+        });
+        for leaf in large {
+            if self.points.len() >= params.max_vertices {
+                break;
+            }
+            let corners = self.trees[leaf as usize].corners;
+            if (0..3).any(|k| self.middle(corners, k).is_some()) {
+                self.trees[leaf as usize].excess /= SQRT_2;
+                continue;
+            }
+            let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
+            let lengths = sides.map(|side| self.length(side));
+            let longest = lengths.into_iter().fold(0.0, f64::max);
+            // Of the long sides, the one whose other triangle wants to be divided too.
+            let other_wants = |[a, b]: [u32; 2]| {
+                let Some(&other) = self.leaf_of.get(&[b, a]) else {
+                    return false;
+                };
+                let other = &self.trees[other as usize];
+                other.excess > ROUNDING && (0..3).all(|k| self.middle(other.corners, k).is_none())
+            };
+            let key = |k: usize| (other_wants(sides[k]), lengths[k]);
+            let best = (0..3)
+                .filter(|&k| lengths[k] >= LONG_SIDE * longest)
+                .max_by(|&a, &b| {
+                    let (a, b) = (key(a), key(b));
+                    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+                });
+            if let Some(k) = best {
+                let [a, b] = sides[k];
+                self.trees[leaf as usize].excess /= SQRT_2;
+                self.add_middle([a.min(b), a.max(b)]);
+            }
+        }
+    }
+
+    fn length(&self, [a, b]: [u32; 2]) -> f64 {
+        (self.points[a as usize] - self.points[b as usize]).norm()
     }
 
     /// The conforming triangles, in the order of the old ones, and the index of each one's old
@@ -98,19 +172,25 @@ impl Forest {
     pub(super) fn triangles(&self) -> (Vec<[u32; 3]>, Vec<u32>) {
         let mut found = Vec::with_capacity(self.trees.len() + self.trees.len() / 4);
         for tree in self.trees.iter().filter(|tree| !tree.is_split) {
-            let halved = (0..3).find_map(|k| Some((k, self.middle(tree.corners, k)?)));
-            match halved {
-                None => found.push((tree.root, tree.corners)),
-                Some((k, m)) => {
-                    let [a, b, c] = [0, 1, 2].map(|s| tree.corners[(k + s) % 3]);
-                    found.push((tree.root, [a, m, c]));
-                    found.push((tree.root, [m, b, c]));
-                }
-            }
+            self.close(tree.root, tree.corners, &mut found);
         }
         // A stable sort keeps the parts of one triangle in the order of their creation.
         found.sort_by_key(|(root, _)| *root);
         found.into_iter().map(|(root, t)| (t, root)).unzip()
+    }
+
+    /// Divides a triangle at the longest of its divided sides, and its halves likewise.
+    fn close(&self, root: u32, corners: [u32; 3], found: &mut Vec<(u32, [u32; 3])>) {
+        let divided = (0..3).filter_map(|k| Some((k, self.middle(corners, k)?)));
+        let length = |k: usize| self.length([corners[k], corners[(k + 1) % 3]]);
+        let longest = divided.max_by(|(j, _), (k, _)| length(*j).total_cmp(&length(*k)));
+        let Some((k, m)) = longest else {
+            found.push((root, corners));
+            return;
+        };
+        let [a, b, c] = [0, 1, 2].map(|s| corners[(k + s) % 3]);
+        self.close(root, [a, m, c], found);
+        self.close(root, [m, b, c], found);
     }
 
     /// The origin of each vertex, the old vertices first.
@@ -138,7 +218,7 @@ impl Forest {
     }
 
     pub(super) fn n_too_large(&self) -> usize {
-        let is_left = |tree: &&Tree| !tree.is_split && tree.is_too_large;
+        let is_left = |tree: &&Tree| !tree.is_split && tree.excess > ROUNDING;
         self.trees.iter().filter(is_left).count()
     }
 
@@ -157,7 +237,7 @@ impl Forest {
             root,
             depth,
             is_split: false,
-            is_too_large: false,
+            excess: 0.0,
         });
         for k in 0..3 {
             let edge = [corners[k], corners[(k + 1) % 3]];
@@ -172,13 +252,26 @@ impl Forest {
 
     /// Adds a leaf to the list if it is larger than wanted.
     fn measure(&mut self, leaf: u32, wanted: &impl Fn(u32, &[Vec3; 3]) -> f64) {
+        let limit = self.limit();
         let tree = &mut self.trees[leaf as usize];
         let corners = tree.corners.map(|v| self.points[v as usize]);
         let longest = (0..3)
             .map(|k| (corners[(k + 1) % 3] - corners[k]).norm())
             .fold(0.0, f64::max);
-        tree.is_too_large = longest > wanted(tree.root, &corners);
-        if tree.is_too_large {
+        let size = if self.divides_in_two {
+            let [a, b, c] = corners;
+            let area = 0.5 * (b - a).cross(&(c - a)).norm();
+            (2.0 * area.sqrt()).max(SLENDER * longest)
+        } else {
+            longest
+        };
+        let wanted = wanted(tree.root, &corners);
+        tree.excess = if wanted <= 0.0 {
+            f64::INFINITY
+        } else {
+            size / wanted
+        };
+        if tree.excess > limit {
             self.wanted.push_back(leaf);
         }
     }
@@ -237,11 +330,7 @@ impl Forest {
         if let Some(&m) = self.middles.get(&edge) {
             return m;
         }
-        let m = self.points.len() as u32;
-        let middle = (self.points[from as usize] + self.points[to as usize]) * 0.5;
-        self.points.push(middle);
-        self.ends.push(edge);
-        self.middles.insert(edge, m);
+        let m = self.add_middle(edge);
         let beyond = self.leaf_of.get(&[to, from]).copied().or_else(|| {
             let [whole_from, whole_to] = self.whole(from, to)?;
             self.leaf_of.get(&[whole_to, whole_from]).copied()
@@ -251,6 +340,16 @@ impl Forest {
         {
             self.forced.push(leaf);
         }
+        m
+    }
+
+    /// Adds the vertex at the midpoint of an edge, smaller end first.
+    fn add_middle(&mut self, edge: [u32; 2]) -> u32 {
+        let m = self.points.len() as u32;
+        let [a, b] = edge.map(|v| self.points[v as usize]);
+        self.points.push((a + b) * 0.5);
+        self.ends.push(edge);
+        self.middles.insert(edge, m);
         m
     }
 

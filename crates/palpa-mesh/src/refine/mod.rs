@@ -17,6 +17,10 @@
 //! forest are all similar to their ancestors. The green triangles only close it and are never
 //! refined themselves, so that angles do not get worse with the number of rounds. To refine
 //! further, or elsewhere, start again from the body as it was grown.
+//!
+//! Red triangles have half the edges of their parents, and four times the vertices. If asked, triangles
+//! that are too large by less than √2 are divided into two at the end, at a long side that their
+//! neighbour divides as well: twice the vertices.
 
 mod forest;
 mod imprint;
@@ -44,6 +48,10 @@ pub struct RefineParams {
     pub max_vertices: usize,
     /// How often a triangle of the skin may be divided into four.
     pub max_depth: u32,
+    /// Whether a triangle that is too large by less than a factor of √2 is divided into two instead. Its
+    /// size is then not its longest edge but twice the root of its area, which is the same in a right
+    /// triangle with equal legs, and at least 0.75 times its longest edge.
+    pub divides_in_two: bool,
 }
 
 impl Default for RefineParams {
@@ -51,6 +59,7 @@ impl Default for RefineParams {
         Self {
             max_vertices: 100_000,
             max_depth: 10,
+            divides_in_two: false,
         }
     }
 }

@@ -173,6 +173,59 @@ fn limbs_stay_sound_when_refined_near_a_place() {
 }
 
 #[test]
+fn triangles_that_are_a_little_too_large_are_divided_into_two() {
+    let halving = RefineParams {
+        divides_in_two: true,
+        ..RefineParams::default()
+    };
+    // Right triangles with legs of 10 mm, or 5 mm once divided into four.
+    let body = patch(9, 9, 0.01, &[0.0, 0.01], &[0]);
+    for (wanted, parts) in [
+        (14.2e-3, 1),
+        (12e-3, 2),
+        (9.5e-3, 4),
+        (6e-3, 8),
+        (5.1e-3, 8),
+    ] {
+        let refined = refine(&body, &halving, |_, _| wanted);
+        assert_faithful(&body, &refined);
+        assert_eq!(refined.n_too_large, 0, "{wanted}");
+        assert_eq!(refined.parents.len(), 128 * parts, "{wanted}");
+        assert!((smallest_angle(&refined.body.skin) - 45.0).abs() < 1e-9);
+    }
+    let shallow = RefineParams {
+        max_depth: 1,
+        ..halving
+    };
+    let refined = refine(&body, &shallow, |_, _| 1e-3);
+    assert_eq!(refined.n_too_large, 128 * 4);
+
+    let (arm, bones) = forearm(14e-3, 1.0);
+    let body = grown(&arm, &bones);
+    let place = [body.skin.points[body.n_vertices() / 2]];
+    let mut n_vertices = Vec::new();
+    for h in [
+        6e-3, 5e-3, 4.2e-3, 3.5e-3, 3e-3, 2.5e-3, 2.1e-3, 1.75e-3, 1.5e-3,
+    ] {
+        let size = near_points(&place, 15e-3, h, 0.5);
+        let refined = refine(&body, &halving, &size);
+        assert_faithful(&body, &refined);
+        assert_eq!(refined.n_too_large, 0);
+        let angle = smallest_angle(&refined.body.skin);
+        println!("{h} m: {} vertices, {angle:.1}°", refined.body.n_vertices());
+        assert!(angle > 0.45 * smallest_angle(&body.skin), "{angle}°");
+        n_vertices.push(refined.body.n_vertices() as f64);
+    }
+    // No step is as large as that of triangles divided into four.
+    let steps = n_vertices.windows(2).map(|pair| pair[1] / pair[0]);
+    let largest = steps.fold(0.0, f64::max);
+    assert!(
+        largest < 2.2 && n_vertices[8] > 3.0 * n_vertices[0],
+        "{n_vertices:?}"
+    );
+}
+
+#[test]
 fn a_level_split_divides_the_same_body() {
     let (arm, bones) = forearm(8e-3, 1.0);
     let body = grown(&arm, &bones);

@@ -34,7 +34,10 @@ impl Reader<'_> {
         };
         Ok(Model {
             kind: model.kind,
-            alpha: at.key("alpha").within(model.alpha, &limits::ALPHA)?,
+            alpha: match model.alpha {
+                None => None,
+                Some(alpha) => Some(at.key("alpha").within(alpha, &limits::ALPHA)?),
+            },
             dynamics,
             tolerance: at
                 .key("tolerance")

@@ -92,7 +92,10 @@ fn everything_is_understood_and_survives_being_written() {
             stiffness: 1e-3
         })
     );
-    assert_eq!((scene.model.alpha, scene.model.tolerance), (0.7, 1e-6));
+    assert_eq!(
+        (scene.model.alpha, scene.model.tolerance),
+        (Some(0.7), 1e-6)
+    );
     let mesh = Mesh {
         refine: false,
         coarsen: Some(true),
@@ -289,7 +292,7 @@ fn a_scene_of_old_has_the_defaults_of_the_continuum() {
     let scene = Scene::embedded();
     assert_eq!(scene.model.kind, ModelKind::Tissue);
     assert_eq!(scene.model.dynamics, Dynamics::QuasiStatic);
-    assert_eq!((scene.model.alpha, scene.model.tolerance), (0.8, 1e-5));
+    assert_eq!((scene.model.alpha(), scene.model.tolerance), (0.8, 1e-5));
     assert!(scene.lumps.is_empty() && scene.press.speeds.is_empty());
     assert_eq!(scene.press.cycles, 1);
     assert_eq!(scene.mesh.near_tool_of(&scene.tool), Some(2e-3));

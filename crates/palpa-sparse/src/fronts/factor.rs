@@ -20,6 +20,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Number;
+use super::solve::subtract_symmetric;
 use super::tree::{Front, FrontPair, Half, Tree};
 use crate::Singular;
 use crate::blocks::Block;
@@ -129,6 +130,19 @@ impl<T: Number> Exterior<T> {
             }
         }
         Ok(())
+    }
+
+    /// Subtracts the exterior's answer to displacements of the ring from a right side there. Cost:
+    /// quadratic in the size of the ring.
+    ///
+    /// # Panics
+    /// If there are not as many numbers as unknowns on the ring.
+    pub fn subtract_response(&self, displacements: &[T], right: &mut [T]) {
+        assert!(
+            displacements.len() == right.len() && self.schur.len() == right.len().pow(2),
+            "one displacement and one force per unknown of the ring"
+        );
+        subtract_symmetric(&self.schur, displacements, right);
     }
 
     /// The exterior's Schur complement on the ring: its lower triangle, column-major.

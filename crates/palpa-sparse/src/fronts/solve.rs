@@ -285,6 +285,49 @@ impl<T: Number, const FORWARD: bool> WithSimd for Pass<'_, T, FORWARD> {
 /// them. A column of nodes has three unknowns per node, so the last group may be smaller.
 const TOGETHER: usize = 4;
 
+/// `y −= A x` for a symmetric matrix given by its lower triangle, column by column.
+pub(super) fn subtract_symmetric<T: Number>(a: &[T], x: &[T], y: &mut [T]) {
+    pulp::Arch::new().dispatch(SubtractSymmetric { a, x, y });
+}
+
+// A struct, so that it is compiled for the machine's vectors: a closure is not always inlined where
+// it is called.
+struct SubtractSymmetric<'a, T> {
+    a: &'a [T],
+    x: &'a [T],
+    y: &'a mut [T],
+}
+
+impl<T: Number> WithSimd for SubtractSymmetric<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { a, x, y } = self;
+        let size = x.len();
+        for j in (0..size).step_by(TOGETHER) {
+            let n = TOGETHER.min(size - j);
+            for p in j..j + n {
+                let column = &a[p * size..][..size];
+                y[p] -= column[p] * x[p];
+                for q in p + 1..j + n {
+                    y[q] -= column[q] * x[p];
+                    y[p] -= column[q] * x[q];
+                }
+            }
+            // The matrix is larger than the caches near the core: its columns are read once for both
+            // products.
+            let columns = std::array::from_fn(|k| &a[(j + k.min(n - 1)) * size..][..size][j + n..]);
+            let factors = std::array::from_fn(|k| if k < n { x[j + k] } else { T::default() });
+            let sums = T::dot_columns(simd, columns, &x[j + n..]);
+            T::subtract_columns(simd, columns, factors, &mut y[j + n..]);
+            for (y, sum) in y[j..j + n].iter_mut().zip(sums) {
+                *y -= sum;
+            }
+        }
+    }
+}
+
 #[inline(always)]
 fn forward<T: Number, S: Simd>(simd: S, panel: &[T], own: usize, x: &mut [T]) {
     let height = x.len();

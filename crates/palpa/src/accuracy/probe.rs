@@ -262,7 +262,7 @@ impl Probe {
         let prepared = &press.prepared;
         let supports = continuum::supports(prepared.scene.body.cut_faces, body, &mut Vec::new());
         let params = ModelParams {
-            alpha: prepared.scene.model.alpha,
+            alpha: prepared.scene.model.alpha(),
         };
         let pairs = pairs_in(press, part);
         let model = Model::build_like(body, &prepared.materials, &supports, params, &pairs)?;

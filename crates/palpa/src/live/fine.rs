@@ -75,7 +75,7 @@ impl FineScene {
         let body = self.coarse.fine_round(scene, place, self.radius);
         let supports = continuum::supports(scene.body.cut_faces, &body, &mut Vec::new());
         let params = ModelParams {
-            alpha: scene.model.alpha,
+            alpha: scene.model.alpha(),
         };
         Model::build(&body, &self.prepared.materials, &supports, params)
     }

@@ -61,7 +61,17 @@ pub const GOOD_TRAVEL: f64 = 0.2e-3;
 /// age limit of a patch.
 const MOST_NODES: usize = 80_000;
 /// Default length of the edges under the tool, as a share of its contact radius.
-pub const EDGE_SHARE: f64 = 0.4;
+pub const EDGE_SHARE: f64 = 0.45;
+/// The same for an accuracy of 2 %. Between the two levels have most of the error, and edges hardly change: with
+/// this power of the accuracy. Below and above, they change as all other sizes.
+const FINE_EDGE_SHARE: f64 = 0.4;
+const FINE: f64 = 0.02;
+const EDGE_EXPONENT: f64 = 0.29;
+/// Default height of the intervals at the skin, as a share of the contact radius.
+const LEVEL_SHARE: f64 = 0.4;
+/// Share of the strain that pairs average ([`palpa_scene::Model::alpha`]), where the scene gives none. Triangles
+/// are wide here, and pairs of them too soft: on a forearm the force is 1 to 2 % less with 0.8.
+const ALPHA: f64 = 0.65;
 /// Error of the force, as a share, that the default mesh is made for.
 pub const ACCURACY: f64 = 0.03;
 /// Distance between the points along the hand's way at which the body is refined, m.
@@ -213,25 +223,34 @@ impl LiveScene {
 }
 
 /// The scene with a coarser mesh than that of a scripted press, which may take its time, where it gives
-/// no sizes: edges of 0.4 contact radii under the tool that soon grow beside it, and levels as low as in
-/// a press. On a layered block the force is within 1.3 % past 2 mm of that on a mesh with edges of
-/// 0.15 contact radii. With half the growth of the edges it is the same; with one level less in soft fat,
-/// or one for the muscle, it is 2 to 3 % more. Prisms that a lump cuts have its share of the stiffness,
-/// so they need not be smaller than the lump. If the scene asks for an accuracy, all these sizes are
-/// smaller or larger. A skin from a file is coarsened where it is finer than that; one made by formula
-/// has the spacing that the scene asks for. Returns the sizes near the tool with it: intervals deeper
-/// than one and a half contact radii may be higher than in a press.
+/// no sizes: edges of 0.45 contact radii under the tool that soon grow beside it, and levels as low as in
+/// a press; docs/realtime.md has the errors. With half the growth of the edges they are the same; with one
+/// level less in soft fat, or one for the muscle, the force is 2 to 3 % more. Prisms that a lump cuts have
+/// its share of the stiffness, so they need not be smaller than the lump. If the scene asks for an accuracy,
+/// all these sizes are smaller or larger. A skin from a file is coarsened where it is finer than that; one
+/// made by formula has the spacing that the scene asks for. If the scene gives the length of the edges, its
+/// mesh is as in a press with the same growth. Returns the sizes near the tool with it: intervals deeper
+/// than one and a half contact radii may be a little higher than in a press.
 fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const EDGE_GROWTH: f64 = 1.2;
     const LUMP_SHARE: f64 = 1.5;
-    const DEEP: f64 = 1.6;
+    const DEEP: f64 = 1.2;
     let mut scene = scene.clone();
     let mesh = &mut scene.mesh;
     let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
     mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     let accuracy = mesh.accuracy.unwrap_or(ACCURACY);
-    let scale = (accuracy / ACCURACY).powf(1.0 / ORDER);
-    mesh.near_tool = mesh.near_tool_at(&scene.tool, scale * EDGE_SHARE);
+    let looser = accuracy / ACCURACY;
+    let scale = looser.powf(1.0 / ORDER);
+    let is_given = mesh.near_tool.is_some();
+    let height = mesh.near_tool_at(&scene.tool, scale * LEVEL_SHARE);
+    let edge = (EDGE_SHARE * looser.powf(EDGE_EXPONENT))
+        .min(FINE_EDGE_SHARE * (accuracy / FINE).powf(1.0 / ORDER))
+        .max(EDGE_SHARE * scale);
+    mesh.near_tool = mesh.near_tool_at(&scene.tool, edge);
+    if !is_given {
+        scene.model.alpha.get_or_insert(ALPHA);
+    }
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
     if mesh.growth.is_none() {
         mesh.growth = Some(EDGE_GROWTH);
@@ -246,10 +265,15 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     // coarsened.
     let n_levels = 1 + scene.layers.iter().map(|l| l.levels).sum::<usize>();
     mesh.max_vertices = mesh.max_vertices.min(MOST_NODES / n_levels + 1);
-    let mut sizes = Sizes::of(&scene);
-    if let Some(sizes) = sizes.as_mut().filter(|_| !is_graded) {
-        sizes.levels.far = DEEP;
-    }
+    let sizes = Sizes::of(&scene).map(|mut sizes| {
+        sizes.levels.h = height.unwrap_or(sizes.levels.h);
+        sizes.divides_in_two = !is_given;
+        sizes.two_on_bone = !is_given;
+        if !is_graded {
+            sizes.levels.far = DEEP;
+        }
+        sizes
+    });
     (scene, sizes)
 }
 

@@ -44,6 +44,9 @@ const DEVIATION_OF_THICKNESS: f64 = 0.02;
 /// through the whole body.
 const SPARED: f64 = 1.05;
 
+/// The share of an interval that leaves two parts of it, rounding included.
+const HALF: f64 = 0.501;
+
 /// Arguments: index of an interval, and two places in it as shares of its height. Returns the
 /// largest wanted height between them, m.
 type LevelWish = Box<dyn Fn(usize, f64, f64) -> f64>;
@@ -108,6 +111,12 @@ pub struct Sizes {
     pub skin: Graded,
     /// Heights of the intervals between levels, by depth.
     pub levels: Graded,
+    /// Whether triangles that are a little too large are divided into two instead of four
+    /// ([`RefineParams::divides_in_two`]).
+    pub divides_in_two: bool,
+    /// Whether a layer on the bone has two intervals at least where the tool is near it: between bone and
+    /// tool one is up to 8 % too stiff, however thin.
+    pub two_on_bone: bool,
 }
 
 impl Sizes {
@@ -146,6 +155,8 @@ impl Sizes {
                 growth: below * of_levels,
                 ..graded
             },
+            divides_in_two: false,
+            two_on_bone: false,
         }
     }
 }
@@ -347,7 +358,7 @@ fn refine_near(
         });
     }
     fine.extend(over_lumps(scene, body, lumps, notes));
-    refined(scene, body, &fine)
+    refined(scene, body, &fine, sizes)
 }
 
 /// Points of the skin that the tool presses at a place and along its way, `h` apart or less, and the
@@ -403,9 +414,10 @@ pub(crate) fn coarsening(
 }
 
 /// The body refined as requested, if the scene allows refinement.
-fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine]) -> Refined {
+fn refined(scene: &Scene, body: &LayeredBody, fine: &[Fine], sizes: Option<Sizes>) -> Refined {
     let params = RefineParams {
         max_vertices: scene.mesh.max_vertices,
+        divides_in_two: sizes.is_some_and(|sizes| sizes.divides_in_two),
         ..RefineParams::default()
     };
     let wish = |fine: &Fine| {
@@ -501,7 +513,7 @@ impl CoarseBody {
             size: sizes.skin,
             is_rim: false,
         }));
-        refined(scene, &self.body, &fine).body
+        refined(scene, &self.body, &fine, self.sizes).body
     }
 }
 
@@ -633,6 +645,7 @@ fn split_near(
         return (body, true);
     }
     let mut wishes: Vec<LevelWish> = Vec::new();
+    let mut on_bone = false;
     let mut wish = |depths: Vec<f64>, depth: f64, radius: f64, size: Graded| {
         let beyond = near_depth(depth, radius, 0.0, 1.0);
         let size = size.looser(SPARED);
@@ -641,6 +654,7 @@ fn split_near(
     };
     if let Some(sizes) = sizes {
         let depths = mean_depths(&body, &[place.vertex as u32]);
+        on_bone = sizes.two_on_bone && is_whole_layer_near(&body, &depths, sizes.levels.border);
         wish(depths, 0.0, 0.0, sizes.levels);
     }
     if !lumps.is_empty() {
@@ -659,17 +673,28 @@ fn split_near(
             }
         }
     }
+    let n = body.n_levels - 1;
     let wanted = |i: usize, from: f64, to: f64| {
-        wishes
-            .iter()
+        let most = if on_bone && i + 1 == n {
+            HALF
+        } else {
+            f64::INFINITY
+        };
+        (wishes.iter())
             .map(|wish| wish(i, from, to))
-            .fold(f64::INFINITY, f64::min)
+            .fold(most, f64::min)
     };
-    let (parts, is_met) = parts_for(body.n_levels - 1, wanted, MOST_LEVELS);
+    let (parts, is_met) = parts_for(n, wanted, MOST_LEVELS);
     if parts.iter().all(|heights| heights.len() == 1) {
         return (body, is_met);
     }
     (split_levels(&body, &parts).body, is_met)
+}
+
+/// Whether the lowest interval, below one of these depths (m), is a whole layer and begins above `border`, m.
+fn is_whole_layer_near(body: &LayeredBody, depths: &[f64], border: f64) -> bool {
+    let (n, layers) = (body.n_levels - 1, &body.interval_layer);
+    depths[n - 1] < border && (n == 1 || layers[n - 1] != layers[n - 2])
 }
 
 /// The skin that a disc holds. If the body may be refined, the disc's edge becomes a ring of

@@ -176,8 +176,7 @@ impl Live {
     fn due(&self) -> Option<Due> {
         let ring = self.first_ring_dof();
         let reaches_ring = self
-            .problem
-            .pressing()
+            .pressing_firmly()
             .any(|c| self.plan.tree.first_dof(c.vertex as usize) >= ring);
         let radius = self.plan.radius;
         let centres = self.next_centres();

@@ -10,6 +10,10 @@ use crate::posed_tool::PosedTool;
 
 /// Residuals are relative to the tools' force, but at least to this force, N.
 const LEAST_FORCE: f64 = 0.01;
+/// A vertex with less than this share of its tool's force hardly presses. Zones that need not contain such
+/// vertices are so much smaller that steps take a quarter less time; with 0.01 they take less still, but the
+/// force of the moving step is then 0.3 to 0.4 % off instead of 0.1 to 0.2 %.
+const FIRM: f64 = 0.005;
 
 /// The place where tools press.
 pub(super) struct Pressed {
@@ -44,7 +48,18 @@ impl Live {
         })
     }
 
-    /// Largest distance of a pressing vertex from the centre of its tool, m.
+    /// The pressing candidates, without those that hardly do. At the rim of a contact, a vertex bears
+    /// little, and less than its share of a zone that contains it costs.
+    pub(super) fn pressing_firmly(&self) -> impl Iterator<Item = &Candidate> {
+        (0..self.course.tools.len()).flat_map(|tool| {
+            let own = self.problem.pressing();
+            let own = own.filter(move |c| c.tool as usize == tool);
+            let least = FIRM * own.clone().map(|c| c.pressure).sum::<f64>();
+            own.filter(move |c| c.pressure > least)
+        })
+    }
+
+    /// Largest distance of a vertex that presses firmly from the centre of its tool, m.
     pub(super) fn contact_radius(&self, centres: &Centres) -> f64 {
         self.radius_where(centres, |_| true)
     }
@@ -57,7 +72,7 @@ impl Live {
 
     fn radius_where(&self, centres: &Centres, keep: impl Fn(&Candidate) -> bool) -> f64 {
         let points = &self.model.body.skin.points;
-        let pressing = self.problem.pressing().filter(|c| keep(c));
+        let pressing = self.pressing_firmly().filter(|c| keep(c));
         pressing
             .map(|c| (points[c.vertex as usize] - centres.of(c.tool as usize)).norm())
             .fold(0.0, f64::max)

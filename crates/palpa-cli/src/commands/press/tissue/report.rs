@@ -89,7 +89,7 @@ pub(super) fn facts(scene: &Scene, indentation: &Indentation) -> PressFacts {
         n_prisms: mesh.body.n_prisms(),
         n_single_triangles: model.n_single_triangles(),
         is_resolved: mesh.is_resolved,
-        alpha: scene.model.alpha,
+        alpha: scene.model.alpha(),
         is_viscous: indentation.is_viscous,
         is_dynamic: indentation.is_dynamic(),
     }
