@@ -14,7 +14,7 @@ pub struct Model {
     pub kind: ModelKind,
     /// Share of the deviatoric strain that two paired prisms average, 0 to 0.95. A larger share is
     /// softer and more accurate on a coarse mesh, but a node that is pressed alone can then move
-    /// against its neighbours. `None` is [automatic](Self::alpha).
+    /// against its neighbours. `None` is [automatic](Self::alpha()).
     pub alpha: Option<f64>,
     /// Whether inertia and damping are included.
     pub dynamics: Dynamics,

@@ -69,7 +69,7 @@ const FINE: f64 = 0.02;
 const EDGE_EXPONENT: f64 = 0.29;
 /// Default height of the intervals at the skin, as a share of the contact radius.
 const LEVEL_SHARE: f64 = 0.4;
-/// Share of the strain that pairs average ([`palpa_scene::Model::alpha`]), where the scene gives none. Triangles
+/// Share of the strain that pairs average ([`palpa_scene::Model::alpha()`]), where the scene gives none. Triangles
 /// are wide here, and pairs of them too soft: on a forearm the force is 1 to 2 % less with 0.8.
 const ALPHA: f64 = 0.65;
 /// Error of the force, as a share, that the default mesh is made for.
