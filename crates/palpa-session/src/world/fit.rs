@@ -2,14 +2,13 @@
 //! goes.
 
 use palpa::Note;
-use palpa::live::EDGE_SHARE;
 use palpa_scene::{ContactShape, ContactTool, ModelKind, Scene, Tool};
 
-/// Least edge length under the tool if the scene gives none, m. With finer meshes the engine would
-/// not keep pace with a hand.
+/// Least edge length under the tool if the scene gives none, as a share of the contact radius and in m.
+/// With finer meshes, which tools of a few millimetres and rounded edges ask for, the engine would not keep
+/// pace with a hand.
+const EDGE_SHARE: f64 = 0.4;
 const LEAST_EDGE: f64 = 3e-3;
-/// Edge length in lumps if the scene gives none, m.
-const NEAR_LUMPS: f64 = 6e-3;
 /// Radius of the sphere that replaces a single held node, m.
 const LEAST_TOOL: f64 = 5e-3;
 
@@ -40,16 +39,12 @@ pub(super) fn fit_for_touch(scene: &Scene, notes: &mut Vec<Note>) -> Scene {
         scene.tool = tool;
     }
     scene.mesh.moves |= scene.mesh.refine;
-    let usual = scene.mesh.near_tool_of(&scene.tool);
-    if scene.mesh.refine && scene.mesh.near_tool.is_none() {
-        let fine = (EDGE_SHARE * scene.tool.contact_radius()).max(LEAST_EDGE);
-        scene.mesh.near_tool = Some(fine);
-        if usual.is_some_and(|usual| 1.5 * usual < fine) {
-            notes.push(Note::CoarserForTouch { edge: fine });
-        }
-    }
-    if scene.mesh.near_lumps.is_none() {
-        scene.mesh.near_lumps = Some(NEAR_LUMPS);
+    let least = (EDGE_SHARE * scene.tool.contact_radius()).max(LEAST_EDGE);
+    let mesh = &mut scene.mesh;
+    let usual = mesh.near_tool_at(&scene.tool, EDGE_SHARE);
+    if mesh.refine && usual.is_some_and(|usual| usual < least) && mesh.near_tool.is_none() {
+        mesh.near_tool = Some(least);
+        notes.push(Note::CoarserForTouch { edge: least });
     }
     scene
 }

@@ -144,11 +144,6 @@ impl<T: Number> Exterior<T> {
         );
         subtract_symmetric(&self.schur, displacements, right);
     }
-
-    /// The exterior's Schur complement on the ring: its lower triangle, column-major.
-    pub fn schur(&self) -> &[T] {
-        &self.schur
-    }
 }
 
 /// The factor of the columns of the zone.

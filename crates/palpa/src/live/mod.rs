@@ -61,7 +61,7 @@ pub const GOOD_TRAVEL: f64 = 0.2e-3;
 /// age limit of a patch.
 const MOST_NODES: usize = 80_000;
 /// Default length of the edges under the tool, as a share of its contact radius.
-pub const EDGE_SHARE: f64 = 0.45;
+const EDGE_SHARE: f64 = 0.45;
 /// The same for an accuracy of 2 %. Between the two levels have most of the error, and edges hardly change: with
 /// this power of the accuracy. Below and above, they change as all other sizes.
 const FINE_EDGE_SHARE: f64 = 0.4;
