@@ -36,6 +36,12 @@ impl Outside {
         }
     }
 
+    /// Fits it to the exterior of another zone, which must be factored before it is used.
+    pub(super) fn fit(&mut self, plan: &Plan) {
+        self.plan = plan.id;
+        self.factor.fit(&plan.tree);
+    }
+
     /// Adds the exterior's force on the ring, at these displacements, to a right side. Cost:
     /// quadratic in the size of the ring.
     pub(super) fn push(
@@ -276,5 +282,10 @@ impl Workshop {
             scratch: FactorScratch::new(&plan.tree, Half::Exterior),
             x: vec![0.0; model.structure.n_dofs()],
         }
+    }
+
+    /// Fits it to the exterior of another zone.
+    pub(super) fn fit(&mut self, plan: &Plan) {
+        self.scratch.fit(&plan.tree, Half::Exterior);
     }
 }

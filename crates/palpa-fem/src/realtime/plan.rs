@@ -101,14 +101,15 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// The zone of all columns whose skin vertex at rest is within `radius` of one of `centres`, with
-    /// whole triangles near them.
+    /// The zone of all columns whose skin vertex at rest is within `radius` of one of `centres`, with whole
+    /// triangles near them, and with all neighbours of those within `inner`, which so are not of the ring.
+    /// Both in m.
     pub(super) fn new(
         model: &Model,
         pattern: &ColumnPattern,
         id: u64,
         centres: Centres,
-        radius: f64,
+        [inner, radius]: [f64; 2],
     ) -> Result<Self, TooLarge> {
         let points = &model.body.skin.points;
         let mut is_inside: Vec<bool> = points
@@ -127,6 +128,10 @@ impl Plan {
                     is_inside[v as usize] = true;
                 }
             }
+        }
+        let within = (0..points.len()).filter(|&v| centres.distance(&points[v]) <= inner);
+        for &neighbour in within.flat_map(|v| pattern.neighbours(v)) {
+            is_inside[neighbour as usize] = true;
         }
         if !is_inside.contains(&true) {
             is_inside.fill(true);

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::Number;
 use super::solve::subtract_symmetric;
-use super::tree::{Front, FrontPair, Half, Tree};
+use super::tree::{Front, FrontPair, Half, Threads, Tree};
 use crate::Singular;
 use crate::blocks::Block;
 
@@ -38,6 +38,7 @@ const LEAST_ENTRY: f64 = 1e-3;
 
 /// Scratch memory for factoring; its contents do not matter between calls.
 pub struct FactorScratch<T> {
+    threads: Threads,
     updates: Vec<T>,
     /// For the trunk, then for each branch if branches are factored at the same time.
     memory: Vec<MemBuffer>,
@@ -55,22 +56,43 @@ impl<T> std::fmt::Debug for FactorScratch<T> {
 impl<T: Number> FactorScratch<T> {
     /// Scratch memory for one half of a tree.
     pub fn new(tree: &Tree, half: Half) -> Self {
-        Self {
-            updates: vec![T::default(); tree.scratch[half as usize]],
-            memory: vec![memory_for::<T>(tree, tree.range(half))],
-            raised: Raised::new(tree, half),
-        }
+        Self::with(tree, half, Threads::One, Vec::new())
     }
 
     /// Scratch memory for one half of a tree whose branches are factored at the same time, by the
     /// threads of rayon's pool. The result is the same to the bit.
     pub fn in_parallel(tree: &Tree, half: Half) -> Self {
-        let mut scratch = Self::new(tree, half);
-        let branches = tree.branches[half as usize].iter();
-        scratch
-            .memory
-            .extend(branches.map(|branch| memory_for::<T>(tree, branch.clone())));
-        scratch
+        Self::with(tree, half, Threads::Several, Vec::new())
+    }
+
+    /// Fits it to one half of another tree. Its memory is kept where it is enough.
+    pub fn fit(&mut self, tree: &Tree, half: Half) {
+        let updates = std::mem::take(&mut self.updates);
+        *self = Self::with(tree, half, self.threads, updates);
+    }
+
+    fn with(tree: &Tree, half: Half, threads: Threads, mut updates: Vec<T>) -> Self {
+        at_least(&mut updates, tree.scratch(half, threads));
+        let mut memory = vec![memory_for::<T>(tree, tree.range(half))];
+        if threads == Threads::Several {
+            let branches = tree.branches[half as usize].iter();
+            memory.extend(branches.map(|branch| memory_for::<T>(tree, branch.clone())));
+        }
+        Self {
+            threads,
+            updates,
+            memory,
+            raised: Raised::new(tree, half),
+        }
+    }
+}
+
+/// Makes a vector longer if it is shorter than `n`. What is in it does not matter.
+fn at_least<T: Number>(numbers: &mut Vec<T>, n: usize) {
+    if numbers.len() < n {
+        // Nothing is copied to a new place.
+        numbers.clear();
+        numbers.resize(n, T::default());
     }
 }
 
@@ -99,6 +121,14 @@ impl<T: Number> Exterior<T> {
         }
     }
 
+    /// Fits it to the exterior of another tree, which must be factored before it is used. Memory is kept
+    /// where it is enough.
+    pub fn fit(&mut self, tree: &Tree) {
+        at_least(&mut self.panels, tree.panels[Half::Exterior as usize]);
+        let ring = tree.ring.len() * tree.width;
+        self.schur.resize(ring * ring, T::default());
+    }
+
     /// Factors the exterior of the matrix made of `blocks`. The blocks must not contain the zone's
     /// own part: a ring block holds only the exterior's share.
     ///
@@ -125,7 +155,8 @@ impl<T: Number> Exterior<T> {
         for front in &tree.fronts[tree.range(Half::Exterior)] {
             if front.parent.is_none() {
                 let size = front.border.len() * tree.width;
-                let update = &scratch.updates[front.update..][..size * size];
+                let at = front.update(scratch.threads);
+                let update = &scratch.updates[at..][..size * size];
                 add_update(tree.width, &front.to_parent, update, 0, &mut self.schur, n);
             }
         }
@@ -236,13 +267,15 @@ fn eliminate_half<T: Number>(
 ) -> Result<(), Singular> {
     let branches = &tree.branches[half as usize];
     let FactorScratch {
+        threads,
         updates,
         memory,
         raised,
     } = scratch;
+    let threads = *threads;
     raised.n = 0;
     let (trunk_memory, branch_memory) = memory.split_at_mut(1);
-    let is_parallel = branch_memory.len() == branches.len() && branches.len() > 1 && !may_raise;
+    let is_parallel = threads == Threads::Several && branches.len() > 1 && !may_raise;
     if is_parallel {
         let rooms = rooms(tree, branches, panels, updates, branch_memory);
         (rooms.into_par_iter().zip(branches)).try_for_each(|(mut room, branch)| {
@@ -252,6 +285,7 @@ fn eliminate_half<T: Number>(
         })?;
     }
     let mut room = Room {
+        threads,
         panels,
         first_panel: 0,
         updates,
@@ -272,6 +306,7 @@ fn eliminate_half<T: Number>(
 
 /// Memory in which some fronts are factored.
 struct Room<'a, T> {
+    threads: Threads,
     panels: &'a mut [T],
     /// Index of the first of these panels' numbers among those of the half.
     first_panel: usize,
@@ -357,7 +392,7 @@ fn rooms<'a, T>(
                 * b;
             let end = (fronts
                 .iter()
-                .map(|f| f.update + (f.border.len() * b).pow(2)))
+                .map(|f| f.update(Threads::Several) + (f.border.len() * b).pow(2)))
             .fold(update, usize::max);
             let (_, rest) = std::mem::take(&mut panels).split_at_mut(first_panel - panel);
             let (own, rest) = rest.split_at_mut(n_panels);
@@ -365,6 +400,7 @@ fn rooms<'a, T>(
             let (own_updates, rest) = std::mem::take(&mut updates).split_at_mut(end - update);
             updates = rest;
             let room = Room {
+                threads: Threads::Several,
                 panels: own,
                 first_panel,
                 updates: own_updates,
@@ -393,7 +429,11 @@ fn eliminate<T: Number>(
     let (own, border) = (front.own.len() * b, front.border.len() * b);
     let height = own + border;
     let panel = &mut room.panels[front.panel - room.first_panel..][..height * own];
-    let update_of = |front: &Front| front.update.saturating_sub(room.first_update);
+    let threads = room.threads;
+    let update_of = |front: &Front| {
+        let at = front.update(threads);
+        at.saturating_sub(room.first_update)
+    };
     if let Some(raised) = &mut room.raised {
         raised.share = 0.0;
     }
@@ -551,7 +591,10 @@ fn add_update_wide<T: Number>(
                     .take_while(|&(k, &row)| row as usize == start + k)
                     .count();
                 let row = (start - first) * b;
-                let (from, into) = (&from[i * b..][..run * b], &mut into[row..][..run * b]);
+                // Above the diagonal is what was in the memory before.
+                let above = if i == j { jj } else { 0 };
+                let from = &from[i * b..][..run * b][above..];
+                let into = &mut into[row..][..run * b][above..];
                 for (into, &from) in into.iter_mut().zip(from) {
                     *into += from;
                 }

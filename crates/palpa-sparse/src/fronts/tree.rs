@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::dissect::{Part, dissect};
+use super::dissect::{Part, dissect, ranks};
 use crate::TooLarge;
 use crate::blocks::ColumnPattern;
 
@@ -25,6 +25,15 @@ pub enum Half {
     Zone,
 }
 
+/// How many threads factor a half; their updates are at other places in the scratch memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Threads {
+    /// One, which uses the memory of an update again as soon as it has been added.
+    One,
+    /// Several, each with memory of its own.
+    Several,
+}
+
 /// Columns that are eliminated together, and the later columns that they touch or fill.
 #[derive(Debug)]
 pub(super) struct Front {
@@ -44,12 +53,17 @@ pub(super) struct Front {
     /// Index of the first number of its panel, among those of its half. A panel has
     /// `(own + border) × own` blocks of columns.
     pub(super) panel: usize,
-    /// Index of the first number of its update, in the scratch memory of its half. An update has
-    /// `border × border` blocks of columns.
-    pub(super) update: usize,
+    /// Index of the first number of its update in the scratch memory of its half, for one thread and
+    /// for several. An update has `border × border` blocks of columns.
+    update: [usize; 2],
 }
 
 impl Front {
+    /// Index of the first number of its update in the scratch memory of its half.
+    pub(super) fn update(&self, threads: Threads) -> usize {
+        self.update[threads as usize]
+    }
+
     /// Multiplications for factoring this front, with `width` unknowns in a column.
     fn flops(&self, width: usize) -> f64 {
         let (s, r) = (
@@ -91,9 +105,10 @@ pub struct Tree {
     /// Number of unknowns in a column.
     pub(super) width: usize,
     pub(super) n_levels: usize,
-    /// Sizes of panels and scratch memory, in numbers: exterior, then zone.
+    /// Sizes of panels, in numbers: exterior, then zone.
     pub(super) panels: [usize; 2],
-    pub(super) scratch: [usize; 2],
+    /// Sizes of scratch memory, in numbers, for one thread and for several: exterior, then zone.
+    scratch: [[usize; 2]; 2],
     /// Subtrees of each half that can be factored at the same time; see [`Self::find_branches`].
     pub(super) branches: [Vec<Range<usize>>; 2],
     /// Whether a front is in no branch. `[n_fronts]`
@@ -131,15 +146,15 @@ impl Tree {
         let exterior = set(&|c| !zone[c]);
         let within = set(&|c| zone[c] && !is_ring(c));
         let ring = set(&|c| is_ring(c));
-        let mut side = vec![0; n];
+        let mut ranks = ranks(n);
         let mut parts = Vec::new();
         if !exterior.is_empty() {
-            dissect(pattern, places, exterior, &mut side, &mut parts);
+            dissect(pattern, places, exterior, &mut ranks, &mut parts);
         }
         let n_exterior = parts.len();
         let ring_len = ring.len();
         if !within.is_empty() {
-            dissect(pattern, places, within, &mut side, &mut parts);
+            dissect(pattern, places, within, &mut ranks, &mut parts);
         }
         if ring_len > 0 {
             let children = (parts.len() > n_exterior).then(|| parts.len() - 1);
@@ -180,7 +195,7 @@ impl Tree {
                 to_parent: Vec::new(),
                 pairs: Vec::new(),
                 panel: 0,
-                update: 0,
+                update: [0; 2],
             });
         }
         let ring = (n - ring_len) as u32..n as u32;
@@ -224,7 +239,7 @@ impl Tree {
             width,
             n_levels: pattern.n_levels(),
             panels: [0; 2],
-            scratch: [0; 2],
+            scratch: [[0; 2]; 2],
             branches: [Vec::new(), Vec::new()],
             is_trunk: Vec::new(),
             flops: [0.0; 2],
@@ -273,15 +288,18 @@ impl Tree {
                 front.panel = self.panels[h];
                 self.panels[h] += own * (own + border);
             }
+            self.take_updates(h, Threads::One, self.range(half));
             let branches = self.find_branches(half);
             for branch in &branches {
                 self.is_trunk[branch.clone()].fill(false);
-                self.take_updates(h, branch.clone());
+                self.take_updates(h, Threads::Several, branch.clone());
             }
             let trunk = self.range(half).filter(|&f| self.is_trunk[f]);
-            self.take_updates(h, trunk.collect::<Vec<_>>().into_iter());
+            let trunk = trunk.collect::<Vec<_>>().into_iter();
+            self.take_updates(h, Threads::Several, trunk);
             self.branches[h] = branches;
-            if self.panels[h] > MOST_NUMBERS || self.scratch[h] > MOST_NUMBERS {
+            let largest = self.scratch.iter().map(|of_halves| of_halves[h]);
+            if largest.chain([self.panels[h]]).any(|n| n > MOST_NUMBERS) {
                 return Err(TooLarge {
                     n_dofs: self.order.len() * b,
                 });
@@ -292,18 +310,19 @@ impl Tree {
 
     /// Gives fronts, in the order of elimination, their scratch memory after all that has been
     /// given in this half. Memory of updates of other fronts is not reused.
-    fn take_updates(&mut self, half: usize, fronts: impl Iterator<Item = usize>) {
-        let b = self.width;
-        let start = self.scratch[half];
+    fn take_updates(&mut self, half: usize, threads: Threads, fronts: impl Iterator<Item = usize>) {
+        let (b, t) = (self.width, threads as usize);
+        let start = self.scratch[t][half];
         let mut free: Vec<Range<usize>> = Vec::new();
         for f in fronts {
             let size = (self.fronts[f].border.len() * b).pow(2);
-            self.fronts[f].update = take(&mut free, size, &mut self.scratch[half]);
+            self.fronts[f].update[t] = take(&mut free, size, &mut self.scratch[t][half]);
             for c in self.fronts[f].children.clone() {
                 let child = &self.fronts[c as usize];
                 let size = (child.border.len() * b).pow(2);
-                if child.update >= start {
-                    give(&mut free, child.update..child.update + size);
+                let at = child.update[t];
+                if at >= start {
+                    give(&mut free, at..at + size);
                 }
             }
         }
@@ -339,6 +358,11 @@ impl Tree {
         }
         roots.sort_unstable();
         roots.iter().map(|&f| first[f]..f + 1).collect()
+    }
+
+    /// Size of the scratch memory of a half, in numbers.
+    pub(super) fn scratch(&self, half: Half, threads: Threads) -> usize {
+        self.scratch[threads as usize][half as usize]
     }
 
     /// The fronts of a half, in the order of elimination.

@@ -13,8 +13,16 @@ use crate::batch::History;
 use crate::law::Prony;
 use crate::model::Model;
 
-/// Growth factor of the zone's radius when vertices of its ring press.
+/// Radius of a zone at least, as a multiple of that of the contact: it may grow until the zone is ready.
 const ZONE_GROWTH: f64 = 1.3;
+/// Radius within which no vertex is of the ring, as a multiple of that of the contact on its way until the
+/// next zone.
+const INNER: f64 = 1.1;
+/// Where the next zone's centre lies, in ways that the tools go until it is ready. So they are as far behind
+/// it when the zone comes as they will be ahead of it when the one after it does.
+const AHEAD: f64 = 1.5;
+/// The longest such way, as a share of the zone's radius: hands may turn.
+const LONGEST_AHEAD: f64 = 0.5;
 /// Time after which a linear exterior with viscous memory should be updated, as a share of its
 /// shortest relaxation time; and the limits of that time, s.
 const LAG_SHARE: f64 = 0.5;
@@ -92,9 +100,8 @@ impl Jobs {
 
 /// A job that is due.
 struct Due {
-    /// Centres at rest (m) and radius (m) of a new zone; `None` for a new factor of the present
-    /// exterior.
-    zone: Option<(Centres, f64)>,
+    /// Centres at rest and radii of a new zone, m; `None` for a new factor of the present exterior.
+    zone: Option<(Centres, [f64; 2])>,
     /// Indentation, m.
     depth: f64,
 }
@@ -130,14 +137,10 @@ impl Live {
             self.jobs.age = 0;
             self.jobs.depth_at_factor = depth;
             job.id = self.jobs.n_asked;
-            job.target = zone.map(|(centres, radius)| {
+            job.target = zone.map(|(centres, radii)| {
                 self.jobs.n_zones += 1;
                 let id = self.jobs.n_zones;
-                Target {
-                    id,
-                    centres,
-                    radius,
-                }
+                Target { id, centres, radii }
             });
             job.old = self.exterior.origin(&self.outside);
             job.lag = self.exterior.lag();
@@ -189,14 +192,10 @@ impl Live {
             return None;
         }
         let zone = (is_leaving || reaches_ring).then(|| {
-            let mut radius = self
-                .params
-                .zone_radius
-                .max(ZONE_GROWTH * self.contact_radius(&centres));
-            if reaches_ring && !is_leaving {
-                radius = radius.max(ZONE_GROWTH * self.plan.radius);
-            }
-            (centres, radius)
+            let reach = self.reach();
+            let on_its_way = reach + (AHEAD - 1.0) * self.way().norm();
+            let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
+            (centres, [INNER * on_its_way, radius])
         });
         Some(Due { zone, depth })
     }
@@ -207,7 +206,7 @@ impl Live {
     }
 
     /// Centre at rest of a zone requested now, m: the middle of the vertices that a tool presses,
-    /// moved ahead by the distance that the tools will go until the zone is ready.
+    /// moved ahead by the distance that the tools will go until the zone is ready, and half of that.
     fn next_centre(&self, tool: usize) -> Vec3 {
         let Some(Pressed { middle, along }) = self.pressed_by(tool) else {
             let displacements = &self.state.displacements;
@@ -220,10 +219,15 @@ impl Live {
             }
             return nearest_point(&self.model, displacements, tools, None).1;
         };
-        let lead = self.course.drift * f64::from(self.jobs.latency);
-        let lead = lead - along * along.dot(&lead);
-        let most = self.params.leave * self.plan.radius;
-        middle + lead * (most / lead.norm()).min(1.0)
+        let way = self.way();
+        middle + (way - along * along.dot(&way)) * AHEAD
+    }
+
+    /// The way that the tools will go until a job requested now is done, m.
+    fn way(&self) -> Vec3 {
+        let way = self.course.drift * f64::from(self.jobs.latency);
+        let most = LONGEST_AHEAD * self.params.zone_radius;
+        way * (most / way.norm()).min(1.0)
     }
 
     /// Writes the memory of the prisms whose memory is updated in every step into a history.

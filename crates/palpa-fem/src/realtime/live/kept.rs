@@ -15,8 +15,6 @@ use crate::posed_tool::PosedTool;
 /// Iterations beyond the first of each step after which a new factor is cheaper: about the cost of a
 /// factor over that of an iteration.
 const MOST_EXTRA: usize = 8;
-/// Share of the forces out of balance that an iteration with a good factor leaves at most.
-const SLOW: f64 = 0.3;
 /// Share of the least gap of the triangles without candidates that the tools may go until the next
 /// search: the skin may come to meet them.
 const USABLE: f64 = 0.7;
@@ -97,10 +95,13 @@ impl Live {
         self.kept.has_factor && !self.kept.is_worn() && !self.springs.are_on()
     }
 
-    /// The kind of the next iteration of a step, whose last left `residual` after one with `before`.
-    pub(super) fn next_pass(&mut self, residual: f64, before: f64) -> Pass {
+    /// The kind of the next iteration of a step, whose last left `residual` after one with `before`; infinite
+    /// for the first. `left` more are allowed.
+    pub(super) fn next_pass(&mut self, residual: f64, before: f64, left: usize) -> Pass {
         self.kept.n_extra += 1;
-        if residual < ROUGH.min(SLOW * before) {
+        let rate = residual / before;
+        let will_do = residual * rate.powi(left as i32) <= self.params.tolerance;
+        if residual < ROUGH && will_do {
             Pass::Near
         } else {
             self.kept.n_extra = MOST_EXTRA;

@@ -156,7 +156,8 @@ impl Live {
         let mut state = come.state;
         let mut memory = Memory::new(&model);
         let n_zones = n_before + 1;
-        let plan = Plan::new(&model, &pattern, n_zones, centres, params.zone_radius)?;
+        let radii = [0.0, params.zone_radius];
+        let plan = Plan::new(&model, &pattern, n_zones, centres, radii)?;
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
         let mut room = Room::new(&model, &pattern, &plan, come.history.as_ref());
         let shop = &mut room.shop;

@@ -64,6 +64,12 @@ impl Live {
         self.radius_where(centres, |_| true)
     }
 
+    /// As [`Self::contact_radius`], from the middle of what each tool presses.
+    pub(super) fn reach(&self) -> f64 {
+        let middle = |tool| self.pressed_by(tool).map_or(Vec3::zeros(), |at| at.middle);
+        self.contact_radius(&Centres::new(self.course.tools.len(), middle))
+    }
+
     /// As [`Self::contact_radius`] in the present zone, without vertices outside it.
     pub(super) fn radius_inside(&self) -> f64 {
         let is_inside = |c: &Candidate| self.plan.is_inside[c.vertex as usize];

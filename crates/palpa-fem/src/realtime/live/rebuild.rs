@@ -45,8 +45,8 @@ pub(super) struct Target {
     pub(super) id: u64,
     /// Its centres at rest, m.
     pub(super) centres: Centres,
-    /// Its radius, m.
-    pub(super) radius: f64,
+    /// Its radii, m; see [`Plan::new`].
+    pub(super) radii: [f64; 2],
 }
 
 /// The arrays that go to the background with each job and come back with its result, so that the
@@ -128,6 +128,12 @@ impl Shop {
         }
     }
 
+    /// Takes the prisms of another zone's exterior, and makes room to factor it. Returns the old ones.
+    fn enter(&mut self, plan: &Plan, follower: Follower) -> Follower {
+        self.workshop.fit(plan);
+        std::mem::replace(&mut self.follower, follower)
+    }
+
     /// Factors an exterior at these displacements.
     pub(super) fn refactor(
         &mut self,
@@ -198,30 +204,26 @@ impl Rebuild {
         let Retired { outside, kept, .. } = std::mem::take(&mut room.retired);
         let plan = match self.target {
             None => Arc::clone(&self.plan),
-            Some(Target {
-                id,
-                centres,
-                radius,
-            }) => {
-                let plan = Plan::new(&model, &pattern, id, centres, radius);
+            Some(Target { id, centres, radii }) => {
+                let plan = Plan::new(&model, &pattern, id, centres, radii);
                 Arc::new(
                     plan.expect("a body that could be factored with one zone can be with another"),
                 )
             }
         };
         let is_new = self.target.is_some();
-        let mut old_shop = is_new.then(|| {
-            let shop = Shop::new(&model, &room.memory, &pattern, &plan);
-            std::mem::replace(&mut room.shop, shop)
+        let mut old = is_new.then(|| {
+            let new = Follower::new(&model, &room.memory, &pattern, &plan, Tangent::Single);
+            room.shop.enter(&plan, new)
         });
         let entering = self.settle(&mut room, &plan);
         if model.has_memory {
-            self.bring_up_memory(&mut room, old_shop.as_mut());
+            self.bring_up_memory(&mut room, old.as_mut());
         }
-        let recycled = outside.filter(|old| old.plan == plan.id);
-        let mut outside = recycled
+        let mut outside = outside
             .and_then(Arc::into_inner)
             .unwrap_or_else(|| Outside::new(&model, &plan));
+        outside.fit(&plan);
         outside.id = self.id;
         let Room {
             shop,
@@ -233,8 +235,8 @@ impl Rebuild {
         let result = shop.refactor(&mut outside, &model, memory, &pattern, &plan, displacements);
         let zone = (is_new && result.is_ok())
             .then(|| self.zone(memory, history.as_ref(), &plan, entering));
-        if let (Err(_), Some(old)) = (&result, old_shop) {
-            *shop = old;
+        if let (Err(_), Some(old)) = (&result, old) {
+            shop.enter(&self.plan, old);
         }
         let kept = (model.has_memory && !self.is_followed).then(|| {
             let recycled = kept.and_then(Arc::into_inner);
@@ -283,7 +285,7 @@ impl Rebuild {
 
     /// Updates the viscous memory of the exterior's prisms, and gives it to the shop; `old` is that
     /// of the present zone, if there is a new one.
-    fn bring_up_memory(&self, room: &mut Room, old: Option<&mut Shop>) {
+    fn bring_up_memory(&self, room: &mut Room, old: Option<&mut Follower>) {
         let Room {
             shop,
             memory,
@@ -295,7 +297,7 @@ impl Rebuild {
         if !self.is_followed {
             // Nothing else updates the memory of a linear exterior.
             memory.begin_materials(&self.model, self.lag);
-            let batches = &mut old.map_or(&mut *shop, |old| old).follower.batches;
+            let batches = &mut old.unwrap_or(&mut shop.follower).batches;
             batches.commit_lanes(memory, displacements);
             if let (true, Some(history)) = (is_new, &mut *history) {
                 batches.store(history);

@@ -119,7 +119,8 @@ impl Live {
             let pass = if report.iterations == 0 {
                 self.first_pass()
             } else {
-                self.next_pass(report.residual, before)
+                let left = self.params.max_iterations - report.iterations;
+                self.next_pass(report.residual, before, left)
             };
             before = if report.iterations == 0 {
                 f64::INFINITY
