@@ -496,7 +496,7 @@ fn a_body_at_rest_is_let_be_and_wakes_when_touched() {
         let away = at(tool, 0.0, 0.0, -5e-3);
         // Friction keeps what a step leaves out of balance, and two presses do not leave the same.
         let params = LiveParams {
-            tolerance: 2e-4,
+            tolerance: 5e-5,
             ..params(mode)
         };
         let mut live = Live::new(Arc::clone(&model), &away, params).unwrap();
