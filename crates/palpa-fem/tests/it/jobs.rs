@@ -100,6 +100,54 @@ fn after_jobs_that_are_lost_the_body_catches_up() {
     }
 }
 
+/// A zone is made for the place where the tool will be while it serves, so jobs may take as long as the tool
+/// needs for a third of the zone's radius.
+#[test]
+fn slow_jobs_make_their_zones_ahead_of_the_tool() {
+    const SLOW: usize = 30;
+    let model = model_of(25, false, None);
+    let tool = sphere(0.0);
+    let way = || {
+        (1..=240_u32).map(move |k| {
+            let down = f64::from(k.min(60)) / 60.0;
+            let along = f64::from(k.clamp(60, 200) - 60);
+            at(tool, -9e-3 + 0.13e-3 * along, 0.0, 3e-3 * down)
+        })
+    };
+    let start = at(tool, -9e-3, 0.0, -1e-3);
+    let forces = |late: usize| -> Vec<f64> {
+        let params = LiveParams {
+            zone_radius: 9e-3,
+            ..params(ExteriorMode::Linear)
+        };
+        let mut live = Live::new(Arc::clone(&model), &start, params).unwrap();
+        let (mut out, mut zone) = (None, 0);
+        let forces = way().enumerate().map(|(k, tools)| {
+            if let Some((_, done)) = out.take_if(|(due, _)| *due <= k) {
+                live.install(done);
+            }
+            let report = live.step(&tools, DT);
+            assert_eq!(
+                report.outcome,
+                StepOutcome::Arrived,
+                "{late}, {k}: {report:?}"
+            );
+            zone = report.zone;
+            if let Some(job) = live.take_job() {
+                out = Some((k + late, job.run()));
+            }
+            live.tool_force(0).z
+        });
+        let forces = forces.collect();
+        assert!(zone > 4, "{zone} zones");
+        forces
+    };
+    let (expected, found) = (forces(1), forces(SLOW));
+    let errors = expected.iter().zip(&found).skip(60);
+    let worst = errors.map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.03, "{worst}");
+}
+
 #[test]
 fn after_jobs_that_are_lost_the_mesh_moves_on() {
     for prony in [None, Some(prony())] {

@@ -371,6 +371,49 @@ fn the_work_of_a_zone_is_a_small_part_of_the_whole() {
     assert!(share < 0.15, "{share}");
 }
 
+/// The exterior surrounds its zone, whose ring is eliminated last: a short cut that leaves the whole ring on one
+/// side is a bad one. The shortest cuts near the middle need a quarter more.
+#[test]
+fn cuts_of_an_exterior_look_at_the_work_behind_them() {
+    let case = case(30, 30, 4, false, 5.0);
+    let tree = Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    let flops = tree.flops(Half::Exterior);
+    assert!(flops < 5.2e8, "{flops:e}");
+}
+
+#[test]
+fn memory_of_one_exterior_serves_another() {
+    let small = case(12, 12, 2, false, 4.5);
+    let large = case(12, 12, 2, false, 2.0);
+    let tree = |case: &Case| Tree::zone_last(&case.pattern, &case.places, &case.zone).unwrap();
+    let trees = [tree(&small), tree(&large), tree(&small)];
+    let mut reused = Exterior::<f64>::new(&trees[0]);
+    let mut scratch = FactorScratch::new(&trees[0], Half::Exterior);
+    for (case, tree) in [&small, &large, &small].into_iter().zip(&trees) {
+        let [inner, outer] = blocks(case, 2);
+        reused.fit(tree);
+        scratch.fit(tree, Half::Exterior);
+        reused.factor(tree, &outer, &mut scratch).unwrap();
+        let mut fresh = Exterior::<f64>::new(tree);
+        let mut own = FactorScratch::new(tree, Half::Exterior);
+        fresh.factor(tree, &outer, &mut own).unwrap();
+        let solved = [&reused, &fresh].map(|exterior| {
+            let (mut zone, mut solve) = (Zone::<f64>::new(tree), SolveScratch::new(tree));
+            let mut inside = FactorScratch::new(tree, Half::Zone);
+            zone.factor(tree, &inner, Some(exterior), &mut inside)
+                .unwrap();
+            let mut x = vec![1.0; case.pattern.n_dofs()];
+            substitute(tree, Half::Exterior, exterior, &mut x, &mut solve);
+            substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+            back_substitute(tree, Half::Zone, &zone, &mut x, &mut solve);
+            back_substitute(tree, Half::Exterior, exterior, &mut x, &mut solve);
+            x
+        });
+        assert_eq!(solved[0], solved[1]);
+        assert!(solved[0].iter().all(|x| x.is_finite() && *x != 1.0));
+    }
+}
+
 #[test]
 fn a_matrix_that_is_not_positive_definite_is_refused() {
     let case = case(6, 6, 2, false, 2.0);

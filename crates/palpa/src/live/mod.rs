@@ -50,10 +50,11 @@ use crate::skin::Skin;
 
 /// Radius of the zone as a multiple of contact radius plus depth, its least value as a multiple of what
 /// the tool presses, and its least value, m. The factor of the zone is most of the time of a step, so it
-/// is no larger than it must be: it contains the contact where the tool is on its way to the next zone.
-const ZONE_RADII: f64 = 0.8;
-const PRESSED_RADII: f64 = 1.35;
-const LEAST_ZONE: f64 = 12e-3;
+/// is no larger than it must be: it contains the contact where the tool is on its way to the next zone. With
+/// smaller ones steps are faster still, but forces are up to 5 % off where the exterior of a large body is late.
+const ZONE_RADII: f64 = 0.73;
+const PRESSED_RADII: f64 = 1.25;
+const LEAST_ZONE: f64 = 11e-3;
 /// Distance that a tool may move in one step of the tissue, m, so that the force at the device
 /// stays within about 2 % of the converged one: see "Force while moving" in docs/realtime.md.
 pub const GOOD_TRAVEL: f64 = 0.2e-3;

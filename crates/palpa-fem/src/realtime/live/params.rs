@@ -35,7 +35,7 @@ impl Default for LiveParams {
             reach: 1.5e-3,
             leave: 0.2,
             longest_move: 3e-3,
-            stale: 1e-3,
+            stale: 0.4e-3,
         }
     }
 }

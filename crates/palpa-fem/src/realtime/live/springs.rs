@@ -6,8 +6,9 @@ use super::Live;
 use super::report::LiveReport;
 
 /// First stiffness of the springs, relative to the skin's own stiffness; growth factor; largest
-/// value.
-const FIRST: f64 = 0.03;
+/// value. The contact problem takes their forces out again, so stiff ones cost no accuracy, and with soft
+/// ones a second factor may still not be positive definite.
+const FIRST: f64 = 1.0;
 const GROWTH: f64 = 3.0;
 const MOST: f64 = 10.0;
 /// Least and largest number of iterations before softer springs are tried. The number doubles each
