@@ -6,6 +6,7 @@ use palpa_mesh::Vec3;
 
 use super::super::plan::Centres;
 use super::kept::Kept;
+use super::params::LONGEST_AHEAD;
 use super::pressed::{Pressed, nearest_point};
 use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
 use super::{ExteriorMode, Live};
@@ -21,8 +22,6 @@ const INNER: f64 = 1.1;
 /// Where the next zone's centre lies, in ways that the tools go until it is ready. So they are as far behind
 /// it when the zone comes as they will be ahead of it when the one after it does.
 const AHEAD: f64 = 1.5;
-/// The longest such way, as a share of the zone's radius: hands may turn.
-const LONGEST_AHEAD: f64 = 0.5;
 /// Time after which a linear exterior with viscous memory should be updated, as a share of its
 /// shortest relaxation time; and the limits of that time, s.
 const LAG_SHARE: f64 = 0.5;

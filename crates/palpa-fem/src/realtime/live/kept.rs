@@ -100,7 +100,7 @@ impl Live {
     pub(super) fn next_pass(&mut self, residual: f64, before: f64, left: usize) -> Pass {
         self.kept.n_extra += 1;
         let rate = residual / before;
-        let will_do = residual * rate.powi(left as i32) <= self.params.tolerance;
+        let will_do = residual * rate.powf(left as f64) <= self.params.tolerance;
         if residual < ROUGH && will_do {
             Pass::Near
         } else {

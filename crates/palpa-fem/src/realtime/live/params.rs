@@ -1,5 +1,8 @@
 //! Parameters of the real-time step.
 
+/// The longest way of the tools for which a zone is made ahead of them, as a share of its radius: hands may turn.
+pub(super) const LONGEST_AHEAD: f64 = 0.5;
+
 /// Parameters of the real-time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveParams {
@@ -35,16 +38,16 @@ impl Default for LiveParams {
             reach: 1.5e-3,
             leave: 0.2,
             longest_move: 3e-3,
-            stale: 0.4e-3,
+            stale: 1e-3,
         }
     }
 }
 
 impl LiveParams {
-    /// Distance that a tool may go while a job is under way, m: out of the zone's centre, or as far
-    /// as the stiffness of a followed exterior is valid.
+    /// Distance that a tool may go while a job is under way, m: so far zones are made ahead of it. No farther
+    /// than the stiffness of a followed exterior is valid.
     pub fn longest_way(&self) -> f64 {
-        let way = self.leave * self.zone_radius;
+        let way = LONGEST_AHEAD * self.zone_radius;
         match self.exterior {
             ExteriorMode::Followed => way.min(self.stale),
             ExteriorMode::Linear => way,
