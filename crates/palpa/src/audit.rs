@@ -1,9 +1,10 @@
-//! The static force at poses of the loop, solved again on a mesh that is finer than the loop's: how
+//! The static force at poses of the loop, solved again on meshes that are finer than the loop's: how
 //! wrong the force of the loop is.
 //!
 //! ```text
-//!  poses of the tool ─► a mesh finer than the loop's round them ─► static steps along the way ─► forces
+//!  poses of the tool ─► two meshes finer than the loop's round them ─► static steps along the way ─► forces
 //! ```
+//! The second mesh has every interval halved, and a third of what that changes is added to its force.
 //! Tissue that neither relaxes nor rubs has one equilibrium at each pose, so each is pressed straight
 //! from above ([`Reference::press`]). Else the way to the pose matters, and
 //! [`Reference::follow`] goes it again in quasi-static steps.
@@ -11,15 +12,15 @@
 use std::sync::Arc;
 
 use palpa_fem::{Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
-use palpa_mesh::{SurfaceIndex, Vec3};
+use palpa_mesh::{Surface, SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Target};
 
 use crate::Prepared;
 use crate::build::{BuiltBody, nearest};
 use crate::press::mesh::{Sizes, along_skin};
 
-/// Edges and heights of a reference mesh under the tool, as a share of the contact radius: 1.3 mm for
-/// a ball of 10 mm. On a layered block the force at 5 mm is then 0.7 % above that with 0.9 mm.
+/// Edges of a reference mesh under the tool, as a share of the contact radius: 1.3 mm for a ball of 10 mm. On
+/// flat layers the force is then up to 1.1 % above an axisymmetric solution at 3 to 5 mm, 1.5 % at 2 mm.
 pub const REFERENCE_SHARE: f64 = 0.22;
 /// The mesh that judges a reference has sizes this many times those of the reference.
 const FINER: f64 = 0.7;
@@ -31,10 +32,22 @@ pub const LONGEST_WAY: f64 = 1e-3;
 pub const LONGEST_TIME: f64 = 0.05;
 /// Poses are audited where the force is at least this share of the largest: errors are relative.
 pub const LEAST_FORCE: f64 = 0.2;
-/// Growth of the sizes with the distance from the tool.
-const GROWTH: f64 = 0.35;
+/// The sizes are those for a tool at this depth, m, or smaller, as its circle in the skin is.
+const FULL_DEPTH: f64 = 5e-3;
+/// Growth of the edges with the distance from the tool.
+const GROWTH: f64 = 0.7;
+/// Heights at the skin before they are halved, as a multiple of the edges there, and their growth.
+const HEIGHT: f64 = 2.0;
+const LEVEL_GROWTH: f64 = 0.8;
+/// Share of the strain that pairs average. Thin intervals of soft tissue that is squeezed flat give way
+/// in their mesh with more.
+const ALPHA: f64 = 0.5;
 /// Forces out of balance that a static step may leave, as a share of the tool's.
 const TOLERANCE: f64 = 1e-4;
+/// The same on the way to a pose, where only the pose matters.
+const ON_THE_WAY: f64 = 3e-2;
+/// A mesh is fine at least as far round as a tool at this depth presses, m.
+const LEAST_DEPTH: f64 = 1e-3;
 /// A mesh with more nodes is not used: it would take minutes for a press.
 const MOST_NODES: usize = 60_000;
 /// Distance between the points along a way at which a mesh is fine, m.
@@ -43,13 +56,23 @@ const WAY_STEP: f64 = 4e-3;
 /// begins higher than any press is deep; in the air a step costs nothing.
 const HEIGHTS: [f64; 7] = [50e-3, 7.5e-3, 6e-3, 4.5e-3, 3e-3, 1.5e-3, 0.0];
 
-/// A mesh round some places of a body, and what is needed to press it.
+/// A mesh of a body round some places, or two of them, and what is needed to press it.
 #[derive(Debug)]
 pub struct Reference {
+    mesh: Mesh,
+    /// The same with every interval divided in two: what the force changes by with it, the finer mesh
+    /// still lacks a third of ([`extrapolated`]).
+    halved: Option<Mesh>,
+}
+
+/// A mesh, and what is needed to press it.
+#[derive(Debug)]
+struct Mesh {
     model: Arc<Model>,
     rest: State,
     params: SolveParams,
-    mesh_size: f64,
+    /// Mean length of the skin's edges near the tool, m.
+    size: f64,
 }
 
 /// A pose of the tool at a time, s.
@@ -68,13 +91,8 @@ impl Reference {
     /// When the body cannot be pressed, or has no equilibrium at rest.
     pub fn on(prepared: &Prepared) -> anyhow::Result<Self> {
         Ok(Self {
-            model: prepared.model()?,
-            rest: prepared.rest()?,
-            params: SolveParams {
-                tolerance: TOLERANCE,
-                ..prepared.solve_params()
-            },
-            mesh_size: prepared.mesh.mesh_size,
+            mesh: Mesh::of(prepared)?,
+            halved: None,
         })
     }
 
@@ -84,7 +102,13 @@ impl Reference {
     /// # Errors
     /// When the place cannot be pressed, or the mesh would have too many nodes.
     pub fn round(of: &Prepared, at: Vec3, share: f64) -> anyhow::Result<Self> {
-        Self::build(of, at, &[], share)
+        Self::build(
+            of,
+            at,
+            depth_of(&SurfaceIndex::build(skin_of(of)), at),
+            &[],
+            share,
+        )
     }
 
     /// A mesh of the body of `of` that is fine along the way of these stops across the skin.
@@ -102,12 +126,16 @@ impl Reference {
         let way: Vec<f64> = (0..=n)
             .map(|i| low + (high - low) * i as f64 / n.max(1) as f64)
             .collect();
-        Self::build(of, place.at, &way, share)
+        let index = SurfaceIndex::build(skin_of(of));
+        let depth = (stops.iter())
+            .map(|stop| depth_of(&index, stop.tool.pose.translation.vector))
+            .fold(0.0, f64::max);
+        Self::build(of, place.at, depth, &way, share)
     }
 
-    fn build(of: &Prepared, at: Vec3, way: &[f64], share: f64) -> anyhow::Result<Self> {
-        let scene = finer(&of.scene, at);
-        let skin = &of.grown.growth.body.skin;
+    fn build(of: &Prepared, at: Vec3, depth: f64, way: &[f64], share: f64) -> anyhow::Result<Self> {
+        let scene = finer(&of.scene, at, depth);
+        let skin = skin_of(of);
         let closest = SurfaceIndex::build(skin).closest(at);
         let press_at = closest.map_or(at, |closest| closest.point);
         let grown = Arc::new(BuiltBody {
@@ -115,24 +143,48 @@ impl Reference {
             press_vertex: nearest(skin, press_at),
             ..(*of.grown).clone()
         });
-        let sizes = Sizes::even(&scene, scene.tool.edge_length(share), GROWTH);
-        let prepared = Prepared::with_sizes(&scene, grown, Some(sizes), way)?;
-        let n_nodes = prepared.mesh.body.n_nodes();
-        anyhow::ensure!(
-            n_nodes <= MOST_NODES,
-            "a finer mesh would have {n_nodes} nodes, more than the {MOST_NODES} that are solved for an audit"
-        );
-        Self::on(&prepared)
+        // Contact is small where the tool is not deep.
+        let circle = |depth: f64| scene.tool.contact().map_or(0.0, |t| t.shape.reach(depth).1);
+        let (here, full) = (circle(scene.press.depth), circle(FULL_DEPTH));
+        let share = share * if here < full { here / full } else { 1.0 };
+        let sized =
+            |share: f64, growth: f64| Sizes::even(&scene, scene.tool.edge_length(share), growth);
+        let sizes = Sizes {
+            levels: sized(HEIGHT * share, LEVEL_GROWTH).levels,
+            in_squeezed: 2,
+            ..sized(share, GROWTH)
+        };
+        let build = |halves_levels: bool| {
+            let sizes = Sizes {
+                halves_levels,
+                ..sizes
+            };
+            let prepared = Prepared::with_sizes(&scene, Arc::clone(&grown), Some(sizes), way)?;
+            let n_nodes = prepared.mesh.body.n_nodes();
+            anyhow::ensure!(
+                n_nodes <= MOST_NODES,
+                "a finer mesh would have {n_nodes} nodes, more than the {MOST_NODES} that are solved for an audit"
+            );
+            Mesh::of(&prepared)
+        };
+        Ok(Self {
+            mesh: build(false)?,
+            halved: Some(build(true)?),
+        })
     }
 
-    /// Number of nodes.
+    fn finest(&self) -> &Mesh {
+        self.halved.as_ref().unwrap_or(&self.mesh)
+    }
+
+    /// Number of nodes of the finest mesh.
     pub fn n_nodes(&self) -> usize {
-        self.model.n_nodes()
+        self.finest().model.n_nodes()
     }
 
     /// Mean length of the skin's edges near the tool, m.
     pub fn mesh_size(&self) -> f64 {
-        self.mesh_size
+        self.mesh.size
     }
 
     /// Static force of the tissue on a tool that was pressed straight along its own axis to its pose,
@@ -145,23 +197,74 @@ impl Reference {
             tool.pose.translation.vector += out * height;
             Stop { tool, time: 0.0 }
         };
-        let forces = self.follow(&HEIGHTS.map(above), || true);
-        *forces.last()?
+        let stops = HEIGHTS.map(above);
+        let of_mesh = |mesh: &Mesh| *mesh.follow(&stops, ON_THE_WAY, || true).last()?;
+        let force = of_mesh(&self.mesh)?;
+        match &self.halved {
+            Some(halved) => Some(extrapolated(force, of_mesh(halved)?)),
+            None => Some(force),
+        }
     }
 
     /// Static forces of the tissue on a tool that goes from stop to stop, N, in the scene's frame.
     /// The first stop must not touch the body. From the first stop without an equilibrium on, and if
     /// `goes_on`, which is asked before each stop, returns false, they are `None`.
     pub fn follow(&self, stops: &[Stop], mut goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
+        let mut forces = self.mesh.follow(stops, TOLERANCE, &mut goes_on);
+        if let Some(halved) = &self.halved {
+            let finer = halved.follow(stops, TOLERANCE, goes_on);
+            for (force, finer) in forces.iter_mut().zip(finer) {
+                *force = force
+                    .zip(finer)
+                    .map(|(coarse, fine)| extrapolated(coarse, fine));
+            }
+        }
+        forces
+    }
+}
+
+/// The force on an infinitely fine mesh, from that on a mesh and that with its sizes halved: errors
+/// go with their squares.
+fn extrapolated(coarse: Vec3, fine: Vec3) -> Vec3 {
+    fine + (fine - coarse) / 3.0
+}
+
+impl Mesh {
+    fn of(prepared: &Prepared) -> anyhow::Result<Self> {
+        Ok(Self {
+            model: prepared.model()?,
+            rest: prepared.rest()?,
+            params: SolveParams {
+                tolerance: TOLERANCE,
+                ..prepared.solve_params()
+            },
+            size: prepared.mesh.mesh_size,
+        })
+    }
+
+    /// As [`Reference::follow`]. `tolerance` is that of all stops but the last.
+    fn follow(
+        &self,
+        stops: &[Stop],
+        tolerance: f64,
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Vec<Option<Vec3>> {
         let mut forces = vec![None; stops.len()];
         let Some(first) = stops.first() else {
             return forces;
         };
         let (mut state, mut ws) = (self.rest.clone(), Workspace::new(&self.model));
         let (mut before, mut time) = ([first.tool], first.time);
-        for (force, stop) in forces.iter_mut().zip(stops) {
+        let mut params = SolveParams {
+            tolerance,
+            ..self.params
+        };
+        for (i, (force, stop)) in forces.iter_mut().zip(stops).enumerate() {
             if !goes_on() {
                 break;
+            }
+            if i + 1 == stops.len() {
+                params.tolerance = self.params.tolerance;
             }
             let now = [stop.tool];
             let load = Load {
@@ -173,7 +276,7 @@ impl Reference {
                 tools: &before,
                 ..Load::default()
             };
-            let report = advance(&self.model, &mut state, &mut ws, &last, &load, &self.params);
+            let report = advance(&self.model, &mut state, &mut ws, &last, &load, &params);
             if report.outcome != Outcome::Converged {
                 break;
             }
@@ -260,17 +363,32 @@ pub fn relaxes(scene: &Scene) -> bool {
     all.any(|tissue| tissue.prony.is_some())
 }
 
-/// The scene, set to press at `at` on a mesh without the limits of a live one.
-fn finer(scene: &Scene, at: Vec3) -> Scene {
+/// The skin from which the mesh is refined.
+fn skin_of(of: &Prepared) -> &Surface {
+    &of.grown.growth.body.skin
+}
+
+/// Distance of a place from the skin at rest, m.
+fn depth_of(skin: &SurfaceIndex, at: Vec3) -> f64 {
+    skin.closest(at)
+        .map_or(0.0, |closest| (closest.point - at).norm())
+}
+
+/// The scene, set to press `depth` deep, m, at `at` on a mesh without the limits of a live one.
+fn finer(scene: &Scene, at: Vec3, depth: f64) -> Scene {
     let mut scene = scene.clone();
     scene.press.target = Target::Point(at.into());
     scene.press.direction = None;
     scene.press.speeds.clear();
-    // The depth is that of the poses; the press itself is not run.
-    scene.press.depth = scene.press.depth.min(1e-3);
+    // The press itself is not run; its depth says how far round the place the tool presses.
+    scene.press.depth = depth.max(LEAST_DEPTH);
     scene.mesh.refine = true;
     scene.mesh.max_vertices = MOST_NODES;
-    // That of the loop is for wide triangles.
-    scene.model.alpha = None;
+    // Those of the loop are for its own mesh.
+    scene.mesh.near_lumps = None;
+    scene.mesh.growth = None;
+    scene.mesh.level_growth = None;
+    scene.mesh.accuracy = None;
+    scene.model.alpha = Some(ALPHA);
     scene
 }

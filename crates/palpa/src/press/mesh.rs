@@ -44,8 +44,8 @@ const DEVIATION_OF_THICKNESS: f64 = 0.02;
 /// through the whole body.
 const SPARED: f64 = 1.05;
 
-/// The share of an interval that leaves two parts of it, rounding included.
-const HALF: f64 = 0.501;
+/// Factor on a part of an interval, so that rounding does not add another part.
+const ROUNDED: f64 = 1.001;
 
 /// Arguments: index of an interval, and two places in it as shares of its height. Returns the
 /// largest wanted height between them, m.
@@ -114,9 +114,12 @@ pub struct Sizes {
     /// Whether triangles that are a little too large are divided into two instead of four
     /// ([`RefineParams::divides_in_two`]).
     pub divides_in_two: bool,
-    /// Whether a layer on the bone has two intervals at least where the tool is near it: between bone and
-    /// tool one is up to 8 % too stiff, however thin.
-    pub two_on_bone: bool,
+    /// Least number of intervals of a layer that is softer than what lies under it, where the tool is
+    /// near it. It is squeezed out sideways, fastest in its middle, which two intervals make 7 % too
+    /// stiff and three 2 %, however thin the layer is.
+    pub in_squeezed: usize,
+    /// Whether all intervals are then divided in two.
+    pub halves_levels: bool,
 }
 
 impl Sizes {
@@ -156,7 +159,8 @@ impl Sizes {
                 ..graded
             },
             divides_in_two: false,
-            two_on_bone: false,
+            in_squeezed: 1,
+            halves_levels: false,
         }
     }
 }
@@ -645,7 +649,8 @@ fn split_near(
         return (body, true);
     }
     let mut wishes: Vec<LevelWish> = Vec::new();
-    let mut on_bone = false;
+    let n = body.n_levels - 1;
+    let mut most = vec![f64::INFINITY; n];
     let mut wish = |depths: Vec<f64>, depth: f64, radius: f64, size: Graded| {
         let beyond = near_depth(depth, radius, 0.0, 1.0);
         let size = size.looser(SPARED);
@@ -654,7 +659,7 @@ fn split_near(
     };
     if let Some(sizes) = sizes {
         let depths = mean_depths(&body, &[place.vertex as u32]);
-        on_bone = sizes.two_on_bone && is_whole_layer_near(&body, &depths, sizes.levels.border);
+        most = shares_of_squeezed(scene, &body, &depths, sizes);
         wish(depths, 0.0, 0.0, sizes.levels);
     }
     if !lumps.is_empty() {
@@ -673,28 +678,47 @@ fn split_near(
             }
         }
     }
-    let n = body.n_levels - 1;
     let wanted = |i: usize, from: f64, to: f64| {
-        let most = if on_bone && i + 1 == n {
-            HALF
-        } else {
-            f64::INFINITY
-        };
         (wishes.iter())
             .map(|wish| wish(i, from, to))
-            .fold(most, f64::min)
+            .fold(most[i], f64::min)
     };
-    let (parts, is_met) = parts_for(n, wanted, MOST_LEVELS);
+    let (mut parts, is_met) = parts_for(n, wanted, MOST_LEVELS);
+    if sizes.is_some_and(|sizes| sizes.halves_levels) {
+        for heights in &mut parts {
+            *heights = heights.iter().flat_map(|h| [0.5 * h; 2]).collect();
+        }
+    }
     if parts.iter().all(|heights| heights.len() == 1) {
         return (body, is_met);
     }
     (split_levels(&body, &parts).body, is_met)
 }
 
-/// Whether the lowest interval, below one of these depths (m), is a whole layer and begins above `border`, m.
-fn is_whole_layer_near(body: &LayeredBody, depths: &[f64], border: f64) -> bool {
-    let (n, layers) = (body.n_levels - 1, &body.interval_layer);
-    depths[n - 1] < border && (n == 1 || layers[n - 1] != layers[n - 2])
+/// For each interval, the largest share of it that a part may be, so that layers near the tool that are
+/// softer than what lies under them have as many intervals as wanted. `depths` are those of the levels, m.
+fn shares_of_squeezed(scene: &Scene, body: &LayeredBody, depths: &[f64], sizes: Sizes) -> Vec<f64> {
+    let layers = &body.interval_layer;
+    let young = |layer: usize| scene.layers.get(layer).and_then(|l| l.tissue.young());
+    let share = |&layer: &usize| {
+        let is_of = |of: &&usize| **of == layer;
+        let top = layers.iter().position(|of| *of == layer).unwrap_or(0);
+        // Under the lowest layer is bone.
+        let is_softer = match (young(layer), young(layer + 1)) {
+            (Some(own), Some(under)) => own < under,
+            (Some(_), None) => true,
+            (None, _) => false,
+        };
+        if depths[top] < sizes.levels.border && is_softer {
+            let n_parts = sizes
+                .in_squeezed
+                .div_ceil(layers.iter().filter(is_of).count());
+            ROUNDED / n_parts as f64
+        } else {
+            f64::INFINITY
+        }
+    };
+    layers.iter().map(share).collect()
 }
 
 /// The skin that a disc holds. If the body may be refined, the disc's edge becomes a ring of
