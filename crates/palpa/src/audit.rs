@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use palpa_fem::{Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
-use palpa_mesh::{Surface, SurfaceIndex, Vec3};
+use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Target};
 
 use crate::Prepared;
@@ -102,13 +102,7 @@ impl Reference {
     /// # Errors
     /// When the place cannot be pressed, or the mesh would have too many nodes.
     pub fn round(of: &Prepared, at: Vec3, share: f64) -> anyhow::Result<Self> {
-        Self::build(
-            of,
-            at,
-            depth_of(&SurfaceIndex::build(skin_of(of)), at),
-            &[],
-            share,
-        )
+        Self::build(of, at, &[at], &[], share)
     }
 
     /// A mesh of the body of `of` that is fine along the way of these stops across the skin.
@@ -126,18 +120,27 @@ impl Reference {
         let way: Vec<f64> = (0..=n)
             .map(|i| low + (high - low) * i as f64 / n.max(1) as f64)
             .collect();
-        let index = SurfaceIndex::build(skin_of(of));
-        let depth = (stops.iter())
-            .map(|stop| depth_of(&index, stop.tool.pose.translation.vector))
-            .fold(0.0, f64::max);
-        Self::build(of, place.at, depth, &way, share)
+        let tips: Vec<Vec3> = (stops.iter())
+            .map(|stop| stop.tool.pose.translation.vector)
+            .collect();
+        Self::build(of, place.at, &tips, &way, share)
     }
 
-    fn build(of: &Prepared, at: Vec3, depth: f64, way: &[f64], share: f64) -> anyhow::Result<Self> {
-        let scene = finer(&of.scene, at, depth);
-        let skin = skin_of(of);
-        let closest = SurfaceIndex::build(skin).closest(at);
-        let press_at = closest.map_or(at, |closest| closest.point);
+    /// `tips` are places of the tool; the deepest says how far round the place and the `way` the mesh
+    /// is fine.
+    fn build(
+        of: &Prepared,
+        at: Vec3,
+        tips: &[Vec3],
+        way: &[f64],
+        share: f64,
+    ) -> anyhow::Result<Self> {
+        let skin = &of.grown.growth.body.skin;
+        let index = SurfaceIndex::build(skin);
+        let on_skin = |at: Vec3| index.closest(at).map_or(at, |closest| closest.point);
+        let depths = tips.iter().map(|tip| (on_skin(*tip) - tip).norm());
+        let scene = finer(&of.scene, at, depths.fold(0.0, f64::max));
+        let press_at = on_skin(at);
         let grown = Arc::new(BuiltBody {
             press_at,
             press_vertex: nearest(skin, press_at),
@@ -173,13 +176,10 @@ impl Reference {
         })
     }
 
-    fn finest(&self) -> &Mesh {
-        self.halved.as_ref().unwrap_or(&self.mesh)
-    }
-
     /// Number of nodes of the finest mesh.
     pub fn n_nodes(&self) -> usize {
-        self.finest().model.n_nodes()
+        let finest = self.halved.as_ref().unwrap_or(&self.mesh);
+        finest.model.n_nodes()
     }
 
     /// Mean length of the skin's edges near the tool, m.
@@ -197,27 +197,46 @@ impl Reference {
             tool.pose.translation.vector += out * height;
             Stop { tool, time: 0.0 }
         };
-        let stops = HEIGHTS.map(above);
-        let of_mesh = |mesh: &Mesh| *mesh.follow(&stops, ON_THE_WAY, || true).last()?;
-        let force = of_mesh(&self.mesh)?;
-        match &self.halved {
-            Some(halved) => Some(extrapolated(force, of_mesh(halved)?)),
-            None => Some(force),
-        }
+        *self
+            .forces(&HEIGHTS.map(above), ON_THE_WAY, || true)
+            .last()?
     }
 
     /// Static forces of the tissue on a tool that goes from stop to stop, N, in the scene's frame.
     /// The first stop must not touch the body. From the first stop without an equilibrium on, and if
     /// `goes_on`, which is asked before each stop, returns false, they are `None`.
-    pub fn follow(&self, stops: &[Stop], mut goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
-        let mut forces = self.mesh.follow(stops, TOLERANCE, &mut goes_on);
-        if let Some(halved) = &self.halved {
-            let finer = halved.follow(stops, TOLERANCE, goes_on);
-            for (force, finer) in forces.iter_mut().zip(finer) {
-                *force = force
-                    .zip(finer)
-                    .map(|(coarse, fine)| extrapolated(coarse, fine));
+    pub fn follow(&self, stops: &[Stop], goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
+        self.forces(stops, TOLERANCE, goes_on)
+    }
+
+    /// As [`Self::follow`]. `on_the_way` is the tolerance of all stops but the last.
+    fn forces(
+        &self,
+        stops: &[Stop],
+        on_the_way: f64,
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Vec<Option<Vec3>> {
+        let mut forces = vec![None; stops.len()];
+        let Some(first) = stops.first() else {
+            return forces;
+        };
+        let mut coarse = Walk::new(&self.mesh, *first);
+        let mut fine = self.halved.as_ref().map(|mesh| Walk::new(mesh, *first));
+        for (i, (force, stop)) in forces.iter_mut().zip(stops).enumerate() {
+            if !goes_on() {
+                break;
             }
+            let is_last = i + 1 == stops.len();
+            let tolerance = if is_last { TOLERANCE } else { on_the_way };
+            let mut found = coarse.go(*stop, tolerance);
+            if let (Some(coarse), Some(fine)) = (found, &mut fine) {
+                let fine = fine.go(*stop, tolerance);
+                found = fine.map(|fine| extrapolated(coarse, fine));
+            }
+            if found.is_none() {
+                break;
+            }
+            *force = found;
         }
         forces
     }
@@ -234,56 +253,53 @@ impl Mesh {
         Ok(Self {
             model: prepared.model()?,
             rest: prepared.rest()?,
-            params: SolveParams {
-                tolerance: TOLERANCE,
-                ..prepared.solve_params()
-            },
+            params: prepared.solve_params(),
             size: prepared.mesh.mesh_size,
         })
     }
+}
 
-    /// As [`Reference::follow`]. `tolerance` is that of all stops but the last.
-    fn follow(
-        &self,
-        stops: &[Stop],
-        tolerance: f64,
-        mut goes_on: impl FnMut() -> bool,
-    ) -> Vec<Option<Vec3>> {
-        let mut forces = vec![None; stops.len()];
-        let Some(first) = stops.first() else {
-            return forces;
-        };
-        let (mut state, mut ws) = (self.rest.clone(), Workspace::new(&self.model));
-        let (mut before, mut time) = ([first.tool], first.time);
-        let mut params = SolveParams {
-            tolerance,
-            ..self.params
-        };
-        for (i, (force, stop)) in forces.iter_mut().zip(stops).enumerate() {
-            if !goes_on() {
-                break;
-            }
-            if i + 1 == stops.len() {
-                params.tolerance = self.params.tolerance;
-            }
-            let now = [stop.tool];
-            let load = Load {
-                tools: &now,
-                duration: stop.time - time,
-                ..Load::default()
-            };
-            let last = Load {
-                tools: &before,
-                ..Load::default()
-            };
-            let report = advance(&self.model, &mut state, &mut ws, &last, &load, &params);
-            if report.outcome != Outcome::Converged {
-                break;
-            }
-            *force = report.tool_forces.first().copied();
-            (before, time) = (now, stop.time);
+/// A tool on its way over a mesh.
+struct Walk<'a> {
+    mesh: &'a Mesh,
+    state: State,
+    ws: Workspace,
+    at: Stop,
+}
+
+impl<'a> Walk<'a> {
+    fn new(mesh: &'a Mesh, at: Stop) -> Self {
+        Self {
+            mesh,
+            state: mesh.rest.clone(),
+            ws: Workspace::new(&mesh.model),
+            at,
         }
-        forces
+    }
+
+    /// Goes on to a stop; the force there, N, if an equilibrium is found.
+    fn go(&mut self, to: Stop, tolerance: f64) -> Option<Vec3> {
+        let (before, now) = ([self.at.tool], [to.tool]);
+        let last = Load {
+            tools: &before,
+            ..Load::default()
+        };
+        let load = Load {
+            tools: &now,
+            duration: to.time - self.at.time,
+            ..Load::default()
+        };
+        let params = SolveParams {
+            tolerance,
+            ..self.mesh.params
+        };
+        let model = &self.mesh.model;
+        let report = advance(model, &mut self.state, &mut self.ws, &last, &load, &params);
+        if report.outcome != Outcome::Converged {
+            return None;
+        }
+        self.at = to;
+        report.tool_forces.first().copied()
     }
 }
 
@@ -361,17 +377,6 @@ pub fn relaxes(scene: &Scene) -> bool {
     let of_layers = scene.layers.iter().map(|layer| &layer.tissue);
     let mut all = of_layers.chain(scene.lumps.iter().map(|lump| &lump.tissue));
     all.any(|tissue| tissue.prony.is_some())
-}
-
-/// The skin from which the mesh is refined.
-fn skin_of(of: &Prepared) -> &Surface {
-    &of.grown.growth.body.skin
-}
-
-/// Distance of a place from the skin at rest, m.
-fn depth_of(skin: &SurfaceIndex, at: Vec3) -> f64 {
-    skin.closest(at)
-        .map_or(0.0, |closest| (closest.point - at).norm())
 }
 
 /// The scene, set to press `depth` deep, m, at `at` on a mesh without the limits of a live one.
