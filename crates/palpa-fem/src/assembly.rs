@@ -157,7 +157,7 @@ pub(crate) fn evaluate_group<'a>(
         &model.geometries[index],
         &model.group_nodes(g, i).map(|n| displacements[n]),
         phases,
-        model.params.alpha,
+        model.shares(i),
         with_tangent,
         response,
     );

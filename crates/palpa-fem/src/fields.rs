@@ -70,7 +70,7 @@ fn fields_with(model: &Model, displacements: &[Vec3], memory: &Memory) -> Vec<Pr
             phases_at(model, memory, index, phases);
             let local = model.group_nodes(g, i).map(|n| displacements[n]);
             let geometry = &model.geometries[index];
-            let wedges = element_fields(group.shape, geometry, &local, phases, model.params.alpha);
+            let wedges = element_fields(group.shape, geometry, &local, phases, model.shares(i));
             wedges.map(|(cauchy, f, volume_ratio, energy)| PrismField {
                 cauchy,
                 stretches: stretches(&f),

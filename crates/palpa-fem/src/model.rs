@@ -5,7 +5,7 @@ use palpa_mesh::{LayeredBody, Vec3};
 use crate::Material;
 use crate::columns::Structure;
 use crate::contact::SkinStiffness;
-use crate::element::{GroupGeometry, Phase};
+use crate::element::{GroupGeometry, Phase, Shares};
 use crate::error::FemError;
 use crate::materials::{Materials, assign};
 use crate::pairing::{Pairing, pair_triangles_like};
@@ -30,17 +30,34 @@ impl Supports {
     }
 }
 
+/// Share of the bulk modulus with which the two wedges of a pair resist to change their volumes against
+/// each other, below the first layer.
+const APART: f64 = 0.1;
+
 /// Parameters of the element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParams {
-    /// Share of the pair's mean deviator, 0 to below 1; the rest is the share of the single wedges.
-    /// Near 1, single nodes show hourglass modes.
+    /// Share of the pair's mean deviator in the first layer, 0 to below 1; the rest is the share of the
+    /// single wedges. Near 1, single nodes show hourglass modes.
     pub alpha: f64,
+    /// The same in the layers below it. It makes little difference to forces there, and soft layers that
+    /// are squeezed flat keep their balance longer with 0.
+    pub alpha_below: f64,
+}
+
+impl ModelParams {
+    /// The same share in all layers.
+    pub fn even(alpha: f64) -> Self {
+        Self {
+            alpha,
+            alpha_below: alpha,
+        }
+    }
 }
 
 impl Default for ModelParams {
     fn default() -> Self {
-        Self { alpha: 0.8 }
+        Self::even(0.8)
     }
 }
 
@@ -76,6 +93,21 @@ impl Model {
         self.materials.iter().any(|m| m.prestress != 0.0)
     }
 
+    /// Shares of a pair's mean and of its wedges in an interval. The wedges of the first layer do not
+    /// resist different changes of volume: it is the soft layers below it that need this when they are
+    /// squeezed flat, and coarse triangles of tense skin lose their balance with it.
+    pub(crate) fn shares(&self, interval: usize) -> Shares {
+        let ModelParams { alpha, alpha_below } = self.params;
+        if self.body.interval_layer[interval] == 0 {
+            Shares { alpha, apart: 0.0 }
+        } else {
+            Shares {
+                alpha: alpha_below,
+                apart: APART,
+            }
+        }
+    }
+
     /// Builds a model. Cost: the symbolic factor, which grows a little faster than the number of
     /// nodes.
     ///
@@ -105,10 +137,10 @@ impl Model {
         params: ModelParams,
         pairs: &[[u32; 4]],
     ) -> Result<Self, FemError> {
-        if !(0.0..1.0).contains(&params.alpha) {
-            return Err(FemError::Alpha {
-                alpha: params.alpha,
-            });
+        for alpha in [params.alpha, params.alpha_below] {
+            if !(0.0..1.0).contains(&alpha) {
+                return Err(FemError::Alpha { alpha });
+            }
         }
         materials.check(body)?;
         let mut holds = vec![Hold::free(); body.n_nodes()];

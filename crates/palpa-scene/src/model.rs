@@ -16,6 +16,9 @@ pub struct Model {
     /// softer and more accurate on a coarse mesh, but a node that is pressed alone can then move
     /// against its neighbours. `None` is [automatic](Self::alpha()).
     pub alpha: Option<f64>,
+    /// The same share in the layers below the first, if it is not the same there. A scene's file cannot
+    /// give it.
+    pub alpha_below: Option<f64>,
     /// Whether inertia and damping are included.
     pub dynamics: Dynamics,
     /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
@@ -27,6 +30,11 @@ impl Model {
     /// Share of the deviatoric strain that two paired prisms average, as given or by default: 0.8.
     pub fn alpha(&self) -> f64 {
         self.alpha.unwrap_or(0.8)
+    }
+
+    /// The same in the layers below the first.
+    pub fn alpha_below(&self) -> f64 {
+        self.alpha_below.unwrap_or(self.alpha())
     }
 }
 

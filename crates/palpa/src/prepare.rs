@@ -196,9 +196,7 @@ impl Prepared {
         if let Some(model) = self.model.get() {
             return Ok(Arc::clone(model));
         }
-        let params = ModelParams {
-            alpha: self.scene.model.alpha(),
-        };
+        let params = element_params(&self.scene);
         let model = Model::build(&self.mesh.body, &self.materials, &self.supports, params)?;
         Ok(Arc::clone(self.model.get_or_init(|| Arc::new(model))))
     }
@@ -311,5 +309,13 @@ impl Approach {
             tool: self.tool,
             pose: Pose::from_parts(translation.into(), self.pose.rotation),
         }
+    }
+}
+
+/// Parameters of a scene's elements.
+pub(crate) fn element_params(scene: &Scene) -> ModelParams {
+    ModelParams {
+        alpha: scene.model.alpha(),
+        alpha_below: scene.model.alpha_below(),
     }
 }

@@ -114,15 +114,16 @@ impl LaneBatch {
         }
     }
 
-    /// Sets the stiffness of the last added pair.
-    pub(super) fn stiffen(&mut self, slopes: [f64; N_POINTS], bulk: f64) {
+    /// Sets the stiffness of the last added pair: half the shear moduli, the bulk modulus, and what its
+    /// wedges have against each other, Pa.
+    pub(super) fn stiffen(&mut self, slopes: [f64; N_POINTS], bulk: f64, apart: f64) {
         let lane = self.n - 1;
         if let Some(past) = &mut self.past {
-            past.rest.put(lane, slopes, bulk);
+            past.rest.put(lane, slopes, bulk, apart);
         }
-        self.double.stiffness.put(lane, slopes, bulk);
+        self.double.stiffness.put(lane, slopes, bulk, apart);
         if let Some(single) = &mut self.single {
-            single.stiffness.put(lane, slopes, bulk);
+            single.stiffness.put(lane, slopes, bulk, apart);
         }
     }
 
@@ -202,6 +203,7 @@ impl<E: Number> Numbers<E> {
             stiffness: Stiffness {
                 slope: [zero; N_POINTS],
                 bulk: zero,
+                apart: zero,
             },
             constant: has_memory.then_some(Constant {
                 stress: [[zero; 6]; N_POINTS],
@@ -235,7 +237,8 @@ impl<E: Number> Numbers<E> {
             geometry.thickness[c][lane] = E::nearest(from.thickness[c]);
             geometry.thickness_gradient[c][lane] = E::nearest(from.thickness_gradient[c]);
         }
-        geometry.alpha[lane] = E::nearest(if is_pair { model.params.alpha } else { 0.0 });
+        let alpha = model.shares(pair / model.n_groups()).alpha;
+        geometry.alpha[lane] = E::nearest(if is_pair { alpha } else { 0.0 });
     }
 
     /// Copies the numbers that a step has changed, in another precision.
@@ -243,6 +246,7 @@ impl<E: Number> Numbers<E> {
         let row = |row: &Row<f64>| row.map(E::nearest);
         self.stiffness.slope = std::array::from_fn(|p| row(&from.stiffness.slope[p]));
         self.stiffness.bulk = row(&from.stiffness.bulk);
+        self.stiffness.apart = row(&from.stiffness.apart);
         if let (Some(constant), Some(from)) = (&mut self.constant, &from.constant) {
             for (rows, from) in constant
                 .stress
@@ -275,25 +279,32 @@ impl<E: Number> Numbers<E> {
 }
 
 impl Stiffness<f64> {
-    /// This stiffness times the factors of a step, of its deviatoric and its volumetric part.
+    /// This stiffness times the factors of a step, of its deviatoric and its volumetric part. What the
+    /// wedges have against each other has no memory.
     fn scaled(&self, [deviatoric, volumetric]: [f64; 2]) -> Self {
         Self {
             slope: self.slope.map(|row| row.map(|x| x * deviatoric)),
             bulk: self.bulk.map(|x| x * volumetric),
+            apart: self.apart,
         }
     }
 }
 
 impl<E: Number> Stiffness<E> {
-    fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64) {
+    fn put(&mut self, lane: usize, slopes: [f64; N_POINTS], bulk: f64, apart: f64) {
         for (row, slope) in self.slope.iter_mut().zip(slopes) {
             row[lane] = E::nearest(slope);
         }
         self.bulk[lane] = E::nearest(bulk);
+        self.apart[lane] = E::nearest(apart);
     }
 
     fn copy_first(&mut self, lane: usize) {
-        for row in self.slope.iter_mut().chain([&mut self.bulk]) {
+        for row in self
+            .slope
+            .iter_mut()
+            .chain([&mut self.bulk, &mut self.apart])
+        {
             row[lane] = row[0];
         }
     }
@@ -313,6 +324,7 @@ impl Past {
             rest: Stiffness {
                 slope: [zero; N_POINTS],
                 bulk: zero,
+                apart: zero,
             },
             tension: [zero; 6],
             rows: vec![empty; prony.filter(|_| keeps_rows).map_or(0, Prony::n_rows)],

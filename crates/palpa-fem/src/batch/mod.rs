@@ -64,8 +64,8 @@ pub(crate) struct Batches {
     phases: Vec<PhaseAt<'static>>,
 }
 
-/// Half the shear modulus of a group at rest at each point, Pa, its bulk modulus times its volume,
-/// J, and its hardening; `None` if the kernel does not have its law.
+/// Half the shear modulus of a group at rest at each point and its bulk modulus, Pa, and its
+/// hardening; `None` if the kernel does not have its law.
 fn lane(phases: &[PhaseAt<'_>], has_memory: bool) -> Option<([f64; N_POINTS], f64, Hardening)> {
     if has_memory && phases.len() > 1 {
         return None;
@@ -137,7 +137,7 @@ impl Batches {
                     open.push(index);
                 }
                 batches[index].push(model, pattern, g, i, columns);
-                batches[index].stiffen(slopes, bulk);
+                batches[index].stiffen(slopes, bulk, bulk * model.shares(i).apart);
                 if batches[index].n == WIDTH {
                     open.retain(|&b| b != index);
                 }

@@ -2,7 +2,8 @@
 //! between levels.
 //!
 //! ```text
-//! W = α Σ_q V_q W_d(F^_q)  +  (1 − α) Σ_wedges Σ_q V_wq W_d(F^_wq)  +  V U(v̄),   v̄ = Σ V_wq v(F_wq) / V
+//! W = α Σ_q V_q W_d(F^_q)  +  (1 − α) Σ_wedges Σ_q V_wq W_d(F^_wq)  +  V U(v̄)
+//!     + ½ γ K V₀ V₁/V (v̄₀ − v̄₁)²,   v̄ = Σ V_wq v(F_wq) / V
 //! ```
 //! `F_wq` is the deformation gradient of wedge w over its centroid at depth point q, `F_q` the mean
 //! of both wedges' by volume. The volume change is one number per pair, which is what removes
@@ -76,6 +77,16 @@ pub(crate) struct GroupLayout {
     pub(crate) n_wedges: u8,
 }
 
+/// Shares of a pair's mean and of its wedges in its energy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shares {
+    /// `α`, that of the pair's mean deviator.
+    pub(crate) alpha: f64,
+    /// `γ`, that of the bulk modulus with which the wedges resist to change their volumes against each
+    /// other.
+    pub(crate) apart: f64,
+}
+
 /// Number of nodes of a pair; those of column c are 2 c (upper) and 2 c + 1 (lower).
 pub(crate) const N_NODES: usize = 8;
 /// Number of node pairs a ≥ b, in the order `a (a + 1)/2 + b`.
@@ -125,13 +136,13 @@ pub(crate) fn deformation(
     f
 }
 
-/// Evaluates a group. `alpha` is the share of the pair's mean deviator.
+/// Evaluates a group.
 pub(crate) fn evaluate(
     shape: GroupLayout,
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],
-    alpha: f64,
+    shares: Shares,
     with_tangent: bool,
     out: &mut GroupResponse,
 ) {
@@ -143,8 +154,8 @@ pub(crate) fn evaluate(
     if with_tangent {
         out.stiffness = [Mat3::zeros(); N_BLOCKS];
     }
-    let alpha = if n_wedges == 2 { alpha } else { 0.0 };
-    let Some(volume) = volumetric(shape, geometry, &f, phases, kinematics) else {
+    let alpha = if n_wedges == 2 { shares.alpha } else { 0.0 };
+    let Some(volume) = volumetric(shape, geometry, &f, phases, kinematics, shares.apart) else {
         out.energy = f64::INFINITY;
         return;
     };
@@ -193,11 +204,12 @@ pub(crate) fn evaluate(
                     VolumeMeasure::Jacobian => add_second_derivative_of_det(
                         &mut response.tangent[q][q],
                         &f[w][q],
-                        volume.pressure * wedge.volumes[q],
+                        volume.pressures[w] * wedge.volumes[q],
                     ),
                     VolumeMeasure::GreenTrace => {
                         for i in 0..9 {
-                            response.tangent[q][q][(i, i)] += volume.pressure * wedge.volumes[q];
+                            response.tangent[q][q][(i, i)] +=
+                                volume.pressures[w] * wedge.volumes[q];
                         }
                     }
                     VolumeMeasure::SmallTrace => {}
@@ -217,10 +229,13 @@ struct VolumePart {
     /// Mean of `v` over the group, less 1.
     change: f64,
     energy: f64,
-    /// Mean of `U'` over the phases: pressure, positive in tension. Pa
-    pressure: f64,
+    /// Pressure of the wedges, positive in tension: the mean of `U'` over the phases, and what the
+    /// two wedges have against each other. Pa
+    pressures: [f64; 2],
     /// `U''/V`, in Pa/m³.
     stiffness: f64,
+    /// `κ V/(V₀ V₁)`, in Pa/m³; 0 for a single wedge.
+    apart: f64,
     measure: VolumeMeasure,
     /// `∂v/∂F` at the points.
     derivative: [[Mat3; 2]; 2],
@@ -246,11 +261,12 @@ fn volumetric(
     f: &[[Mat3; 2]; 2],
     phases: &[PhaseAt<'_>],
     kinematics: Kinematics,
+    apart_share: f64,
 ) -> Option<VolumePart> {
     let measure = phases[0].law.volume_measure();
     let total = geometry.volume();
     let mut derivative = [[Mat3::zeros(); 2]; 2];
-    let mut change = 0.0;
+    let mut changes = [0.0; 2];
     for w in 0..usize::from(shape.n_wedges) {
         for q in 0..2 {
             if kinematics == Kinematics::Finite
@@ -260,29 +276,43 @@ fn volumetric(
                 return None;
             }
             let (v, dv) = volume_change(measure, &f[w][q]);
-            change += geometry.wedges[w].volumes[q] / total * v;
+            changes[w] += geometry.wedges[w].volumes[q] / geometry.wedges[w].volume() * v;
             derivative[w][q] = dv;
         }
     }
-    let (mut energy, mut pressure, mut bulk) = (0.0, 0.0, 0.0);
+    let share = |w: usize| geometry.wedges[w].volume() / total;
+    let change = share(0) * changes[0] + share(1) * changes[1];
+    let (mut energy, mut pressure, mut bulk, mut kappa) = (0.0, 0.0, 0.0, 0.0);
     for at in phases {
         let [u, du, ddu] = at.law.volumetric(1.0 + change);
+        // Without the factors of a step: it has no memory.
+        kappa += apart_share * at.phase.volume * at.law.volumetric(1.0)[2];
         let scale = at.scale[1] * at.phase.volume;
         let constant = at.phase.volume * at.overstress.map_or(0.0, |o| o.volume);
         energy += total * (scale * u + constant * change);
         pressure += scale * du + constant;
         bulk += scale * ddu;
     }
+    let mut pressures = [pressure; 2];
+    let mut apart = 0.0;
+    if shape.n_wedges == 2 {
+        let difference = changes[0] - changes[1];
+        energy += 0.5 * kappa * total * share(0) * share(1) * difference * difference;
+        pressures[0] += kappa * share(1) * difference;
+        pressures[1] -= kappa * share(0) * difference;
+        apart = kappa / (total * share(0) * share(1));
+    }
     if !energy.is_finite() {
         return None;
     }
     let stress = [0, 1]
-        .map(|w| [0, 1].map(|q| derivative[w][q] * (pressure * geometry.wedges[w].volumes[q])));
+        .map(|w| [0, 1].map(|q| derivative[w][q] * (pressures[w] * geometry.wedges[w].volumes[q])));
     Some(VolumePart {
         change,
         energy,
-        pressure,
+        pressures,
         stiffness: bulk / total,
+        apart,
         measure,
         derivative,
         stress,
@@ -295,20 +325,32 @@ fn add_bulk_stiffness(
     volume: &VolumePart,
     out: &mut GroupResponse,
 ) {
+    let total = geometry.volume();
     let mut gradient = [Vec3::zeros(); N_NODES];
+    let mut difference = [Vec3::zeros(); N_NODES];
     for w in 0..usize::from(shape.n_wedges) {
         let wedge = &geometry.wedges[w];
+        let other = if w == 0 {
+            geometry.wedges[1].volume() / total
+        } else {
+            -geometry.wedges[0].volume() / total
+        };
         for q in 0..2 {
             let weighted = volume.derivative[w][q] * wedge.volumes[q];
             for corner in 0..6 {
-                gradient[node(shape.wedges[w], corner)] += weighted * wedge.gradients[q][corner];
+                let at = node(shape.wedges[w], corner);
+                let part = weighted * wedge.gradients[q][corner];
+                gradient[at] += part;
+                difference[at] += part * other;
             }
         }
     }
     for a in 0..N_NODES {
         let left = gradient[a] * volume.stiffness;
+        let apart = difference[a] * volume.apart;
         for b in 0..=a {
-            out.stiffness[a * (a + 1) / 2 + b] += left * gradient[b].transpose();
+            out.stiffness[a * (a + 1) / 2 + b] +=
+                left * gradient[b].transpose() + apart * difference[b].transpose();
         }
     }
 }
@@ -525,16 +567,16 @@ pub(crate) fn element_fields(
     geometry: &GroupGeometry,
     displacements: &[Vec3; N_NODES],
     phases: &[PhaseAt<'_>],
-    alpha: f64,
+    shares: Shares,
 ) -> [(Mat3, Mat3, f64, f64); 2] {
     let f = deformation(shape, geometry, displacements);
     let kinematics = phases[0].law.kinematics();
     let mut fields = [(Mat3::zeros(), Mat3::identity(), 1.0, 0.0); 2];
-    let Some(volume) = volumetric(shape, geometry, &f, phases, kinematics) else {
+    let Some(volume) = volumetric(shape, geometry, &f, phases, kinematics, shares.apart) else {
         return fields;
     };
     let n_wedges = usize::from(shape.n_wedges);
-    let alpha = if n_wedges == 2 { alpha } else { 0.0 };
+    let alpha = if n_wedges == 2 { shares.alpha } else { 0.0 };
     let pair = PairMean::new(geometry, &f);
     let total = geometry.volume();
     for w in 0..n_wedges {
@@ -569,10 +611,10 @@ pub(crate) fn element_fields(
         // Volumetric stress p ∂v/∂F, turned to the present frame.
         cauchy += match volume.measure {
             VolumeMeasure::Jacobian | VolumeMeasure::SmallTrace => {
-                Mat3::identity() * volume.pressure
+                Mat3::identity() * volume.pressures[w]
             }
             VolumeMeasure::GreenTrace => {
-                mean * mean.transpose() * (volume.pressure / mean.determinant())
+                mean * mean.transpose() * (volume.pressures[w] / mean.determinant())
             }
         };
         fields[w] = (cauchy, mean, 1.0 + volume.change, energy);

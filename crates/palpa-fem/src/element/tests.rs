@@ -141,7 +141,10 @@ impl Case {
             &self.geometry,
             displacements,
             &phases,
-            0.8,
+            Shares {
+                alpha: 0.8,
+                apart: 0.1,
+            },
             with_tangent,
             &mut out,
         );

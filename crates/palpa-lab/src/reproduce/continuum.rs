@@ -225,7 +225,7 @@ fn model(body: Body, layered: &LayeredBody) -> Result<Model, FemError> {
         layered,
         &Materials::of_layers(materials.to_vec()),
         &Supports::on_base(layered),
-        ModelParams { alpha: ALPHA },
+        ModelParams::even(ALPHA),
     )
 }
 

@@ -84,7 +84,7 @@ pub(crate) fn distorted(diagonal: Diagonal) -> LayeredBody {
 
 fn model(body: &LayeredBody, law: Law) -> Result<Model, VerifyError> {
     let materials = Materials::of_layers(vec![Material::new("tissue", law)]);
-    let params = ModelParams { alpha: ALPHA };
+    let params = ModelParams::even(ALPHA);
     Ok(Model::build(
         body,
         &materials,

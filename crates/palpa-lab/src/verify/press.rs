@@ -28,7 +28,7 @@ impl Pressed {
         materials: &Materials,
         supports: &Supports,
     ) -> Result<Self, VerifyError> {
-        let model = Model::build(body, materials, supports, ModelParams { alpha: ALPHA })?;
+        let model = Model::build(body, materials, supports, ModelParams::even(ALPHA))?;
         Ok(Self {
             state: State::new(&model),
             ws: Workspace::new(&model),

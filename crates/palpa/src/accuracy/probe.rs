@@ -2,8 +2,7 @@
 
 use palpa_fem::pairing::Pair;
 use palpa_fem::{
-    Load, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Workspace, assume_pressures,
-    equilibrate,
+    Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, assume_pressures, equilibrate,
 };
 use palpa_mesh::refine::{LevelSplit, RefineParams, Refined, mean_depths, refine, split_levels};
 use palpa_mesh::{LayeredBody, Part, Vec3};
@@ -11,6 +10,7 @@ use palpa_mesh::{LayeredBody, Part, Vec3};
 use super::{ErrorBars, N_SOURCES, Probed, STAND_IN, Source};
 use crate::build::nearest;
 use crate::continuum;
+use crate::prepare::element_params;
 use crate::press::mesh::NEAR;
 use crate::press::tissue::{Deformed, Indentation};
 
@@ -261,9 +261,7 @@ impl Probe {
         }
         let prepared = &press.prepared;
         let supports = continuum::supports(prepared.scene.body.cut_faces, body, &mut Vec::new());
-        let params = ModelParams {
-            alpha: prepared.scene.model.alpha(),
-        };
+        let params = element_params(&prepared.scene);
         let pairs = pairs_in(press, part);
         let model = Model::build_like(body, &prepared.materials, &supports, params, &pairs)?;
         Ok(Self {

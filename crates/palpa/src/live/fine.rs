@@ -5,13 +5,13 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use palpa_fem::realtime::FineBodies;
-use palpa_fem::{FemError, Model, ModelParams};
+use palpa_fem::{FemError, Model};
 use palpa_mesh::Vec3;
 use palpa_scene::Scene;
 
 use crate::build::nearest;
 use crate::continuum;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, element_params};
 use crate::press::mesh::CoarseBody;
 
 /// The fine part of the mesh is larger than what the tool presses by this margin, m: the tool may go
@@ -74,10 +74,12 @@ impl FineScene {
         let scene = &self.prepared.scene;
         let body = self.coarse.fine_round(scene, place, self.radius);
         let supports = continuum::supports(scene.body.cut_faces, &body, &mut Vec::new());
-        let params = ModelParams {
-            alpha: scene.model.alpha(),
-        };
-        Model::build(&body, &self.prepared.materials, &supports, params)
+        Model::build(
+            &body,
+            &self.prepared.materials,
+            &supports,
+            element_params(scene),
+        )
     }
 }
 

@@ -7,6 +7,7 @@
 )]
 
 use super::algebra::{M3, V3, axpy, cofactor, dot};
+use super::unit::NO_VOLUME;
 use super::{LaneGroup, Lanes, Local, N_NODES};
 
 /// Deformation and change of volume of the two wedges at their points.
@@ -15,12 +16,39 @@ pub(super) struct Wedges<R> {
     pub(super) f: [[M3<R>; 2]; 2],
     /// m³. `[wedge][point]`
     pub(super) volumes: [[R; 2]; 2],
-    /// `Σ V (J − 1)`, m³.
+    /// `Σ V (J − 1)` of each wedge and of both, m³.
+    changes: [R; 2],
     pub(super) change: R,
     /// `Σ V`, m³.
     pub(super) total: R,
     /// Least volume ratio of a point, at most 1.
     pub(super) least: R,
+}
+
+/// Volume changes of the wedges of a pair against each other, `½ κ V₀V₁/V (J₀ − J₁)²`.
+pub(super) struct Apart<R> {
+    /// What it adds to the pressures of the wedges, Pa.
+    pub(super) pressures: [R; 2],
+    /// `κ V/(V₀V₁)`, Pa/m³.
+    pub(super) stiffness: R,
+    /// `V_w/V`.
+    shares: [R; 2],
+}
+
+impl<R: Lanes> Apart<R> {
+    /// `V ∂v̄/∂u` and `V₀V₁/V ∂(J₀ − J₁)/∂u` from `V_w ∂J_w/∂u`, m².
+    #[inline(always)]
+    pub(super) fn gradients(&self, of_wedges: &[[V3<R>; N_NODES]; 2]) -> [[V3<R>; N_NODES]; 2] {
+        let mut gradients = *of_wedges;
+        for a in 0..N_NODES {
+            for c in 0..3 {
+                let [first, second] = [of_wedges[0][a][c], of_wedges[1][a][c]];
+                gradients[0][a][c] = first + second;
+                gradients[1][a][c] = self.shares[1] * first - self.shares[0] * second;
+            }
+        }
+        gradients
+    }
 }
 
 /// Nodes, gradients and deformation of a unit: N nodes, two depth points.
@@ -47,6 +75,7 @@ impl<R: Lanes> Wedges<R> {
         let mut wedges = Self {
             f: [[[[zero; 3]; 3]; 2]; 2],
             volumes: [[zero; 2]; 2],
+            changes: [zero; 2],
             change: zero,
             total: zero,
             least: one,
@@ -69,11 +98,31 @@ impl<R: Lanes> Wedges<R> {
                 wedges.f[w][q] = h;
                 wedges.volumes[w][q] = volume;
                 wedges.least = wedges.least.min(j);
-                wedges.change = volume.mul_add(j - one, wedges.change);
+                wedges.changes[w] = volume.mul_add(j - one, wedges.changes[w]);
                 wedges.total = wedges.total + volume;
             }
+            wedges.change = wedges.change + wedges.changes[w];
         }
         wedges
+    }
+
+    /// What the wedges have against changing their volumes against each other; `stiffness` is that of
+    /// the pair to it, Pa. A single prism has none.
+    #[inline(always)]
+    pub(super) fn apart(&self, group: &LaneGroup<'_, R>, stiffness: R) -> Apart<R> {
+        let (zero, one) = (group.splat(0.0), group.splat(1.0));
+        let none = group.splat(NO_VOLUME);
+        let volumes = [0, 1].map(|w| self.volumes[w][0] + self.volumes[w][1]);
+        let second = volumes[1].select_less(none, one, volumes[1]);
+        let stiffness = volumes[1].select_less(none, zero, stiffness);
+        let shares = volumes.map(|volume| volume.divided_by(self.total));
+        let apart = self.changes[0].divided_by(volumes[0]) - self.changes[1].divided_by(second);
+        let pull = stiffness * apart;
+        Apart {
+            pressures: [shares[1] * pull, zero - shares[0] * pull],
+            stiffness: stiffness.divided_by(shares[0]).divided_by(second),
+            shares,
+        }
     }
 
     /// One of the wedges as a unit.

@@ -79,8 +79,10 @@ pub(super) struct Geometry<E> {
 pub(super) struct Stiffness<E> {
     /// Half the shear modulus at the points at rest, Pa; `w'` of laws in the first invariant.
     pub(super) slope: [Row<E>; N_POINTS],
-    /// Bulk modulus times volume, summed over the points, J.
+    /// Bulk modulus, Pa.
     pub(super) bulk: Row<E>,
+    /// What the wedges have against changing their volumes against each other, Pa.
+    pub(super) apart: Row<E>,
 }
 
 /// Constant stresses of a batch: `xx, yy, zz, xy, yz, zx` at the points, and pressure, Pa.
@@ -167,18 +169,20 @@ impl<R: Lanes> LaneGroup<'_, R> {
                 }
             }
         }
-        // V ∂v̄/∂u, for the stiffness of the volume change.
-        let mut gradient = [[zero; 3]; N_NODES];
+        // V_w ∂J_w/∂u of both wedges, for the stiffness of the volume change.
+        let mut gradients = [[[zero; 3]; N_NODES]; 2];
+        let apart = wedges.apart(self, self.load(&self.material.apart));
         for w in 0..2 {
             let unit = wedges.wedge(self, w, self.splat(1.0) - alpha);
-            let gradient = &mut gradient;
+            let pressure = pressure + apart.pressures[w];
+            let gradient = &mut gradients[w];
             let change = VolumeChange::Wedge { pressure, gradient };
             self.add::<6, TANGENT>(&unit, change, &mut sums, stiffness);
         }
         let unit = wedges.mean(self, alpha);
         let change = VolumeChange::Mean {
-            bulk: bulk.divided_by(wedges.total),
-            gradient: &gradient,
+            stiffness: [bulk.divided_by(wedges.total), apart.stiffness],
+            gradients: apart.gradients(&gradients),
         };
         self.add::<N_NODES, TANGENT>(&unit, change, &mut sums, stiffness);
         for (node, force) in sums.forces.iter().enumerate() {

@@ -44,8 +44,8 @@ struct Factors<'a, R, const N: usize> {
     second: [R; 2],
     /// `g/J`.
     spin: [R; 2],
-    /// `bulk` and `gradient` of [`VolumeChange::Mean`].
-    bulk: Option<(R, &'a [V3<R>; N_NODES])>,
+    /// `stiffness` and `gradients` of [`VolumeChange::Mean`].
+    volume: Option<([R; 2], [[V3<R>; N_NODES]; 2])>,
     /// First of the unit's nodes.
     node: usize,
 }
@@ -71,7 +71,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
         change: VolumeChange<'_, R>,
         stiffness: &mut [[Row<R::Element>; 9]; N_BLOCKS],
     ) {
-        let bulk = match change {
+        let volume = match change {
             VolumeChange::Wedge { gradient, .. } => {
                 for q in 0..2 {
                     for a in 0..N {
@@ -81,7 +81,10 @@ impl<R: Lanes> LaneGroup<'_, R> {
                 }
                 None
             }
-            VolumeChange::Mean { bulk, gradient } => Some((bulk, gradient)),
+            VolumeChange::Mean {
+                stiffness,
+                gradients,
+            } => Some((stiffness, gradients)),
         };
         let sigma = self.sigma(ratios);
         let bend = self.bend(ratios, laws, nodes, &sigma);
@@ -101,7 +104,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
             strains: strains.as_ref(),
             second: [laws[0].second, laws[1].second],
             spin: [g[0] * ratios.inv_j[0], g[1] * ratios.inv_j[1]],
-            bulk,
+            volume,
             node: unit.node,
         };
         for a in 0..N {
@@ -271,8 +274,9 @@ impl<R: Lanes> LaneGroup<'_, R> {
         // Factors of the rows of a, scaled once.
         let rows = factors.node + a;
         let lifted = factors
-            .bulk
-            .map(|(stiffness, gradient)| scale(stiffness, &gradient[rows]));
+            .volume
+            .as_ref()
+            .map(|(k, g)| [scale(k[0], &g[0][rows]), scale(k[1], &g[1][rows])]);
         let sharp = factors.steep.map(|steep| {
             [
                 scale(factors.second[0], &steep[0][a]),
@@ -307,8 +311,10 @@ impl<R: Lanes> LaneGroup<'_, R> {
                             }
                         }
                     }
-                    if let (Some(lifted), Some((_, gradient))) = (&lifted, factors.bulk) {
-                        sum = lifted[r].mul_add(gradient[columns][t], sum);
+                    if let (Some(lifted), Some((_, gradients))) = (&lifted, &factors.volume) {
+                        for k in 0..2 {
+                            sum = lifted[k][r].mul_add(gradients[k][columns][t], sum);
+                        }
                     }
                     sum = match (r, t) {
                         (0, 1) => sum + z[2],

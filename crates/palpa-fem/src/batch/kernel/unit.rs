@@ -23,15 +23,16 @@ pub(super) struct Sums<R> {
 
 /// The part of a unit in the energy of the pair's volume change.
 pub(super) enum VolumeChange<'a, R> {
-    /// A wedge: the pressure acts on it, Pa, and its part of `V ∂v̄/∂u` is added to `gradient`, m².
+    /// A wedge: the pressure acts on it, Pa, and `V_w ∂J_w/∂u` is added to `gradient`, m².
     Wedge {
         pressure: R,
         gradient: &'a mut [V3<R>; N_NODES],
     },
-    /// The mean: it has no pressure, and adds the stiffness `bulk · gradient ⊗ gradient`.
+    /// The mean: it has no pressure, and adds the stiffness `Σ stiffness · gradient ⊗ gradient`: of
+    /// the pair's volume, and of the wedges' against each other.
     Mean {
-        bulk: R,
-        gradient: &'a [V3<R>; N_NODES],
+        stiffness: [R; 2],
+        gradients: [[V3<R>; N_NODES]; 2],
     },
 }
 
