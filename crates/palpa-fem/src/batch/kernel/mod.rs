@@ -42,7 +42,7 @@ use super::principal::{PLACES, Six, respond};
 use crate::law::Hardening;
 use algebra::{cauchy_green, cofactor, inv_cbrt};
 use deformation::Wedges;
-use unit::{NO_VOLUME, Sums, VolumeChange};
+use unit::{NO_VOLUME, OfVolume, Sums, VolumeChange};
 
 pub(super) use algebra::{M3, V3, axpy, dot, mul, scale};
 
@@ -180,10 +180,17 @@ impl<R: Lanes> LaneGroup<'_, R> {
             self.add::<6, TANGENT>(&unit, change, &mut sums, stiffness);
         }
         let unit = wedges.mean(self, alpha);
-        let change = VolumeChange::Mean {
-            stiffness: [bulk.divided_by(wedges.total), apart.stiffness],
-            gradients: apart.gradients(&gradients),
-        };
+        let [of_pair, of_wedges] = apart.gradients(&gradients);
+        let change = VolumeChange::Mean([
+            OfVolume {
+                stiffness: bulk.divided_by(wedges.total),
+                gradient: of_pair,
+            },
+            OfVolume {
+                stiffness: apart.stiffness,
+                gradient: of_wedges,
+            },
+        ]);
         self.add::<N_NODES, TANGENT>(&unit, change, &mut sums, stiffness);
         for (node, force) in sums.forces.iter().enumerate() {
             for c in 0..3 {

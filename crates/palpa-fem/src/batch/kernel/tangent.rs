@@ -8,8 +8,8 @@
 
 use super::algebra::{V3, axpy, cross, dot, mul, scale};
 use super::deformation::Unit;
-use super::unit::{Carried, LawAt, Ratios, VolumeChange, times_b};
-use super::{Hardening, LaneGroup, Lanes, N_BLOCKS, N_NODES, Row};
+use super::unit::{Carried, LawAt, OfVolume, Ratios, VolumeChange, times_b};
+use super::{Hardening, LaneGroup, Lanes, N_BLOCKS, Row};
 
 /// A vector for each point and node of a unit.
 type PerNode<R, const N: usize> = [[V3<R>; N]; 2];
@@ -44,8 +44,8 @@ struct Factors<'a, R, const N: usize> {
     second: [R; 2],
     /// `g/J`.
     spin: [R; 2],
-    /// `stiffness` and `gradients` of [`VolumeChange::Mean`].
-    volume: Option<([R; 2], [[V3<R>; N_NODES]; 2])>,
+    /// That of [`VolumeChange::Mean`].
+    volume: Option<[OfVolume<R>; 2]>,
     /// First of the unit's nodes.
     node: usize,
 }
@@ -81,10 +81,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
                 }
                 None
             }
-            VolumeChange::Mean {
-                stiffness,
-                gradients,
-            } => Some((stiffness, gradients)),
+            VolumeChange::Mean(parts) => Some(parts),
         };
         let sigma = self.sigma(ratios);
         let bend = self.bend(ratios, laws, nodes, &sigma);
@@ -276,7 +273,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
         let lifted = factors
             .volume
             .as_ref()
-            .map(|(k, g)| [scale(k[0], &g[0][rows]), scale(k[1], &g[1][rows])]);
+            .map(|parts| [0, 1].map(|k| scale(parts[k].stiffness, &parts[k].gradient[rows])));
         let sharp = factors.steep.map(|steep| {
             [
                 scale(factors.second[0], &steep[0][a]),
@@ -311,9 +308,9 @@ impl<R: Lanes> LaneGroup<'_, R> {
                             }
                         }
                     }
-                    if let (Some(lifted), Some((_, gradients))) = (&lifted, &factors.volume) {
+                    if let (Some(lifted), Some(parts)) = (&lifted, &factors.volume) {
                         for k in 0..2 {
-                            sum = lifted[k][r].mul_add(gradients[k][columns][t], sum);
+                            sum = lifted[k][r].mul_add(parts[k].gradient[columns][t], sum);
                         }
                     }
                     sum = match (r, t) {

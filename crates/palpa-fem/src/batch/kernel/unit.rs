@@ -28,12 +28,16 @@ pub(super) enum VolumeChange<'a, R> {
         pressure: R,
         gradient: &'a mut [V3<R>; N_NODES],
     },
-    /// The mean: it has no pressure, and adds the stiffness `Σ stiffness · gradient ⊗ gradient`: of
-    /// the pair's volume, and of the wedges' against each other.
-    Mean {
-        stiffness: [R; 2],
-        gradients: [[V3<R>; N_NODES]; 2],
-    },
+    /// The mean: it has no pressure, and adds the stiffness of the pair's volume, and that of its wedges'
+    /// volumes against each other.
+    Mean([OfVolume<R>; 2]),
+}
+
+/// The stiffness `stiffness · gradient ⊗ gradient` of a change of volume; Pa/m³ and m².
+#[derive(Clone, Copy)]
+pub(super) struct OfVolume<R> {
+    pub(super) stiffness: R,
+    pub(super) gradient: [V3<R>; N_NODES],
 }
 
 /// Volume ratios of a unit's points.
@@ -103,7 +107,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
         let laws = [self.law_at(unit, &ratios, 0), self.law_at(unit, &ratios, 1)];
         let pressure = match &change {
             VolumeChange::Wedge { pressure, .. } => *pressure,
-            VolumeChange::Mean { .. } => self.splat(0.0),
+            VolumeChange::Mean(_) => self.splat(0.0),
         };
         let g = self.pulls(unit, &ratios, &laws, pressure);
         let nodes = self.add_forces(unit, &ratios, &laws, &g, &mut sums.forces);
