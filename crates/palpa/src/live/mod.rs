@@ -44,7 +44,7 @@ use crate::accuracy::ORDER;
 use crate::build::{Pressed, build_for, in_mm};
 use crate::note::Note;
 use crate::prepare::Prepared;
-use crate::press::mesh::{Sizes, along_skin};
+use crate::press::mesh::{Sizes, along_skin, young_of};
 use crate::press::tissue::{note_mesh, note_tension};
 use crate::skin::Skin;
 
@@ -294,9 +294,8 @@ fn choose_alpha(scene: &mut Scene) {
     if scene.model.alpha.is_some() {
         return;
     }
-    let young = |layer: usize| scene.layers.get(layer).and_then(|l| l.tissue.young());
-    let bends = young(0)
-        .zip(young(1))
+    let bends = young_of(scene, 0)
+        .zip(young_of(scene, 1))
         .is_some_and(|(own, under)| own > under);
     let (alpha, below) = if bends {
         (BENDING_ALPHA, Some(ALPHA_BELOW))

@@ -695,16 +695,20 @@ fn split_near(
     (split_levels(&body, &parts).body, is_met)
 }
 
+/// Young's modulus of a layer, Pa, if there is such a layer and its tissue has one.
+pub(crate) fn young_of(scene: &Scene, layer: usize) -> Option<f64> {
+    scene.layers.get(layer).and_then(|l| l.tissue.young())
+}
+
 /// For each interval, the largest share of it that a part may be, so that layers near the tool that are
 /// softer than what lies under them have as many intervals as wanted. `depths` are those of the levels, m.
 fn shares_of_squeezed(scene: &Scene, body: &LayeredBody, depths: &[f64], sizes: Sizes) -> Vec<f64> {
     let layers = &body.interval_layer;
-    let young = |layer: usize| scene.layers.get(layer).and_then(|l| l.tissue.young());
     let share = |&layer: &usize| {
         let is_of = |of: &&usize| **of == layer;
         let top = layers.iter().position(|of| *of == layer).unwrap_or(0);
         // Under the lowest layer is bone.
-        let is_softer = match (young(layer), young(layer + 1)) {
+        let is_softer = match (young_of(scene, layer), young_of(scene, layer + 1)) {
             (Some(own), Some(under)) => own < under,
             (Some(_), None) => true,
             (None, _) => false,

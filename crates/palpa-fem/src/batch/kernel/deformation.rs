@@ -16,9 +16,8 @@ pub(super) struct Wedges<R> {
     pub(super) f: [[M3<R>; 2]; 2],
     /// m³. `[wedge][point]`
     pub(super) volumes: [[R; 2]; 2],
-    /// `Σ V (J − 1)` of each wedge and of both, m³.
+    /// `Σ V (J − 1)` of each wedge, m³.
     changes: [R; 2],
-    pub(super) change: R,
     /// `Σ V`, m³.
     pub(super) total: R,
     /// Least volume ratio of a point, at most 1.
@@ -76,7 +75,6 @@ impl<R: Lanes> Wedges<R> {
             f: [[[[zero; 3]; 3]; 2]; 2],
             volumes: [[zero; 2]; 2],
             changes: [zero; 2],
-            change: zero,
             total: zero,
             least: one,
         };
@@ -101,9 +99,14 @@ impl<R: Lanes> Wedges<R> {
                 wedges.changes[w] = volume.mul_add(j - one, wedges.changes[w]);
                 wedges.total = wedges.total + volume;
             }
-            wedges.change = wedges.change + wedges.changes[w];
         }
         wedges
+    }
+
+    /// `Σ V (J − 1)` of both, m³.
+    #[inline(always)]
+    pub(super) fn change(&self) -> R {
+        self.changes[0] + self.changes[1]
     }
 
     /// What the wedges have against changing their volumes against each other; `stiffness` is that of

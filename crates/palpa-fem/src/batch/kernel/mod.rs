@@ -153,7 +153,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
         let alpha = self.load(&self.geometry.alpha);
         let wedges = Wedges::new(self, local);
         let bulk = self.load(&self.material.bulk);
-        let mut pressure = bulk * wedges.change.divided_by(wedges.total);
+        let mut pressure = bulk * wedges.change().divided_by(wedges.total);
         if let Some(constant) = self.constant {
             pressure = pressure + self.load(&constant.pressure);
         }
@@ -206,7 +206,7 @@ impl<R: Lanes> LaneGroup<'_, R> {
     #[inline(always)]
     pub(super) fn elastic(&self, local: &Local<R::Element>, out: &mut Constant<R::Element>) {
         let wedges = Wedges::new(self, local);
-        let pressure = self.load(&self.material.bulk) * wedges.change.divided_by(wedges.total);
+        let pressure = self.load(&self.material.bulk) * wedges.change().divided_by(wedges.total);
         pressure.store(&mut out.pressure[self.at..]);
         let (sums, shares) = wedges.shares(self.splat(1.0));
         let units = [
