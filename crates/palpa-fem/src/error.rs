@@ -86,6 +86,14 @@ pub enum FemError {
         /// The value given.
         alpha: f64,
     },
+    /// The share of the bulk modulus between the wedges of a pair is out of range.
+    #[error(
+        "apart is {apart}, outside 0 to 1; 0.1 is enough for soft layers that are squeezed flat"
+    )]
+    Apart {
+        /// The value given.
+        apart: f64,
+    },
     /// The factor would need too much memory.
     #[error(
         "the factor of {n_dofs} unknowns would take more than 8 GiB; make the mesh coarser, with fewer levels, or cut out a part"

@@ -27,6 +27,7 @@ mod system;
 
 pub use contact::Touch;
 pub use dynamics::Dynamics;
+pub use element::Shares;
 pub use error::FemError;
 pub use fields::{PrismField, level_forces, prism_fields, relaxed_fields};
 pub use law::{Kinematics, Law, Material, Response, VolumeMeasure};

@@ -30,27 +30,25 @@ impl Supports {
     }
 }
 
-/// Share of the bulk modulus with which the two wedges of a pair resist to change their volumes against
-/// each other, below the first layer.
-const APART: f64 = 0.1;
-
 /// Parameters of the element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParams {
-    /// Share of the pair's mean deviator in the first layer, 0 to below 1; the rest is the share of the
-    /// single wedges. Near 1, single nodes show hourglass modes.
-    pub alpha: f64,
-    /// The same in the layers below it. It makes little difference to forces there, and soft layers that
-    /// are squeezed flat keep their balance longer with 0.
-    pub alpha_below: f64,
+    /// Those of the first layer.
+    pub first: Shares,
+    /// Those of the layers below it. `alpha` makes little difference to forces there, and soft layers
+    /// that are squeezed flat keep their balance longer with 0 and with some `apart`; coarse triangles of
+    /// a tense first layer lose theirs with it.
+    pub below: Shares,
 }
 
 impl ModelParams {
-    /// The same share in all layers.
+    /// The same share of the pair's mean in all layers, and wedges that may change their volumes against
+    /// each other.
     pub fn even(alpha: f64) -> Self {
+        let shares = Shares { alpha, apart: 0.0 };
         Self {
-            alpha,
-            alpha_below: alpha,
+            first: shares,
+            below: shares,
         }
     }
 }
@@ -93,18 +91,12 @@ impl Model {
         self.materials.iter().any(|m| m.prestress != 0.0)
     }
 
-    /// Shares of a pair's mean and of its wedges in an interval. The wedges of the first layer do not
-    /// resist different changes of volume: it is the soft layers below it that need this when they are
-    /// squeezed flat, and coarse triangles of tense skin lose their balance with it.
+    /// Shares of a pair's mean and of its wedges in an interval.
     pub(crate) fn shares(&self, interval: usize) -> Shares {
-        let ModelParams { alpha, alpha_below } = self.params;
         if self.body.interval_layer[interval] == 0 {
-            Shares { alpha, apart: 0.0 }
+            self.params.first
         } else {
-            Shares {
-                alpha: alpha_below,
-                apart: APART,
-            }
+            self.params.below
         }
     }
 
@@ -137,9 +129,12 @@ impl Model {
         params: ModelParams,
         pairs: &[[u32; 4]],
     ) -> Result<Self, FemError> {
-        for alpha in [params.alpha, params.alpha_below] {
+        for Shares { alpha, apart } in [params.first, params.below] {
             if !(0.0..1.0).contains(&alpha) {
                 return Err(FemError::Alpha { alpha });
+            }
+            if !(0.0..=1.0).contains(&apart) {
+                return Err(FemError::Apart { apart });
             }
         }
         materials.check(body)?;

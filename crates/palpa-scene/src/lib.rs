@@ -49,7 +49,7 @@ pub use elastic::{Elastic, Resistance, Stiffness, Volume};
 pub use error::{Place, SceneError};
 pub use law::{Energy, OgdenTerm};
 pub use lump::{Lump, LumpPlace, LumpShape};
-pub use model::{Damping, Dynamics, Mesh, Model, ModelKind};
+pub use model::{BelowFirst, Damping, Dynamics, Mesh, Model, ModelKind};
 pub use motion::{Device, DeviceKind, DevicePreset, Grip, Motion, MotionKind};
 pub use scene::{
     Body, CutFaces, Cutout, Generator, InPlane, Layer, LengthUnit, Press, Reference, Scene, Skin,

@@ -16,9 +16,9 @@ pub struct Model {
     /// softer and more accurate on a coarse mesh, but a node that is pressed alone can then move
     /// against its neighbours. `None` is [automatic](Self::alpha()).
     pub alpha: Option<f64>,
-    /// The same share in the layers below the first, if it is not the same there. A scene's file cannot
-    /// give it.
-    pub alpha_below: Option<f64>,
+    /// What prisms share in the layers below the first, if it is not the same there. A scene's file
+    /// cannot give it.
+    pub below: Option<BelowFirst>,
     /// Whether inertia and damping are included.
     pub dynamics: Dynamics,
     /// Tolerance of the force balance: the largest unbalanced force at a free node, relative to the
@@ -33,9 +33,21 @@ impl Model {
     }
 
     /// The same in the layers below the first.
-    pub fn alpha_below(&self) -> f64 {
-        self.alpha_below.unwrap_or(self.alpha())
+    pub fn below(&self) -> BelowFirst {
+        self.below.unwrap_or(BelowFirst {
+            alpha: self.alpha(),
+            apart: 0.0,
+        })
     }
+}
+
+/// What two paired prisms share in the layers below the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BelowFirst {
+    /// Share of the deviatoric strain that they average.
+    pub alpha: f64,
+    /// Share of the bulk modulus with which they resist to change their volumes against each other.
+    pub apart: f64,
 }
 
 /// The models of the body.

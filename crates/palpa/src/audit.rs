@@ -395,6 +395,6 @@ fn finer(scene: &Scene, at: Vec3, depth: f64) -> Scene {
     scene.mesh.level_growth = None;
     scene.mesh.accuracy = None;
     scene.model.alpha = Some(ALPHA);
-    scene.model.alpha_below = None;
+    scene.model.below = None;
     scene
 }

@@ -12,7 +12,7 @@ use anyhow::bail;
 use palpa_fem::lump::Lump;
 use palpa_fem::shape::{Pose, Tool as RigidTool};
 use palpa_fem::{
-    Load, Materials, Model, ModelParams, Outcome, PosedTool, SolveParams, State, Supports,
+    Load, Materials, Model, ModelParams, Outcome, PosedTool, Shares, SolveParams, State, Supports,
     Workspace, advance,
 };
 use palpa_mesh::growth::MAX_NODES;
@@ -314,8 +314,15 @@ impl Approach {
 
 /// Parameters of a scene's elements.
 pub(crate) fn element_params(scene: &Scene) -> ModelParams {
+    let below = scene.model.below();
     ModelParams {
-        alpha: scene.model.alpha(),
-        alpha_below: scene.model.alpha_below(),
+        first: Shares {
+            alpha: scene.model.alpha(),
+            apart: 0.0,
+        },
+        below: Shares {
+            alpha: below.alpha,
+            apart: below.apart,
+        },
     }
 }

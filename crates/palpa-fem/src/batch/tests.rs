@@ -11,7 +11,7 @@ use crate::law::{
 use crate::model::Model;
 use crate::state::Memory;
 use crate::system::LinearSystem;
-use crate::{Mat3, Material, Materials, ModelParams, State, Supports};
+use crate::{Mat3, Material, Materials, ModelParams, Shares, State, Supports};
 use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
 use palpa_mesh::{LayeredBody, Vec3};
 
@@ -161,7 +161,14 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
             } else {
                 Supports::default()
             };
-            let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
+            let params = ModelParams {
+                below: Shares {
+                    alpha: 0.3,
+                    apart: 0.1,
+                },
+                ..ModelParams::default()
+            };
+            let model = Model::build(&body, &materials, &supports, params).unwrap();
             let mut memory = Memory::new(&model);
             let mut state = State::new(&model);
             let [first, u] = deformations(&model, strain);

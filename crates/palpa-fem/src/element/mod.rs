@@ -79,12 +79,13 @@ pub(crate) struct GroupLayout {
 
 /// Shares of a pair's mean and of its wedges in its energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Shares {
-    /// `α`, that of the pair's mean deviator.
-    pub(crate) alpha: f64,
+pub struct Shares {
+    /// `α`, that of the pair's mean deviator, 0 to below 1; the rest is that of the single wedges. Near 1,
+    /// single nodes show hourglass modes.
+    pub alpha: f64,
     /// `γ`, that of the bulk modulus with which the wedges resist to change their volumes against each
-    /// other.
-    pub(crate) apart: f64,
+    /// other, 0 to 1.
+    pub apart: f64,
 }
 
 /// Number of nodes of a pair; those of column c are 2 c (upper) and 2 c + 1 (lower).

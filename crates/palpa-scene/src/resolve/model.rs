@@ -38,7 +38,7 @@ impl Reader<'_> {
                 None => None,
                 Some(alpha) => Some(at.key("alpha").within(alpha, &limits::ALPHA)?),
             },
-            alpha_below: None,
+            below: None,
             dynamics,
             tolerance: at
                 .key("tolerance")

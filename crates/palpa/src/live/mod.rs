@@ -37,7 +37,7 @@ use palpa_fem::realtime::{ExteriorMode, FineBodies, Live, LiveParams, Roaming};
 use palpa_fem::shape::Tool as RigidTool;
 use palpa_fem::{Model, PosedTool};
 use palpa_mesh::Vec3;
-use palpa_scene::{Mesh, Scene, Skin as GivenSkin};
+use palpa_scene::{BelowFirst, Mesh, Scene, Skin as GivenSkin};
 use palpa_servo::Pose;
 
 use crate::accuracy::ORDER;
@@ -76,10 +76,14 @@ const LEVEL_SHARE: f64 = 0.4;
 /// Share of the strain that pairs average ([`palpa_scene::Model::alpha()`]), where the scene gives none. Triangles
 /// are wide here, and pairs of them too soft with 0.8.
 const ALPHA: f64 = 0.65;
-/// The same in a first layer that lies over a softer one, which it bends over, and in the layers below it. In
-/// those it changes the force by less than 1 %, but steps over thin fat fail where pairs average anything.
+/// The same in a first layer that lies over a softer one, which it bends over.
 const BENDING_ALPHA: f64 = 0.9;
-const ALPHA_BELOW: f64 = 0.0;
+/// The same in the layers below such a one, where it changes the force by less than 1 %, but steps over thin fat
+/// fail if pairs average anything, or if their prisms may change their volumes against each other at no cost.
+const BELOW_BENDING: BelowFirst = BelowFirst {
+    alpha: 0.0,
+    apart: 0.1,
+};
 /// Least number of intervals of a layer that is softer than what lies under it, near the tool: with two the force
 /// is 3 to 5 % more.
 const IN_SQUEEZED: usize = 3;
@@ -298,12 +302,12 @@ fn choose_alpha(scene: &mut Scene) {
         .zip(young_of(scene, 1))
         .is_some_and(|(own, under)| own > under);
     let (alpha, below) = if bends {
-        (BENDING_ALPHA, Some(ALPHA_BELOW))
+        (BENDING_ALPHA, Some(BELOW_BENDING))
     } else {
         (ALPHA, None)
     };
     scene.model.alpha = Some(alpha);
-    scene.model.alpha_below = below;
+    scene.model.below = below;
 }
 
 /// Radius of a zone that contains the contact at the hand's depth, m.
