@@ -191,46 +191,36 @@ impl Reference {
     /// N, in the scene's frame; `None` if no equilibrium was found. It is instantaneous: nothing
     /// relaxes.
     pub fn press(&self, tool: &PosedTool) -> Option<Vec3> {
-        let out = tool.pose.rotation * Vec3::z();
-        let above = |height: f64| {
-            let mut tool = *tool;
-            tool.pose.translation.vector += out * height;
-            Stop { tool, time: 0.0 }
+        let mut coarse = Walk::new(&self.mesh, above(tool, HEIGHTS[0]));
+        let force = coarse.press(tool)?;
+        let Some(fine) = &self.halved else {
+            return Some(force);
         };
-        *self
-            .forces(&HEIGHTS.map(above), ON_THE_WAY, || true)
-            .last()?
+        // It goes the way itself only where the state of the other mesh does not lead to its own.
+        let pose = above(tool, 0.0);
+        let fine = (Walk::at_state_of(&coarse, fine, pose))
+            .and_then(|mut walk| walk.go(pose, TOLERANCE))
+            .or_else(|| Walk::new(fine, above(tool, HEIGHTS[0])).press(tool))?;
+        Some(extrapolated(force, fine))
     }
 
     /// Static forces of the tissue on a tool that goes from stop to stop, N, in the scene's frame.
     /// The first stop must not touch the body. From the first stop without an equilibrium on, and if
     /// `goes_on`, which is asked before each stop, returns false, they are `None`.
-    pub fn follow(&self, stops: &[Stop], goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
-        self.forces(stops, TOLERANCE, goes_on)
-    }
-
-    /// As [`Self::follow`]. `on_the_way` is the tolerance of all stops but the last.
-    fn forces(
-        &self,
-        stops: &[Stop],
-        on_the_way: f64,
-        mut goes_on: impl FnMut() -> bool,
-    ) -> Vec<Option<Vec3>> {
+    pub fn follow(&self, stops: &[Stop], mut goes_on: impl FnMut() -> bool) -> Vec<Option<Vec3>> {
         let mut forces = vec![None; stops.len()];
         let Some(first) = stops.first() else {
             return forces;
         };
         let mut coarse = Walk::new(&self.mesh, *first);
         let mut fine = self.halved.as_ref().map(|mesh| Walk::new(mesh, *first));
-        for (i, (force, stop)) in forces.iter_mut().zip(stops).enumerate() {
+        for (force, stop) in forces.iter_mut().zip(stops) {
             if !goes_on() {
                 break;
             }
-            let is_last = i + 1 == stops.len();
-            let tolerance = if is_last { TOLERANCE } else { on_the_way };
-            let mut found = coarse.go(*stop, tolerance);
+            let mut found = coarse.go(*stop, TOLERANCE);
             if let (Some(coarse), Some(fine)) = (found, &mut fine) {
-                let fine = fine.go(*stop, tolerance);
+                let fine = fine.go(*stop, TOLERANCE);
                 found = fine.map(|fine| extrapolated(coarse, fine));
             }
             if found.is_none() {
@@ -240,6 +230,14 @@ impl Reference {
         }
         forces
     }
+}
+
+/// The tool drawn back along its own axis, m.
+fn above(tool: &PosedTool, height: f64) -> Stop {
+    let mut tool = *tool;
+    let out = tool.pose.rotation * Vec3::z();
+    tool.pose.translation.vector += out * height;
+    Stop { tool, time: 0.0 }
 }
 
 /// The force on an infinitely fine mesh, from that on a mesh and that with its sizes halved: errors
@@ -275,6 +273,35 @@ impl<'a> Walk<'a> {
             ws: Workspace::new(&mesh.model),
             at,
         }
+    }
+
+    /// A tool at `at` on a mesh that has every interval of another halved, in the state of the other: `None` if
+    /// it is not that mesh.
+    fn at_state_of(other: &Self, mesh: &'a Mesh, at: Stop) -> Option<Self> {
+        let [coarse, fine] = [&other.mesh.model, &mesh.model].map(|model| model.body());
+        if fine.skin.points != coarse.skin.points || fine.n_levels != 2 * coarse.n_levels - 1 {
+            return None;
+        }
+        let mut walk = Self::new(mesh, at);
+        let moves = &other.state.displacements;
+        for v in 0..coarse.n_vertices() {
+            for level in 0..fine.n_levels {
+                let at = |level: usize| moves[coarse.node(v, level)];
+                walk.state.displacements[fine.node(v, level)] =
+                    0.5 * (at(level / 2) + at(level.div_ceil(2)));
+            }
+        }
+        walk.state.touches.clone_from(&other.state.touches);
+        Some(walk)
+    }
+
+    /// Comes down to a pose along the tool's own axis; the force there, N, if an equilibrium is found.
+    fn press(&mut self, tool: &PosedTool) -> Option<Vec3> {
+        let (last, way) = HEIGHTS.split_last()?;
+        for height in way {
+            self.go(above(tool, *height), ON_THE_WAY)?;
+        }
+        self.go(above(tool, *last), TOLERANCE)
     }
 
     /// Goes on to a stop; the force there, N, if an equilibrium is found.

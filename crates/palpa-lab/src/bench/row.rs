@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::growth::Growth;
 use super::ratios::Ratio;
-use super::shipped::ShippedRow;
+use super::shipped::{PoseRow, ShippedRow};
 
 /// Part of the stiffness that a step recomputes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -105,6 +105,8 @@ pub struct BenchReport {
     pub is_complete: bool,
     /// Shipped scenes.
     pub shipped: Vec<ShippedRow>,
+    /// Their poses that were solved again.
+    pub poses: Vec<PoseRow>,
     /// Uniform blocks and graded bodies.
     pub rows: Vec<BenchRow>,
     /// Growth of the cost with the size of the body.
@@ -126,9 +128,10 @@ impl Serialize for BenchReport {
         }
         let shipped = self.shipped.iter().map(Row::Shipped);
         let rows: Vec<Row<'_>> = shipped.chain(self.rows.iter().map(Row::Uniform)).collect();
-        let mut report = serializer.serialize_struct("BenchReport", 5)?;
+        let mut report = serializer.serialize_struct("BenchReport", 6)?;
         report.serialize_field("is_complete", &self.is_complete)?;
         report.serialize_field("rows", &rows)?;
+        report.serialize_field("poses", &self.poses)?;
         report.serialize_field("growth", &self.growth)?;
         report.serialize_field("ratios", &self.ratios)?;
         report.serialize_field("method", self.method)?;

@@ -36,8 +36,8 @@ const METHOD: &str = "shipped scenes: the scene with its default mesh, as the lo
 /// Shipped scenes: an ideal hand presses, strokes and lifts at random places of the scenes that users
 /// run, on the mesh that they get; forces are compared with static forces on finer meshes. Uniform
 /// blocks: bodies of 1,000 to 64,000 nodes, and meshes graded toward the tool. Rates are those of
-/// thread-CPU time on one core. Writes `bench.json`, `bench_shipped.csv`, `bench.csv`, `bench.svg` and
-/// `bench.png`.
+/// thread-CPU time on one core. Writes `bench.json`, `bench_shipped.csv`, `bench_poses.csv`, `bench.csv`,
+/// `bench.svg` and `bench.png`.
 #[derive(Debug, clap::Args)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -139,6 +139,13 @@ fn finish(report: &mut BenchReport, context: &Context) -> anyhow::Result<()> {
     if !report.shipped.is_empty() {
         let mut table = out.table("bench_shipped.csv")?;
         for row in &report.shipped {
+            table.push(row)?;
+        }
+        table.finish()?;
+    }
+    if !report.poses.is_empty() {
+        let mut table = out.table("bench_poses.csv")?;
+        for row in &report.poses {
             table.push(row)?;
         }
         table.finish()?;

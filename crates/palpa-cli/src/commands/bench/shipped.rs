@@ -21,7 +21,10 @@ pub(super) fn measure_all(
         progress.set_message(case.name.clone());
         match measure(case, params, || !context.is_interrupted()) {
             // What an interrupted case measured until then is its row.
-            Ok(row) => report.shipped.push(row),
+            Ok(found) => {
+                report.shipped.push(found.row);
+                report.poses.extend(found.poses);
+            }
             Err(_) if context.is_interrupted() => break,
             Err(error) => return Err(error.context(format!("case \"{}\"", case.name))),
         }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::drive::{Driven, Felt, Part, StepTime, drive};
 use super::places::{Spot, draw_spots};
-use super::{ShippedCase, ShippedRow};
+use super::{PoseRow, ShippedCase, ShippedRow};
 
 /// Poses are drawn from this depth on, m.
 const FROM_DEPTH: f64 = 2e-3;
@@ -28,18 +28,19 @@ pub struct MeasureParams {
     pub n_poses: usize,
 }
 
-/// An audited pose.
-#[derive(Debug, Clone, Copy)]
-struct Audited {
-    part: Part,
-    error: Option<f64>,
-    mesh_error: Option<f64>,
+/// What is found of a case.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// Its row of the table.
+    pub row: ShippedRow,
+    /// Its poses that were solved again.
+    pub poses: Vec<PoseRow>,
 }
 
 /// What the audit of a way finds.
 #[derive(Debug, Default)]
 struct Audit {
-    poses: Vec<Audited>,
+    poses: Vec<PoseRow>,
     /// Least number of nodes of a reference mesh.
     nodes: Option<usize>,
     /// See [`ShippedRow::reference_change`].
@@ -56,7 +57,7 @@ pub fn measure(
     case: &ShippedCase,
     params: &MeasureParams,
     goes_on: impl Fn() -> bool + Sync,
-) -> anyhow::Result<ShippedRow> {
+) -> anyhow::Result<Measured> {
     let mut row = ShippedRow {
         case: case.name.clone(),
         accuracy: case.scene.mesh.accuracy.unwrap_or(ACCURACY),
@@ -100,7 +101,7 @@ pub fn measure(
     enter_motion(&mut row, &moving);
     let audits = ways.par_iter().enumerate().map(|(k, (live, felt, poses))| {
         if goes_on() {
-            audit(felt, live, poses, k, &goes_on)
+            audit(felt, live, poses, (&row, k), &goes_on)
         } else {
             Ok(Audit::default())
         }
@@ -108,9 +109,9 @@ pub fn measure(
     let audits = audits.collect::<anyhow::Result<Vec<Audit>>>()?;
     row.reference_nodes = audits.iter().filter_map(|audit| audit.nodes).min();
     row.reference_change = audits.iter().find_map(|audit| audit.change);
-    let poses: Vec<Audited> = audits.into_iter().flat_map(|audit| audit.poses).collect();
+    let poses: Vec<PoseRow> = audits.into_iter().flat_map(|audit| audit.poses).collect();
     enter_errors(&mut row, &poses);
-    Ok(row)
+    Ok(Measured { row, poses })
 }
 
 fn note(row: &mut ShippedRow, spot: &Spot, driven: &Driven) {
@@ -123,8 +124,8 @@ fn note(row: &mut ShippedRow, spot: &Spot, driven: &Driven) {
     row.n_failed += driven.n_failed;
 }
 
-fn enter_errors(row: &mut ShippedRow, audited: &[Audited]) {
-    let of_poses = audited.iter().map(|pose| Some((pose.part, pose.error?)));
+fn enter_errors(row: &mut ShippedRow, audited: &[PoseRow]) {
+    let of_poses = (audited.iter()).map(|pose| Some((pose.part, pose.total_error?)));
     let errors: Vec<(Part, f64)> = of_poses.flatten().collect();
     row.n_poses = errors.len();
     row.n_poses_failed = audited.len() - errors.len();
@@ -179,7 +180,7 @@ fn audit(
     felt: &[Felt],
     live: &LiveScene,
     chosen: &[usize],
-    k: usize,
+    (row, place): (&ShippedRow, usize),
     goes_on: &impl Fn() -> bool,
 ) -> anyhow::Result<Audit> {
     let mut audit = Audit::default();
@@ -189,7 +190,7 @@ fn audit(
     let stops: Vec<Stop> = felt.iter().map(stop).collect();
     let prepared = &live.prepared;
     let of_chosen: Vec<Stop> = chosen.iter().map(|&i| stops[i]).collect();
-    if k == 0 {
+    if place == 0 {
         let tool = &of_chosen[of_chosen.len() / 2].tool;
         audit.change = Quality::find(prepared, tool, goes_on).map(|quality| quality.change);
     }
@@ -225,11 +226,18 @@ fn audit(
     let poses = chosen.iter().zip(forces).map(|(&i, force)| {
         let felt = &felt[i];
         let error = |found: Vec3| Some(share(found, force?));
-        let on_loop = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
-        Audited {
+        let on_mesh = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
+        PoseRow {
+            case: row.case.clone(),
+            accuracy: row.accuracy,
+            place,
             part: felt.part,
-            error: error(felt.force),
-            mesh_error: on_loop.and_then(error),
+            depth_mm: felt.depth * 1e3,
+            force_n: felt.force.norm(),
+            static_n: force.map(|force| force.norm()),
+            on_mesh_n: on_mesh.map(|force| force.norm()),
+            total_error: error(felt.force),
+            mesh_error: on_mesh.and_then(error),
         }
     });
     audit.poses = poses.collect();

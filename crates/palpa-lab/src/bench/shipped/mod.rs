@@ -16,6 +16,6 @@ mod row;
 
 pub use cases::{ShippedCase, Variant, shipped_cases};
 pub use drive::{Driven, Felt, Part, StepTime, drive};
-pub use measure::{MeasureParams, measure};
+pub use measure::{MeasureParams, Measured, measure};
 pub use places::{Spot, draw_spots};
-pub use row::ShippedRow;
+pub use row::{PoseRow, ShippedRow};

@@ -2,6 +2,33 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::drive::Part;
+
+/// A pose that was solved again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PoseRow {
+    /// Name of the case.
+    pub case: String,
+    /// See [`ShippedRow::accuracy`].
+    pub accuracy: f64,
+    /// Number of the place.
+    pub place: usize,
+    /// Part of the way.
+    pub part: Part,
+    /// Depth of the device below the first touch at the place.
+    pub depth_mm: f64,
+    /// Force of the loop at 1 kHz.
+    pub force_n: f64,
+    /// Static force on finer meshes; `None` if no equilibrium was found.
+    pub static_n: Option<f64>,
+    /// Static force on the loop's mesh; `None` if the way matters, or if no equilibrium was found.
+    pub on_mesh_n: Option<f64>,
+    /// Difference between the first two, as vectors, as a share of the static force.
+    pub total_error: Option<f64>,
+    /// Difference between the last two, likewise.
+    pub mesh_error: Option<f64>,
+}
+
 /// What one scene gives at all its places.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ShippedRow {
