@@ -63,7 +63,7 @@ fn forces(model: &Arc<Model>, exterior: ExteriorMode, lost: &[usize]) -> Vec<(f6
         let report = live.step(&tools, DT);
         // While jobs are lost the tool may leave the zone.
         let is_good = report.outcome == StepOutcome::Arrived;
-        let is_there = report.outcome != StepOutcome::Failed;
+        let is_there = !matches!(report.outcome, StepOutcome::Held | StepOutcome::Failed);
         assert!(is_good || is_there && !lost.is_empty(), "{k}: {report:?}");
         forces.push((live.tool_force(0).z, report.zone));
         if let Some(job) = live.take_job() {

@@ -346,7 +346,7 @@ impl Ridden {
         match report.outcome {
             StepOutcome::Arrived | StepOutcome::Behind => {}
             StepOutcome::BackedOff => self.n_bad[0] += 1,
-            StepOutcome::Failed => self.n_bad[1] += 1,
+            StepOutcome::Held | StepOutcome::Failed => self.n_bad[1] += 1,
         }
         if let Some(last) = last {
             self.n_zone_switches += usize::from(last.zone != report.zone);

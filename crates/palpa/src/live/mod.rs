@@ -66,11 +66,10 @@ pub const GOOD_TRAVEL: f64 = 0.2e-3;
 const MOST_NODES: usize = 80_000;
 /// Default length of the edges under the tool, as a share of its contact radius.
 const EDGE_SHARE: f64 = 0.45;
-/// The same for an accuracy of 2 %. Between the two levels have most of the error, and edges hardly change: with
-/// this power of the accuracy. Below and above, they change as all other sizes.
-const FINE_EDGE_SHARE: f64 = 0.4;
+/// Between the default accuracy and this one, edges and heights near the tool hardly change, with this power of
+/// the accuracy: in motion, finer ones lose more than they gain. Below and above, they change as all other sizes.
 const FINE: f64 = 0.02;
-const EDGE_EXPONENT: f64 = 0.29;
+const GENTLE_EXPONENT: f64 = 0.11;
 /// Default height of the intervals at the skin, as a share of the contact radius.
 const LEVEL_SHARE: f64 = 0.4;
 /// Share of the strain that pairs average ([`palpa_scene::Model::alpha()`]), where the scene gives none. Triangles
@@ -262,15 +261,16 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     let looser = accuracy / ACCURACY;
     let scale = looser.powf(1.0 / ORDER);
     let is_given = mesh.near_tool.is_some();
-    let height = mesh.near_tool_at(&scene.tool, scale * LEVEL_SHARE);
-    let edge = (EDGE_SHARE * looser.powf(EDGE_EXPONENT))
-        .min(FINE_EDGE_SHARE * (accuracy / FINE).powf(1.0 / ORDER))
-        .max(EDGE_SHARE * scale);
-    mesh.near_tool = mesh.near_tool_at(&scene.tool, edge);
+    let gentle = |accuracy: f64| (accuracy / ACCURACY).powf(GENTLE_EXPONENT);
+    let near = gentle(accuracy)
+        .min(gentle(FINE) * (accuracy / FINE).powf(1.0 / ORDER))
+        .max(scale);
+    let height = mesh.near_tool_at(&scene.tool, near * LEVEL_SHARE);
+    mesh.near_tool = mesh.near_tool_at(&scene.tool, near * EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
     if mesh.growth.is_none() {
         mesh.growth = Some(EDGE_GROWTH);
-        mesh.level_growth.get_or_insert(scale * Mesh::GROWTH);
+        mesh.level_growth.get_or_insert(near * Mesh::GROWTH);
     }
     if mesh.near_lumps.is_none() {
         let lumps = scene.lumps.iter();

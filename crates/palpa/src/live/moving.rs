@@ -182,9 +182,13 @@ impl Tissue for LiveTissue {
             StepOutcome::Arrived => StepStatus::Unfinished,
             StepOutcome::Behind => StepStatus::Behind,
             StepOutcome::BackedOff => StepStatus::Settling,
-            StepOutcome::Failed => StepStatus::Failed,
+            // The local model is still that of the state held.
+            StepOutcome::Held if self.local_from.is_some() => StepStatus::Behind,
+            StepOutcome::Held | StepOutcome::Failed => StepStatus::Failed,
         };
-        if status.has_patch() {
+        if report.outcome == StepOutcome::Held {
+            self.local_from = self.local_from.map(|_| input.sampled_at);
+        } else if status.has_patch() {
             self.body
                 .live_mut()
                 .local_model(MAX_CONTACTS, &mut self.local);

@@ -7,11 +7,14 @@ use super::super::candidate::Candidate;
 use super::Live;
 use super::candidates::SkinForces;
 use super::pressed::nearest_vertex;
+use super::report::StepOutcome;
 use crate::posed_tool::PosedTool;
 
 /// The slowest pace.
 const LEAST_PACE: f64 = 1.0 / 64.0;
-/// Failed steps in a row after which a body restarts from rest.
+/// Failed steps in a row after which a body restarts from rest. Until then it holds its last good state, whose
+/// local model is right for a moment only: after 200 steps without a restart, forces were up to four times too
+/// large where the tool had gone on.
 const MOST_FAILED: u32 = 8;
 /// Distance by which tools are lifted off a body at rest each time, m, and the largest number of
 /// lifts.
@@ -82,14 +85,17 @@ impl Live {
 
     /// Called after a step that has lost the body. Returns to the last good state, or after several
     /// such steps in a row to rest. The tools are followed more slowly from there.
-    pub(super) fn recover(&mut self) {
+    pub(super) fn recover(&mut self) -> StepOutcome {
         self.recovery.n_failed += 1;
-        if self.recovery.n_failed < MOST_FAILED {
+        let outcome = if self.recovery.n_failed < MOST_FAILED {
             self.return_to_good();
+            StepOutcome::Held
         } else {
             self.start_again();
-        }
+            StepOutcome::Failed
+        };
         self.recovery.pace = (self.recovery.pace * 0.25).max(LEAST_PACE);
+        outcome
     }
 
     /// Goes back to the last good state.

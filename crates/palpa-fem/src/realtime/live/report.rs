@@ -11,8 +11,10 @@ pub enum StepOutcome {
     /// The step was cut short because tissue would have turned inside out, or it ended far from
     /// equilibrium, or the contact did not settle. The next steps continue from here. The local model must not be rendered.
     BackedOff,
-    /// The step was discarded. The state is the last good one, or rest after several failures in a
-    /// row, and the tools are followed more slowly from there.
+    /// The step was discarded. The state is the last good one, and the tools are followed more slowly from
+    /// there. The local model that was made of that state is still right; a new one is empty.
+    Held,
+    /// Many steps in a row were discarded, and the body has begun again at rest with the tools off it.
     Failed,
 }
 

@@ -48,11 +48,10 @@ impl Live {
                 self.recovery.slow_down();
             }
             Verdict::Lost => {
-                report.outcome = StepOutcome::Failed;
-                self.recover();
+                report.outcome = self.recover();
             }
         }
-        if report.outcome != StepOutcome::Failed {
+        if verdict != Verdict::Lost {
             self.commit_memory(dt);
         }
         self.settled = (verdict == Verdict::Good && self.is_settled_now(&report)).then_some(report);
