@@ -6,8 +6,10 @@ mod uniform;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use palpa_plot::output::OutDir;
 use palpa_scene::Scene;
 use palpa_scene::units::Share;
+use serde::Serialize;
 
 use super::Outcome;
 use super::loop_report::EMBEDDED;
@@ -136,29 +138,26 @@ fn finish(report: &mut BenchReport, context: &Context) -> anyhow::Result<()> {
     }
     let out = context.out_dir()?;
     out.write_json("bench.json", &report)?;
-    if !report.shipped.is_empty() {
-        let mut table = out.table("bench_shipped.csv")?;
-        for row in &report.shipped {
-            table.push(row)?;
-        }
-        table.finish()?;
-    }
-    if !report.poses.is_empty() {
-        let mut table = out.table("bench_poses.csv")?;
-        for row in &report.poses {
-            table.push(row)?;
-        }
-        table.finish()?;
-    }
+    write_rows(&report.shipped, "bench_shipped.csv", out)?;
+    write_rows(&report.poses, "bench_poses.csv", out)?;
+    write_rows(&report.rows, "bench.csv", out)?;
     if !report.rows.is_empty() {
-        let mut table = out.table("bench.csv")?;
-        for row in &report.rows {
-            table.push(row)?;
-        }
-        table.finish()?;
         picture::draw(report, is_of_growth).save(out, "bench")?;
     }
     context.json(&report)
+}
+
+/// Writes rows as a table, if there are any.
+fn write_rows(rows: &[impl Serialize], name: &str, out: &OutDir) -> anyhow::Result<()> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    let mut table = out.table(name)?;
+    for row in rows {
+        table.push(row)?;
+    }
+    table.finish()?;
+    Ok(())
 }
 
 fn chosen(args: &Args) -> anyhow::Result<Chosen> {
