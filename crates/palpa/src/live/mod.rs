@@ -76,11 +76,11 @@ const LEVEL_SHARE: f64 = 0.4;
 /// are wide here, and pairs of them too soft with 0.8.
 const ALPHA: f64 = 0.65;
 /// The same in a first layer that lies over a softer one, which it bends over.
-const BENDING_ALPHA: f64 = 0.9;
-/// The same in the layers below such a one, where it changes the force by less than 1 %, but steps over thin fat
-/// fail if pairs average anything, or if their prisms may change their volumes against each other at no cost.
+const BENDING_ALPHA: f64 = 0.97;
+/// The same in the layers below such a one. Without it the force is 1 % more; but steps over thin fat fail with
+/// more than this, or if a pair's prisms may change their volumes against each other at no cost.
 const BELOW_BENDING: BelowFirst = BelowFirst {
-    alpha: 0.0,
+    alpha: 0.3,
     apart: 0.1,
 };
 /// Least number of intervals of a layer that is softer than what lies under it, near the tool: with two the force
