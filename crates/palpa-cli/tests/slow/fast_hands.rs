@@ -1,4 +1,5 @@
-//! Fast hands on thin soft fat, where a step of the tissue often fails: the force is not let go.
+//! Hands that stroke over thin soft fat, where a step of the tissue often fails, and over a lump: the force is
+//! not let go, and has no jolts.
 
 use palpa_lab::bench::shipped::{Part, StepTime, draw_spots, drive, shipped_cases};
 
@@ -36,4 +37,27 @@ fn strokes_over_thin_fat_keep_their_force() {
     let share = |n: usize, of: usize| n as f64 / of as f64;
     assert!(share(n_failed, n_steps) <= MOST_FAILED, "{n_failed}");
     assert!(share(n_let_go, n_ticks) <= MOST_LET_GO, "{n_let_go}");
+}
+
+/// Place of `shipped-lump` where a vertex left the contact with a force of 1e-11 N that pointed aside.
+const LEFT_AT: usize = 4;
+/// Largest change of the force from one tick to the next, as a share.
+const MOST_CHANGE: f64 = 0.05;
+
+#[test]
+fn a_stroke_has_no_jolt_where_a_vertex_leaves_the_contact() {
+    let lump_forearm = resolved(&include_str!("../../scenes/forearm_lump.toml"));
+    let cases = shipped_cases(&lump_forearm, None).unwrap();
+    let case = cases.iter().find(|c| c.name == "shipped-lump").unwrap();
+    let (spot, live) = draw_spots(case, LEFT_AT + 1).unwrap().pop().unwrap();
+    let driven = drive(&spot.scene(&case.scene), &live, StepTime::Zero).unwrap();
+    let across = driven.felt.iter().filter(|felt| felt.part == Part::Stroke);
+    let pressed = across.filter(|felt| felt.depth > 2e-3);
+    let forces: Vec<f64> = pressed.map(|felt| felt.force.norm()).collect();
+    assert!(forces.len() > 2_000, "{}", forces.len());
+    let changes = forces
+        .windows(2)
+        .map(|pair| (pair[1] / pair[0] - 1.0).abs());
+    let most = changes.fold(0.0, f64::max);
+    assert!(most < MOST_CHANGE, "{most}");
 }
