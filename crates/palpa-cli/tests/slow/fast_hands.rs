@@ -1,7 +1,7 @@
 //! Hands that stroke over thin soft fat, where a step of the tissue often fails, and over a lump: the force is
 //! not let go, and has no jolts.
 
-use palpa_lab::bench::shipped::{Part, StepTime, draw_spots, drive, shipped_cases};
+use palpa_lab::bench::shipped::{Part, ShippedCase, StepTime, draw_spots, drive, shipped_cases};
 
 use crate::resolved;
 
@@ -16,12 +16,17 @@ const TIME: StepTime = StepTime::Counted {
 const MOST_FAILED: f64 = 2e-3;
 const MOST_LET_GO: f64 = 0.02;
 
-#[test]
-fn strokes_over_thin_fat_keep_their_force() {
+/// A case of the bench, by its name.
+fn shipped(name: &str) -> ShippedCase {
     let lump_forearm = resolved(&include_str!("../../scenes/forearm_lump.toml"));
     let cases = shipped_cases(&lump_forearm, None).unwrap();
-    let case = cases.iter().find(|c| c.name == "shipped-forearm").unwrap();
-    let spots = draw_spots(case, N_PLACES).unwrap();
+    cases.into_iter().find(|case| case.name == name).unwrap()
+}
+
+#[test]
+fn strokes_over_thin_fat_keep_their_force() {
+    let case = shipped("shipped-forearm");
+    let spots = draw_spots(&case, N_PLACES).unwrap();
     assert_eq!(spots.len(), N_PLACES);
     let (mut n_steps, mut n_failed, mut n_ticks, mut n_let_go) = (0, 0, 0, 0);
     for (spot, live) in &spots {
@@ -46,10 +51,8 @@ const MOST_CHANGE: f64 = 0.05;
 
 #[test]
 fn a_stroke_has_no_jolt_where_a_vertex_leaves_the_contact() {
-    let lump_forearm = resolved(&include_str!("../../scenes/forearm_lump.toml"));
-    let cases = shipped_cases(&lump_forearm, None).unwrap();
-    let case = cases.iter().find(|c| c.name == "shipped-lump").unwrap();
-    let (spot, live) = draw_spots(case, LEFT_AT + 1).unwrap().pop().unwrap();
+    let case = shipped("shipped-lump");
+    let (spot, live) = draw_spots(&case, LEFT_AT + 1).unwrap().pop().unwrap();
     let driven = drive(&spot.scene(&case.scene), &live, StepTime::Zero).unwrap();
     let across = driven.felt.iter().filter(|felt| felt.part == Part::Stroke);
     let pressed = across.filter(|felt| felt.depth > 2e-3);

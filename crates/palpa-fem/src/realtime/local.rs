@@ -166,12 +166,13 @@ impl ContactProblem {
         self.measure_onsets(&mut clusters.onsets);
         self.gather(skin, most, &mut clusters);
         self.release();
+        self.measure_normals(&mut clusters);
         out.contacts.clear();
-        for cluster in &clusters.all {
+        for (cluster, normal) in clusters.all.iter().zip(&clusters.normals) {
             let members = &clusters.members[cluster.first..cluster.end];
             let shares = &clusters.shares[cluster.first..cluster.end];
             out.contacts
-                .push(self.contact(tools, members, shares, cluster.number));
+                .push(self.contact(tools, members, shares, (cluster.number, normal)));
         }
         self.comply(&mut clusters, &mut out.compliance);
         self.give_way(&mut clusters, &mut out.compliance);
@@ -232,13 +233,33 @@ impl ContactProblem {
         }
     }
 
-    /// One contact of the local model.
+    /// Finds the mean normal of each cluster's members.
+    fn measure_normals(&self, clusters: &mut Clusters) {
+        let Clusters {
+            all,
+            members,
+            shares,
+            normals,
+            ..
+        } = clusters;
+        normals.clear();
+        for cluster in all.iter() {
+            let range = cluster.first..cluster.end;
+            let parts = members[range.clone()].iter().zip(&shares[range]);
+            let mean: Vec3 = parts
+                .map(|(&m, share)| self.candidates[usize::from(m)].normal * *share)
+                .sum();
+            normals.push(mean.try_normalize(0.0).unwrap_or_else(Vec3::zeros));
+        }
+    }
+
+    /// One contact of the local model, with its number and the mean normal of its members.
     fn contact(
         &self,
         tools: &[PosedTool],
         members: &[u16],
         shares: &[f64],
-        number: u32,
+        (number, normal): (u32, &Vec3),
     ) -> LocalContact {
         let parts = || {
             let members = members.iter().map(|&m| &self.candidates[usize::from(m)]);
@@ -248,8 +269,7 @@ impl ContactProblem {
         let position: Vec3 = parts().map(|(c, share)| place(c) * *share).sum();
         let anchor: Vec3 = parts().map(|(c, share)| c.anchor * *share).sum();
         let push: Vec3 = parts().map(|(c, _)| c.push()).sum();
-        let normals: Vec3 = parts().map(|(c, share)| c.normal * *share).sum();
-        let normal = direction(&push, &normals.normalize());
+        let normal = direction(&push, normal);
         let gap: f64 = parts().map(|(c, share)| c.gap.max(0.0) * share).sum();
         let is_pressing = parts().any(|(c, _)| c.pressure > 0.0);
         let PosedTool { tool: shape, pose } = &tools[tool];
@@ -325,15 +345,6 @@ impl ContactProblem {
             ..
         } = clusters;
         let n = all.len();
-        normals.clear();
-        for cluster in all.iter() {
-            let range = cluster.first..cluster.end;
-            let parts = members[range.clone()].iter().zip(&shares[range]);
-            let mean: Vec3 = parts
-                .map(|(&m, share)| self.candidates[usize::from(m)].normal * *share)
-                .sum();
-            normals.push(mean.try_normalize(0.0).unwrap_or_else(Vec3::zeros));
-        }
         rows.clear();
         row_of.clear();
         row_of.resize(self.candidates.len(), usize::MAX);
