@@ -44,23 +44,35 @@ fn strokes_over_thin_fat_keep_their_force() {
     assert!(share(n_let_go, n_ticks) <= MOST_LET_GO, "{n_let_go}");
 }
 
-/// Place of `shipped-lump` where a vertex left the contact with a force of 1e-11 N that pointed aside.
-const LEFT_AT: usize = 4;
 /// Largest change of the force from one tick to the next, as a share.
 const MOST_CHANGE: f64 = 0.05;
 
-#[test]
-fn a_stroke_has_no_jolt_where_a_vertex_leaves_the_contact() {
-    let case = shipped("shipped-lump");
-    let (spot, live) = draw_spots(&case, LEFT_AT + 1).unwrap().pop().unwrap();
+/// The largest change of the force from one tick to the next in a stroke at a place of a case, as a share, where
+/// steps take no time.
+fn largest_jolt(name: &str, place: usize) -> f64 {
+    let case = shipped(name);
+    let (spot, live) = draw_spots(&case, place + 1).unwrap().pop().unwrap();
     let driven = drive(&spot.scene(&case.scene), &live, StepTime::Zero).unwrap();
     let across = driven.felt.iter().filter(|felt| felt.part == Part::Stroke);
     let pressed = across.filter(|felt| felt.depth > 2e-3);
     let forces: Vec<f64> = pressed.map(|felt| felt.force.norm()).collect();
-    assert!(forces.len() > 2_000, "{}", forces.len());
+    assert!(forces.len() > 1_000, "{}", forces.len());
     let changes = forces
         .windows(2)
         .map(|pair| (pair[1] / pair[0] - 1.0).abs());
-    let most = changes.fold(0.0, f64::max);
+    changes.fold(0.0, f64::max)
+}
+
+/// A vertex left the contact there with a force of 1e-11 N that pointed aside.
+#[test]
+fn a_stroke_has_no_jolt_where_a_vertex_leaves_the_contact() {
+    let most = largest_jolt("shipped-lump", 4);
+    assert!(most < MOST_CHANGE, "{most}");
+}
+
+/// The stiffness of a step was raised there, and the local model was five times too stiff for one tick.
+#[test]
+fn a_stroke_has_no_jolt_where_thin_fat_is_nearly_unstable() {
+    let most = largest_jolt("shipped-forearm", 5);
     assert!(most < MOST_CHANGE, "{most}");
 }

@@ -52,6 +52,30 @@ pub(crate) enum Tangent {
     Double,
 }
 
+/// The pressure of the volume in the stiffness, for prisms that turn and shear. Pairs that are not in lanes have their
+/// own always.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Pressure<'a> {
+    /// That of the displacements.
+    Own,
+    /// None: for a stiffness that is nearly always positive definite.
+    None,
+    /// That of the volume that was predicted. Displacements that are extrapolated do not keep the volume to second
+    /// order, and their own pressure is off by as much as the shear modulus.
+    Predicted(From<'a>),
+}
+
+/// What displacements have been extrapolated from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct From<'a> {
+    /// The displacements before, m. `[n_nodes]`
+    pub(crate) displacements: &'a [Vec3],
+    /// Whether a vertex's were not extrapolated; prisms of such vertices only have their own pressure. `[n_vertices]`
+    pub(crate) is_known: &'a [bool],
+    /// Number of levels of nodes.
+    pub(crate) n_levels: usize,
+}
+
 /// The prisms of some part of a body.
 #[derive(Debug)]
 pub(crate) struct Batches {
@@ -252,8 +276,10 @@ impl Batches {
         memory: &Memory,
         displacements: &[Vec3],
         blocks: &mut [Block<f32>],
+        pressure: Pressure<'_>,
     ) -> Result<(), Inverted> {
         let pass = Tangents {
+            pressure,
             full: &self.full,
             local: &mut self.local_single,
             displacements,

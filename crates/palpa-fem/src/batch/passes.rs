@@ -10,10 +10,13 @@ use palpa_sparse::Block;
 use palpa_sparse::fronts::Number;
 use pulp::{Simd, WithSimd};
 
-use super::kernel::{Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, WIDTH};
+use super::kernel::{
+    Constant, LaneGroup, Local, N_BLOCKS, N_NODES, N_POINTS, PressureKind, Row, WIDTH,
+};
 use super::lane_batch::{LaneBatch, Numbers};
 use super::lanes::{Doubles, Lanes, Singles};
 use super::places::{add_block, index_of};
+use super::{From, Pressure};
 use crate::law::Hardening;
 use crate::state::Memory;
 
@@ -78,6 +81,7 @@ impl<E: Number> Local<E> {
         let zero = [E::default(); WIDTH];
         Self {
             displacements: [[zero; 3]; N_NODES],
+            since: [[zero; 3]; N_NODES],
             forces: [[zero; 3]; N_NODES],
             stiffness: [[zero; 9]; N_BLOCKS],
             least: zero,
@@ -86,24 +90,57 @@ impl<E: Number> Local<E> {
 
     #[inline(always)]
     pub(super) fn gather(&mut self, nodes: &[[u32; WIDTH]; N_NODES], displacements: &[Vec3]) {
-        for (rows, nodes) in self.displacements.iter_mut().zip(nodes) {
-            for (lane, &node) in nodes.iter().enumerate() {
-                let u = &displacements[node as usize];
-                for c in 0..3 {
-                    rows[c][lane] = E::nearest(u[c]);
+        put(&mut self.displacements, nodes, |node| displacements[node]);
+    }
+
+    /// Fills in the displacements since those that they were extrapolated from: none for prisms whose vertices
+    /// are all known.
+    #[inline(always)]
+    fn gather_since(
+        &mut self,
+        nodes: &[[u32; WIDTH]; N_NODES],
+        displacements: &[Vec3],
+        from: &From<'_>,
+    ) {
+        put(&mut self.since, nodes, |node| {
+            displacements[node] - from.displacements[node]
+        });
+        for lane in 0..WIDTH {
+            let mut own = nodes.iter().map(|nodes| nodes[lane] as usize);
+            if own.all(|node| from.is_known[node / from.n_levels]) {
+                for rows in self.since.iter_mut().flatten() {
+                    rows[lane] = E::default();
                 }
             }
         }
     }
 }
 
-/// Evaluates a batch in one precision. Returns false if a prism is inside out.
+/// Fills in a vector for each node of a batch.
+#[inline(always)]
+fn put<E: Number>(
+    into: &mut [[Row<E>; 3]; N_NODES],
+    nodes: &[[u32; WIDTH]; N_NODES],
+    vector: impl Fn(usize) -> Vec3,
+) {
+    for (rows, nodes) in into.iter_mut().zip(nodes) {
+        for (lane, &node) in nodes.iter().enumerate() {
+            let u = vector(node as usize);
+            for c in 0..3 {
+                rows[c][lane] = E::nearest(u[c]);
+            }
+        }
+    }
+}
+
+/// Evaluates a batch in one precision; see [`LaneGroup::evaluate`]. Returns false if a prism is inside out.
 #[inline(always)]
 pub(super) fn run<R: Lanes, const TANGENT: bool>(
     token: R::Token,
     numbers: &Numbers<R::Element>,
     hardening: Hardening,
     local: &mut Local<R::Element>,
+    pressure: PressureKind,
 ) -> bool {
     for at in (0..WIDTH).step_by(R::N) {
         let constant = numbers.constant.as_ref();
@@ -115,7 +152,7 @@ pub(super) fn run<R: Lanes, const TANGENT: bool>(
             constant,
             hardening,
         )
-        .evaluate::<TANGENT>(local)
+        .evaluate::<TANGENT>(local, pressure)
         .store(&mut local.least[at..]);
     }
     local.least.iter().all(|&j| j > R::Element::default())
@@ -136,7 +173,13 @@ impl WithSimd for Forces<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         for batch in self.full {
             self.local.gather(&batch.nodes, self.displacements);
-            if !run::<Doubles<S>, false>(simd, &batch.double, batch.hardening, self.local) {
+            if !run::<Doubles<S>, false>(
+                simd,
+                &batch.double,
+                batch.hardening,
+                self.local,
+                PressureKind::Own,
+            ) {
                 return Err(batch.pairs[0]);
             }
             for (rows, nodes) in self.local.forces.iter().zip(&batch.nodes) {
@@ -158,6 +201,7 @@ pub(super) struct Tangents<'a> {
     pub(super) local: &'a mut Local<f32>,
     pub(super) displacements: &'a [Vec3],
     pub(super) blocks: &'a mut [Block<f32>],
+    pub(super) pressure: Pressure<'a>,
 }
 
 impl WithSimd for Tangents<'_> {
@@ -170,7 +214,15 @@ impl WithSimd for Tangents<'_> {
                 continue;
             };
             self.local.gather(&batch.nodes, self.displacements);
-            if !run::<Singles<S>, true>(simd, single, batch.hardening, self.local) {
+            let kind = match self.pressure {
+                Pressure::Own => PressureKind::Own,
+                Pressure::None => PressureKind::None,
+                Pressure::Predicted(from) => {
+                    (self.local).gather_since(&batch.nodes, self.displacements, &from);
+                    PressureKind::Predicted
+                }
+            };
+            if !run::<Singles<S>, true>(simd, single, batch.hardening, self.local, kind) {
                 return Err(batch.pairs[0]);
             }
             for (rows, places) in self.local.stiffness.iter().zip(places.iter()) {

@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Batches;
-use super::kernel::{Local, N_NODES, WIDTH};
+use super::kernel::{Local, N_NODES, PressureKind, WIDTH};
 use super::lane_batch::LaneBatch;
 use super::lanes::Doubles;
 use super::passes::run;
@@ -162,9 +162,9 @@ impl WithSimd for One<'_> {
         } = self.batch;
         self.slot.gather(nodes, self.displacements);
         if self.with_tangent {
-            run::<Doubles<S>, true>(simd, double, *hardening, self.slot)
+            run::<Doubles<S>, true>(simd, double, *hardening, self.slot, PressureKind::Own)
         } else {
-            run::<Doubles<S>, false>(simd, double, *hardening, self.slot)
+            run::<Doubles<S>, false>(simd, double, *hardening, self.slot, PressureKind::Own)
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::assembly::Assembler;
 use crate::assembly::assemble;
-use crate::batch::{Batches, History, Tangent};
+use crate::batch::{Batches, From, History, Pressure, Tangent};
 use crate::columns::SurfaceGroup;
 use crate::law::{
     Fung, Gent, Law, Moduli, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Prony, PronyTerm,
@@ -212,7 +212,7 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
                 batches.begin(&model, &mut own, &fresh);
                 batches.add_forces(&model, &own, &u, &mut forces).unwrap();
                 batches
-                    .add_stiffness(&model, &own, &u, &mut blocks)
+                    .add_stiffness(&model, &own, &u, &mut blocks, Pressure::Own)
                     .unwrap();
             }
             for (force, expected) in forces.iter().zip(&expected) {
@@ -251,6 +251,96 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
     }
 }
 
+/// Twice the energy of displacements `x` by a stiffness.
+fn energy(model: &Model, blocks: &[[f32; 9]], x: &[Vec3]) -> f64 {
+    let mut sum = 0.0;
+    model.structure.for_each_block(|i, row, column| {
+        let block = Mat3::from_fn(|r, c| f64::from(blocks[i][r + 3 * c]));
+        let both = if row == column { 1.0 } else { 2.0 };
+        sum += both * x[row].dot(&(block * x[column]));
+    });
+    sum
+}
+
+#[test]
+fn a_compressed_body_is_stable_without_its_pressure_only() {
+    let body = body();
+    let soft = Law::from(NeoHookean::from_young(5e3, 0.49).unwrap());
+    let materials = materials(&[soft; 3], false);
+    let params = ModelParams::default();
+    let model = Model::build(&body, &materials, &Supports::default(), params).unwrap();
+    let memory = Memory::new(&model);
+    let pattern = model.structure.pattern.clone();
+    let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, Tangent::Single);
+    // A volume 5 % too small in every direction, and a small turn.
+    let positions = &model.body.positions;
+    let u: Vec<Vec3> = positions.iter().map(|x| x * -0.05).collect();
+    let turn: Vec<Vec3> = positions.iter().map(|x| Vec3::x().cross(x)).collect();
+    let [own, none] = [Pressure::Own, Pressure::None].map(|pressure| {
+        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+        batches
+            .add_stiffness(&model, &memory, &u, &mut blocks, pressure)
+            .unwrap();
+        energy(&model, &blocks, &turn)
+    });
+    // Second variation of the volume by a turn about x: 2 J/λ² for each volume at rest, times the pressure.
+    let volume = 0.02 * 0.015 * 9e-3;
+    let (stretch, bulk) = (0.95_f64, 5e3 / (3.0 * (1.0 - 2.0 * 0.49)));
+    let pressure = bulk * (stretch.powi(3) - 1.0);
+    let expected = 2.0 * stretch * pressure * volume;
+    let difference = own - none;
+    assert!(
+        (difference / expected - 1.0).abs() < 0.01,
+        "{difference:e} {expected:e}"
+    );
+    assert!(own < 0.0 && none >= -1e-4 * own.abs(), "{own:e} {none:e}");
+}
+
+#[test]
+fn the_pressure_of_a_predicted_volume_has_no_error_of_the_second_order() {
+    let body = body();
+    let soft = Law::from(NeoHookean::from_young(5e3, 0.49).unwrap());
+    let materials = materials(&[soft; 3], false);
+    let params = ModelParams::default();
+    let model = Model::build(&body, &materials, &Supports::default(), params).unwrap();
+    let memory = Memory::new(&model);
+    let pattern = model.structure.pattern.clone();
+    let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, Tangent::Single);
+    // A turn by 0.2, extrapolated from the rest: the volume grows by 0.04, but none was predicted.
+    let positions = &model.body.positions;
+    let turn: Vec<Vec3> = positions.iter().map(|x| Vec3::x().cross(x)).collect();
+    let u: Vec<Vec3> = turn.iter().map(|x| x * 0.2).collect();
+    let rest = vec![Vec3::zeros(); u.len()];
+    let from = |displacements, is_known| {
+        Pressure::Predicted(From {
+            displacements,
+            is_known,
+            n_levels: model.body.n_levels,
+        })
+    };
+    let n = model.body.n_vertices();
+    let (all, none) = (vec![true; n], vec![false; n]);
+    let pressures = [
+        Pressure::None,
+        Pressure::Own,
+        from(&rest, &none),
+        from(&rest, &all),
+        from(&u, &none),
+    ];
+    let energies = pressures.map(|pressure| {
+        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+        batches
+            .add_stiffness(&model, &memory, &u, &mut blocks, pressure)
+            .unwrap();
+        energy(&model, &blocks, &turn)
+    });
+    let of_own = energies[1] - energies[0];
+    let of = |k: usize| (energies[k] - energies[0]) / of_own;
+    assert!(of(2).abs() < 1e-3, "{}", of(2));
+    assert!((of(3) - 1.0).abs() < 1e-6, "{}", of(3));
+    assert!((of(4) - 1.0).abs() < 1e-6, "{}", of(4));
+}
+
 #[test]
 fn prisms_that_are_inside_out_are_found() {
     let body = body();
@@ -274,7 +364,7 @@ fn prisms_that_are_inside_out_are_found() {
         let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
         assert!(
             batches
-                .add_stiffness(&model, &memory, &u, &mut blocks)
+                .add_stiffness(&model, &memory, &u, &mut blocks, Pressure::Own)
                 .is_err(),
             "{name}"
         );

@@ -12,7 +12,7 @@ use super::contact_problem::ContactProblem;
 use super::outside::Outside;
 use super::plan::{Plan, Trouble};
 use super::{MOST_CANDIDATES, MOST_FAR};
-use crate::batch::{Batches, Tangent};
+use crate::batch::{Batches, Pressure, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -68,10 +68,12 @@ impl Inside {
         pattern: &ColumnPattern,
         plan: &Plan,
         displacements: &[Vec3],
+        pressure: Pressure<'_>,
     ) -> Result<(), Trouble> {
         self.clear(pattern, plan);
+        let blocks = &mut self.blocks;
         self.batches
-            .add_stiffness(model, memory, displacements, &mut self.blocks)?;
+            .add_stiffness(model, memory, displacements, blocks, pressure)?;
         plan.support(model, pattern, true, &mut self.blocks);
         Ok(())
     }

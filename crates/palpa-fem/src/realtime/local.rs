@@ -4,6 +4,7 @@
 //! x_i = x0_i + Σ_j W_ij (r_j − r0_j)
 //! ```
 
+use nalgebra::Rotation3;
 use palpa_mesh::Vec3;
 
 use super::MOST_CANDIDATES;
@@ -59,9 +60,59 @@ pub struct LocalModel {
     pub tools: Vec<LocalTool>,
     /// Compliance `W`, `3 n × 3 n`, column-major, symmetric, m/N.
     pub compliance: Vec<f64>,
+    /// Where each contact was in an earlier model, and the turn of its normal since; see
+    /// [`Self::give_way_as`].
+    known: Vec<Option<(usize, Mat3)>>,
 }
 
 impl LocalModel {
+    /// An empty model with room for so many contacts and tools: to fill it, nothing is allocated.
+    pub fn with_room(n_contacts: usize, n_tools: usize) -> Self {
+        Self {
+            contacts: Vec::with_capacity(n_contacts),
+            tools: Vec::with_capacity(n_tools),
+            compliance: Vec::with_capacity(9 * n_contacts * n_contacts),
+            known: Vec::with_capacity(n_contacts),
+        }
+    }
+
+    /// Takes over the compliance of an earlier model of the same mesh, turned with the normals, where its own is
+    /// that of a body made stiffer ([`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
+    /// keep their own, and do not act on the others.
+    pub fn give_way_as(&mut self, before: &Self) {
+        let normal = |model: &Self, contact: &LocalContact| {
+            let tool = model.tools.get(contact.tool);
+            tool.map_or(contact.normal, |tool| tool.pose.rotation * contact.normal)
+        };
+        let mut known = std::mem::take(&mut self.known);
+        known.clear();
+        known.extend(self.contacts.iter().map(|contact| {
+            let is_same =
+                |old: &LocalContact| old.vertex == contact.vertex && old.tool == contact.tool;
+            let at = before.contacts.iter().position(is_same)?;
+            let [old, new] = [normal(before, &before.contacts[at]), normal(self, contact)];
+            let turn = Rotation3::rotation_between(&old, &new)?;
+            Some((at, turn.into_inner()))
+        }));
+        let n = self.contacts.len();
+        for (i, row) in known.iter().enumerate() {
+            for (j, column) in known.iter().enumerate() {
+                let block = match (row, column) {
+                    (Some((a, turn)), Some((b, other))) => {
+                        turn * before.block(*a, *b) * other.transpose()
+                    }
+                    (None, None) => continue,
+                    _ => Mat3::zeros(),
+                };
+                set_block(&mut self.compliance, n, (i, j), &block);
+            }
+        }
+        for (tool, old) in self.tools.iter_mut().zip(&before.tools) {
+            tool.stiffness = old.stiffness;
+        }
+        self.known = known;
+    }
+
     /// Compliance block: displacement of contact `i` per force on contact `j`, m/N.
     pub fn block(&self, i: usize, j: usize) -> Mat3 {
         block_of(&self.compliance, self.contacts.len(), (i, j))
@@ -612,6 +663,15 @@ fn add_block(compliance: &mut [f64], n: usize, (i, j): (usize, usize), block: &M
     }
 }
 
+/// Sets a block of a compliance of `n` contacts.
+fn set_block(compliance: &mut [f64], n: usize, (i, j): (usize, usize), block: &Mat3) {
+    for c in 0..3 {
+        for r in 0..3 {
+            compliance[3 * i + r + 3 * n * (3 * j + c)] = block[(r, c)];
+        }
+    }
+}
+
 /// A number for the vertices of a cell, different from all vertex numbers.
 fn number_of_cell(cell: [i32; 3], level: usize) -> u32 {
     let mut number = level as u32;
@@ -643,5 +703,71 @@ mod tests {
         assert_eq!(direction(&Vec3::zeros(), &normal), normal);
         let push = Vec3::new(-0.7, 0.0, -0.7);
         assert!((direction(&push, &normal) - push.normalize()).norm() < 1e-12);
+    }
+
+    fn contact(vertex: u32, normal: Vec3) -> LocalContact {
+        LocalContact {
+            vertex,
+            tool: 0,
+            position: Vec3::zeros(),
+            force: Vec3::zeros(),
+            surface: Vec3::zeros(),
+            normal,
+            curvature: Mat3::zeros(),
+            anchor: Vec3::zeros(),
+        }
+    }
+
+    /// A model in which contact `i` gives way to itself by `own`, and to the others by half of that.
+    fn model(contacts: Vec<LocalContact>, own: f64) -> LocalModel {
+        let n = contacts.len();
+        let mut model = LocalModel {
+            contacts,
+            compliance: vec![0.0; 9 * n * n],
+            ..LocalModel::default()
+        };
+        for i in 0..n {
+            for j in 0..n {
+                let by = if i == j { own } else { 0.5 * own };
+                let [a, b] = [i, j].map(|k| model.contacts[k].normal);
+                let block = a * b.transpose() * by;
+                set_block(&mut model.compliance, n, (i, j), &block);
+            }
+        }
+        model
+    }
+
+    #[test]
+    fn a_compliance_is_taken_over_by_vertex_and_turned_with_the_normals() {
+        let (out, aside) = (Vec3::z(), Vec3::new(0.6, 0.0, 0.8));
+        let before = model(
+            vec![contact(7, out), contact(3, out), contact(5, out)],
+            1e-3,
+        );
+        // 9 is new, 5 has turned, and 7 has left.
+        let mut now = model(
+            vec![contact(3, out), contact(9, out), contact(5, aside)],
+            1e-5,
+        );
+        now.give_way_as(&before);
+        let expected = [
+            [
+                out * out.transpose() * 1e-3,
+                Mat3::zeros(),
+                out * aside.transpose() * 0.5e-3,
+            ],
+            [Mat3::zeros(), out * out.transpose() * 1e-5, Mat3::zeros()],
+            [
+                aside * out.transpose() * 0.5e-3,
+                Mat3::zeros(),
+                aside * aside.transpose() * 1e-3,
+            ],
+        ];
+        for (i, row) in expected.iter().enumerate() {
+            for (j, block) in row.iter().enumerate() {
+                let difference = (now.block(i, j) - block).norm();
+                assert!(difference < 1e-15, "{i} {j}: {difference}");
+            }
+        }
     }
 }

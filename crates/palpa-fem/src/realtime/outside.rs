@@ -7,7 +7,7 @@ use palpa_sparse::fronts::{
 use palpa_sparse::{Block, ColumnPattern};
 
 use super::plan::{Plan, Trouble};
-use crate::batch::{Batches, Tangent};
+use crate::batch::{Batches, From, Pressure, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -139,7 +139,7 @@ impl Outside {
     }
 
     /// Assembles and factors the exterior's stiffness at these displacements, and linearises about
-    /// them.
+    /// them. `from` is what they were extrapolated from.
     #[expect(
         clippy::too_many_arguments,
         reason = "a model, its zone and two rooms to work in"
@@ -153,12 +153,18 @@ impl Outside {
         follower: &mut Follower,
         workshop: &mut Workshop,
         displacements: &[Vec3],
+        from: Option<From<'_>>,
     ) -> Result<(), Trouble> {
+        let pressure = from.map_or(Pressure::Own, Pressure::Predicted);
         if !plan.exterior.is_empty() {
             workshop.blocks.fill([0.0; 9]);
-            follower
-                .batches
-                .add_stiffness(model, memory, displacements, &mut workshop.blocks)?;
+            follower.batches.add_stiffness(
+                model,
+                memory,
+                displacements,
+                &mut workshop.blocks,
+                pressure,
+            )?;
             plan.support(model, pattern, false, &mut workshop.blocks);
             self.factor
                 .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;

@@ -18,7 +18,7 @@ enum Way {
     /// The share rises to one or is one. The force is this tick's.
     Up,
     /// The only fault is a stale patch. The share falls to zero, but the force is this tick's, so
-    /// it still falls when the hand draws back.
+    /// it still falls when the hand draws back, and rises again at once with a new patch.
     DownLive { quiet_for: f64 },
     /// There was another fault. The share of the last good force falls to zero.
     DownHeld { quiet_for: f64 },
@@ -55,6 +55,9 @@ impl Ramp {
             } else {
                 Way::DownLive { quiet_for: 0.0 }
             };
+        }
+        if matches!(self.way, Way::DownLive { .. }) && faults.is_empty() && self.gain > 0.0 {
+            self.way = Way::Up;
         }
         let (Way::DownLive { quiet_for } | Way::DownHeld { quiet_for }) = &mut self.way else {
             self.gain = (self.gain + dt / params.ramp_up.max(1e-3)).min(1.0);

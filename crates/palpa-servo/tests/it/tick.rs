@@ -80,6 +80,31 @@ fn a_stale_patch_ramps_to_zero_and_a_fresh_one_back() {
 }
 
 #[test]
+fn a_patch_that_is_a_little_late_costs_little_force() {
+    let (mut servo, mut patch) = settled();
+    let before = servo.command[0].force.z;
+    let (mut least, mut n_stale) = (before, 0);
+    // Stale for five ticks, and then patches come again.
+    while n_stale < 5 {
+        let report = servo.tick(Some(DEEP));
+        n_stale += usize::from(report.faults.contains(Faults::STALE_PATCH));
+        least = least.min(servo.command[0].force.z);
+    }
+    for _ in 0..100 {
+        patch.id += 10_000;
+        servo.send(patch.clone());
+        servo.tick(Some(DEEP));
+        least = least.min(servo.command[0].force.z);
+    }
+    let after = servo.command[0].force.z;
+    assert!(
+        least < 0.999 * before && least > 0.95 * before,
+        "{least} {before}"
+    );
+    assert!((after / before - 1.0).abs() < 1e-3, "{after} {before}");
+}
+
+#[test]
 fn faults_of_device_and_clock_ramp_down_and_recover() {
     let nan = Vec3::new(f64::NAN, 0.0, 0.0);
     let jump = DEEP + Vec3::new(0.0, 0.0, -20e-3);

@@ -24,6 +24,8 @@ pub struct LiveTissue {
     /// The local model of the last step that is fit to be felt, and the number of its mesh.
     local: LocalModel,
     local_mesh: u64,
+    /// The one before it.
+    before: LocalModel,
     /// The time at which its poses were taken, s; `None` before the first such step.
     local_from: Option<f64>,
     last: Option<LiveReport>,
@@ -46,17 +48,14 @@ impl LiveTissue {
                 pose: scene_from_device,
             })
             .collect();
-        let mut local = LocalModel::default();
-        local.contacts.reserve(MAX_CONTACTS);
-        local.tools.reserve(MAX_TOOLS);
-        local.compliance.reserve(9 * MAX_CONTACTS * MAX_CONTACTS);
         Self {
             body,
             tools,
             scene_from_device,
             tolerance,
             posed,
-            local,
+            local: LocalModel::with_room(MAX_CONTACTS, MAX_TOOLS),
+            before: LocalModel::with_room(MAX_CONTACTS, MAX_TOOLS),
             local_mesh: 0,
             local_from: None,
             last: None,
@@ -101,6 +100,18 @@ impl LiveTissue {
                 tool,
                 pose: self.scene_from_device * pose,
             }));
+    }
+
+    /// Makes the local model of the state reached, with the compliance of the last one if its own is too stiff.
+    fn renew_local(&mut self, is_altered: bool) {
+        std::mem::swap(&mut self.local, &mut self.before);
+        let live = self.body.live_mut();
+        live.local_model(MAX_CONTACTS, &mut self.local);
+        let mesh = self.body.n_meshes()[0];
+        if is_altered && mesh == self.local_mesh {
+            self.local.give_way_as(&self.before);
+        }
+        self.local_mesh = mesh;
     }
 
     /// The point of the tool, in its frame, that holds a contact with the friction of the step: where
@@ -189,10 +200,7 @@ impl Tissue for LiveTissue {
         if report.outcome == StepOutcome::Held {
             self.local_from = self.local_from.map(|_| input.sampled_at);
         } else if status.has_patch() {
-            self.body
-                .live_mut()
-                .local_model(MAX_CONTACTS, &mut self.local);
-            self.local_mesh = self.body.n_meshes()[0];
+            self.renew_local(report.is_altered);
             self.local_from = Some(input.sampled_at);
         }
         self.fill(patch);

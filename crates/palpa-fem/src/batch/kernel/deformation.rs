@@ -17,7 +17,7 @@ pub(super) struct Wedges<R> {
     /// m³. `[wedge][point]`
     pub(super) volumes: [[R; 2]; 2],
     /// `Σ V (J − 1)` of each wedge, m³.
-    changes: [R; 2],
+    pub(super) changes: [R; 2],
     /// `Σ V`, m³.
     pub(super) total: R,
     /// Least volume ratio of a point, at most 1.
@@ -109,17 +109,58 @@ impl<R: Lanes> Wedges<R> {
         self.changes[0] + self.changes[1]
     }
 
+    /// `Σ V (J − 1)` of each wedge, with `J` linear in the displacements since an earlier state, m³.
+    #[inline(always)]
+    pub(super) fn predicted_changes(
+        &self,
+        group: &LaneGroup<'_, R>,
+        local: &Local<R::Element>,
+    ) -> [R; 2] {
+        let (zero, one) = (group.splat(0.0), group.splat(1.0));
+        let mut changes = [zero; 2];
+        for w in 0..2 {
+            for q in 0..2 {
+                let mut since = [[zero; 3]; 3];
+                for n in 0..6 {
+                    let g = group.load3(&group.geometry.gradients[w][q][n]);
+                    let u = group.load3(&local.since[2 * w + n]);
+                    for r in 0..3 {
+                        since[r] = axpy(u[r], &g, &since[r]);
+                    }
+                }
+                let mut before = self.f[w][q];
+                for r in 0..3 {
+                    for c in 0..3 {
+                        before[r][c] = before[r][c] - since[r][c];
+                    }
+                }
+                let cof = cofactor(&before);
+                let mut j = dot(&before[0], &cof[0]);
+                for r in 0..3 {
+                    j = j + dot(&cof[r], &since[r]);
+                }
+                changes[w] = self.volumes[w][q].mul_add(j - one, changes[w]);
+            }
+        }
+        changes
+    }
+
     /// What the wedges have against changing their volumes against each other; `stiffness` is that of
     /// the pair to it, Pa. A single prism has none.
     #[inline(always)]
-    pub(super) fn apart(&self, group: &LaneGroup<'_, R>, stiffness: R) -> Apart<R> {
+    pub(super) fn apart(
+        &self,
+        group: &LaneGroup<'_, R>,
+        stiffness: R,
+        changes: &[R; 2],
+    ) -> Apart<R> {
         let (zero, one) = (group.splat(0.0), group.splat(1.0));
         let none = group.splat(NO_VOLUME);
         let volumes = [0, 1].map(|w| self.volumes[w][0] + self.volumes[w][1]);
         let second = volumes[1].select_less(none, one, volumes[1]);
         let stiffness = volumes[1].select_less(none, zero, stiffness);
         let shares = volumes.map(|volume| volume.divided_by(self.total));
-        let apart = self.changes[0].divided_by(volumes[0]) - self.changes[1].divided_by(second);
+        let apart = changes[0].divided_by(volumes[0]) - changes[1].divided_by(second);
         let pull = stiffness * apart;
         Apart {
             pressures: [shares[1] * pull, zero - shares[0] * pull],

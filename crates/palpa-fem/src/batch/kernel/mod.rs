@@ -92,11 +92,23 @@ pub(super) struct Constant<E> {
     pub(super) pressure: Row<E>,
 }
 
+/// The pressure of the volume that counts in an evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PressureKind {
+    Own,
+    /// None at all.
+    None,
+    /// That of the volume predicted from an earlier state: linear in [`Local::since`].
+    Predicted,
+}
+
 /// Displacements in, forces and stiffness out, of one batch.
 #[derive(Debug)]
 pub(super) struct Local<E> {
     /// `[node][component]`, m
     pub(super) displacements: [[Row<E>; 3]; N_NODES],
+    /// Displacements since an earlier state, m; see [`PressureKind::Predicted`]. `[node][component]`
+    pub(super) since: [[Row<E>; 3]; N_NODES],
     /// `∂W/∂u`, N
     pub(super) forces: [[Row<E>; 3]; N_NODES],
     /// `∂²W/∂u_a∂u_b`, entry (r, c) at `3 r + c`, N/m
@@ -145,15 +157,24 @@ impl<'a, R: Lanes> LaneGroup<'a, R> {
 }
 
 impl<R: Lanes> LaneGroup<'_, R> {
-    /// Evaluates forces, and the stiffness if `TANGENT`. Returns the least volume ratio of any
-    /// point; where it is not positive no other result may be used.
+    /// Evaluates forces, and the stiffness if `TANGENT`, with this pressure of the volume in both. Returns the least
+    /// volume ratio of any point; where it is not positive no other result may be used.
     #[inline(always)]
-    pub(super) fn evaluate<const TANGENT: bool>(&self, local: &mut Local<R::Element>) -> R {
+    pub(super) fn evaluate<const TANGENT: bool>(
+        &self,
+        local: &mut Local<R::Element>,
+        kind: PressureKind,
+    ) -> R {
         let zero = self.splat(0.0);
         let alpha = self.load(&self.geometry.alpha);
         let wedges = Wedges::new(self, local);
         let bulk = self.load(&self.material.bulk);
-        let mut pressure = bulk * wedges.change().divided_by(wedges.total);
+        let changes = if kind == PressureKind::Predicted {
+            wedges.predicted_changes(self, local)
+        } else {
+            wedges.changes
+        };
+        let mut pressure = bulk * (changes[0] + changes[1]).divided_by(wedges.total);
         if let Some(constant) = self.constant {
             pressure = pressure + self.load(&constant.pressure);
         }
@@ -171,10 +192,14 @@ impl<R: Lanes> LaneGroup<'_, R> {
         }
         // V_w ∂J_w/∂u of both wedges, for the stiffness of the volume change.
         let mut gradients = [[[zero; 3]; N_NODES]; 2];
-        let apart = wedges.apart(self, self.load(&self.material.apart));
+        let apart = wedges.apart(self, self.load(&self.material.apart), &changes);
         for w in 0..2 {
             let unit = wedges.wedge(self, w, self.splat(1.0) - alpha);
-            let pressure = pressure + apart.pressures[w];
+            let pressure = if kind == PressureKind::None {
+                zero
+            } else {
+                pressure + apart.pressures[w]
+            };
             let gradient = &mut gradients[w];
             let change = VolumeChange::Wedge { pressure, gradient };
             self.add::<6, TANGENT>(&unit, change, &mut sums, stiffness);

@@ -12,7 +12,7 @@ const EDGE: f64 = 0.95;
 const NEW: f64 = 0.2;
 /// Longest move of a tool that presses, m. After a step that took long the tools are far ahead; several
 /// steps catch up with them sooner than one that goes so far that its iterations do not converge.
-const LONGEST_PRESSED: f64 = 0.7e-3;
+const LONGEST_PRESSED: f64 = 1.2e-3;
 
 /// The tools on the way to their targets.
 #[derive(Debug)]

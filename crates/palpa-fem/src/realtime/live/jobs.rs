@@ -129,6 +129,7 @@ impl Live {
             dt,
             lag: 0.0,
             is_followed,
+            is_pressed: self.problem.pressing().next().is_some(),
             id: self.jobs.n_asked,
         };
         if let Some(Due { zone, depth }) = due {

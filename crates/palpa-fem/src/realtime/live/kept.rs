@@ -19,11 +19,21 @@ const MOST_EXTRA: usize = 8;
 /// search: the skin may come to meet them.
 const USABLE: f64 = 0.7;
 
+/// The factor of a zone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Factor {
+    None,
+    /// That of the body's stiffness.
+    Own,
+    /// That of a stiffness made positive definite, which the body's was not.
+    Altered,
+}
+
 /// What is kept, and for how long.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kept {
-    /// Whether the factor is of the present zone.
-    has_factor: bool,
+    /// The factor of the present zone.
+    factor: Factor,
     /// Iterations beyond the first of each step since the factor was computed.
     n_extra: usize,
     /// Whether candidates and compliance belong to the factor.
@@ -37,7 +47,7 @@ pub(super) struct Kept {
 impl Kept {
     /// Nothing.
     pub(super) const NONE: Self = Self {
-        has_factor: false,
+        factor: Factor::None,
         n_extra: 0,
         has_contact: false,
         has_friction: false,
@@ -60,9 +70,18 @@ impl Kept {
         self.horizon = USABLE * gap.max(0.0);
     }
 
+    /// Whether the factor, and so the compliance, is not that of the body's stiffness.
+    pub(super) fn is_altered(&self) -> bool {
+        self.factor == Factor::Altered
+    }
+
     /// Called with a new factor. Candidates need a new compliance then.
-    pub(super) fn renew_factor(&mut self) {
-        self.has_factor = true;
+    pub(super) fn renew_factor(&mut self, is_altered: bool) {
+        self.factor = if is_altered {
+            Factor::Altered
+        } else {
+            Factor::Own
+        };
         self.n_extra = 0;
     }
 }
@@ -77,7 +96,7 @@ impl Live {
             pressing.any(|c| c.tool as usize == tool && !c.is_far)
         });
         let may_follow = kept.has_contact
-            && kept.has_factor
+            && kept.factor != Factor::None
             && !kept.is_worn()
             && kept.has_friction == self.problem.has_friction
             && kept.horizon > 0.0
@@ -92,7 +111,7 @@ impl Live {
 
     /// Whether the present factor does for new candidates. Springs in it belong to the old ones.
     pub(super) fn keeps_factor(&self) -> bool {
-        self.kept.has_factor && !self.kept.is_worn() && !self.springs.are_on()
+        self.kept.factor != Factor::None && !self.kept.is_worn() && !self.springs.are_on()
     }
 
     /// The kind of the next iteration of a step, whose last left `residual` after one with `before`; infinite

@@ -199,6 +199,7 @@ impl Live {
             &pattern,
             &plan,
             &state.displacements,
+            None,
         )
         .map_err(|trouble| match trouble {
             Trouble::Inverted(at) => FemError::NoRest { at: at.into() },

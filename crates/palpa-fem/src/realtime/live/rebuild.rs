@@ -9,7 +9,7 @@ use palpa_sparse::fronts::{Half, SolveScratch, fronts_above};
 use super::super::inside::Inside;
 use super::super::outside::{Follower, Outside, Workshop};
 use super::super::plan::{Centres, Plan, Trouble};
-use crate::batch::{History, Tangent};
+use crate::batch::{From, History, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -35,6 +35,8 @@ pub struct Rebuild {
     pub(super) dt: f64,
     pub(super) lag: f64,
     pub(super) is_followed: bool,
+    /// Whether a tool presses, so that the displacements of a linear exterior are extrapolated.
+    pub(super) is_pressed: bool,
     /// Number of the factor.
     pub(super) id: u64,
 }
@@ -134,7 +136,8 @@ impl Shop {
         std::mem::replace(&mut self.follower, follower)
     }
 
-    /// Factors an exterior at these displacements.
+    /// Factors an exterior at these displacements, extrapolated `from` others.
+    #[expect(clippy::too_many_arguments, reason = "a model and its zone")]
     pub(super) fn refactor(
         &mut self,
         outside: &mut Outside,
@@ -143,6 +146,7 @@ impl Shop {
         pattern: &ColumnPattern,
         plan: &Plan,
         displacements: &[Vec3],
+        from: Option<From<'_>>,
     ) -> Result<(), Trouble> {
         let (follower, workshop) = (&mut self.follower, &mut self.workshop);
         outside.refactor(
@@ -153,6 +157,7 @@ impl Shop {
             follower,
             workshop,
             displacements,
+            from,
         )
     }
 }
@@ -232,7 +237,21 @@ impl Rebuild {
             history,
             ..
         } = &mut *room;
-        let result = shop.refactor(&mut outside, &model, memory, &pattern, &plan, displacements);
+        let extrapolated = self.old.as_ref().filter(|_| self.is_pressed);
+        let from = extrapolated.map(|old| From {
+            displacements: &old.at,
+            is_known: &self.plan.is_inside,
+            n_levels: model.body.n_levels,
+        });
+        let result = shop.refactor(
+            &mut outside,
+            &model,
+            memory,
+            &pattern,
+            &plan,
+            displacements,
+            from,
+        );
         let zone = (is_new && result.is_ok())
             .then(|| self.zone(memory, history.as_ref(), &plan, entering));
         if let (Err(_), Some(old)) = (&result, old) {

@@ -89,6 +89,8 @@ impl Live {
         self.recovery.n_failed += 1;
         let outcome = if self.recovery.n_failed < MOST_FAILED {
             self.return_to_good();
+            // The exterior may be what it fails on.
+            self.jobs.ask_for_factor();
             StepOutcome::Held
         } else {
             self.start_again();

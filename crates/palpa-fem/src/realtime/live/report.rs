@@ -48,6 +48,9 @@ pub struct LiveReport {
     /// Number of unknowns at which the zone's stiffness had to be raised, because it was not positive
     /// definite.
     pub n_raised: usize,
+    /// Whether the compliance of the local model is not the body's, because the stiffness at the end of the step
+    /// was not positive definite either, and had to be altered. The forces are right.
+    pub is_altered: bool,
     /// Stiffness of the springs that held the vertices under the tools during the solve, relative
     /// to the skin's own stiffness. Their forces have been removed from the result.
     pub spring: f64,

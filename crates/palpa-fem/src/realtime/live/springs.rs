@@ -4,6 +4,7 @@
 use super::super::plan::Trouble;
 use super::Live;
 use super::report::LiveReport;
+use crate::batch::Pressure;
 
 /// First stiffness of the springs, relative to the skin's own stiffness; growth factor; largest
 /// value. The contact problem takes their forces out again, so stiff ones cost no accuracy, and with soft
@@ -81,39 +82,47 @@ impl Springs {
 }
 
 impl Live {
-    /// Assembles and factors the zone's stiffness, with springs as soft as possible. Where stiffer
-    /// ones do not make it positive definite, its diagonal is raised: two factors at most.
+    /// Assembles and factors the zone's stiffness, with springs as soft as possible. Where it is not positive
+    /// definite, it loses the pressure of the volume; where that is not enough, it has stiffer springs, and its
+    /// diagonal is raised: three factors at most.
     pub(super) fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
-        let (model, pattern, plan) = (&*self.model, &*self.pattern, &*self.plan);
-        let inside = &mut self.inside;
-        inside.assemble(
-            model,
-            &self.memory,
-            pattern,
-            plan,
-            &self.state.displacements,
-        )?;
+        self.assemble(Pressure::Own)?;
         let pressed = self.problem.pressing().filter(|c| !c.is_far);
         let pressed = pressed.map(|c| c.vertex);
-        let size = inside.skin_stiffness(pattern, pressed);
+        let size = self.inside.skin_stiffness(&self.pattern, pressed);
         let was_eased = self.springs.ease();
         let usual = self.springs.share;
-        let before = usual * size;
         self.hold_pressed(size, 0.0);
-        report.n_factors += 1;
-        let n_raised = if self.inside.factor(&self.plan, &self.outside).is_ok() {
-            0
-        } else {
-            self.springs.stiffen(was_eased);
-            self.hold_pressed(size, before);
-            report.n_factors += 1;
-            self.inside.factor_raised(&self.plan, &self.outside)?
-        };
+        let mut n_raised = 0;
+        let is_altered = !self.has_factored(report);
+        if is_altered {
+            self.assemble(Pressure::None)?;
+            self.hold_pressed(size, 0.0);
+            if !self.has_factored(report) {
+                self.springs.stiffen(was_eased);
+                self.hold_pressed(size, usual * size);
+                report.n_factors += 1;
+                n_raised = self.inside.factor_raised(&self.plan, &self.outside)?;
+            }
+        }
         report.n_raised = report.n_raised.max(n_raised);
         report.spring = self.springs.share;
         self.springs.settle(usual, n_raised);
-        self.kept.renew_factor();
+        self.kept.renew_factor(is_altered);
         Ok(())
+    }
+
+    fn assemble(&mut self, pressure: Pressure<'_>) -> Result<(), Trouble> {
+        let (model, displacements) = (&*self.model, &self.state.displacements);
+        let (memory, pattern, plan) = (&self.memory, &*self.pattern, &*self.plan);
+        self.inside
+            .assemble(model, memory, pattern, plan, displacements, pressure)
+    }
+
+    /// Tries to factor what is assembled.
+    fn has_factored(&mut self, report: &mut LiveReport) -> bool {
+        report.n_factors += 1;
+        self.inside.factor(&self.plan, &self.outside).is_ok()
     }
 
     /// Puts springs under the pressing vertices of the zone, whose own stiffness is `size` and whose

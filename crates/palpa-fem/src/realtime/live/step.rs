@@ -1,6 +1,6 @@
 //! One step: the tools move, the body follows, and the result is judged.
 
-use super::iteration::Known;
+use super::iteration::{Known, Pass};
 use super::report::{LiveReport, StepOutcome};
 use super::{ExteriorState, Live};
 use crate::posed_tool::PosedTool;
@@ -31,6 +31,7 @@ impl Live {
             return settled;
         }
         self.iterations(dt, &mut report);
+        self.refine(dt, &mut report);
         let verdict = self.judge(&mut report);
         if verdict != Verdict::Lost {
             self.end_contact();
@@ -105,6 +106,7 @@ impl Live {
             n_far: 0,
             is_contact_settled: true,
             n_raised: 0,
+            is_altered: false,
             spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
@@ -136,6 +138,20 @@ impl Live {
                 }
             }
         }
+    }
+
+    /// If the last stiffness of the step had to be altered, takes one more iteration: near equilibrium it is mostly
+    /// positive definite again. Else the local model could be much too stiff, five times for a ball over thin fat.
+    fn refine(&mut self, dt: f64, report: &mut LiveReport) {
+        let is_near = report.outcome != StepOutcome::Failed && report.residual <= ROUGH;
+        if !(is_near && self.kept.is_altered()) {
+            return;
+        }
+        report.iterations += 1;
+        if self.iterate(dt, Pass::Anew, report).is_err() {
+            report.outcome = StepOutcome::Failed;
+        }
+        report.is_altered = self.kept.is_altered();
     }
 
     /// Updates a followed exterior, unless the zone is lost already, and judges both.
