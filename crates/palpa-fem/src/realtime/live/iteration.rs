@@ -38,6 +38,9 @@ pub(super) enum Pass {
     Follow,
     /// A later one, with a new stiffness and new candidates.
     Anew,
+    /// One more at the end, for the compliance: with a new stiffness, which is the body's own if springs make it
+    /// positive definite.
+    Last,
     /// A later one near equilibrium, with the factor, compliance and candidates of the previous
     /// one.
     Near,
@@ -92,8 +95,8 @@ impl Live {
                 report.residual = residual;
                 return Ok(());
             }
-            if pass == Pass::Anew || !self.keeps_factor() {
-                self.refactor(report)?;
+            if matches!(pass, Pass::Anew | Pass::Last) || !self.keeps_factor() {
+                self.refactor(pass, report)?;
             }
         }
         // Where the tool has moved along the skin, its pressure turns before anything else changes.
