@@ -108,7 +108,7 @@ impl LiveTissue {
         let live = self.body.live_mut();
         live.local_model(MAX_CONTACTS, &mut self.local);
         let mesh = self.body.n_meshes()[0];
-        if is_altered && mesh == self.local_mesh {
+        if (is_altered || !self.local.is_own) && mesh == self.local_mesh {
             self.local.give_way_as(&self.before);
         }
         self.local_mesh = mesh;
