@@ -51,8 +51,8 @@ pub enum StepStatus {
     /// The step converged within its tolerance.
     #[default]
     Converged = 0,
-    /// The residual is above the tolerance, or the patch has a compliance that is not of this step; but the state is
-    /// usable, and the next steps continue from it.
+    /// The residual is above the tolerance, but the state is usable; the next steps continue from
+    /// it.
     Unfinished = 1,
     /// The step did not reach the poses of the tools; the patch belongs to the poses that it
     /// reached.

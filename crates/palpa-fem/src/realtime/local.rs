@@ -60,9 +60,6 @@ pub struct LocalModel {
     pub tools: Vec<LocalTool>,
     /// Compliance `W`, `3 n × 3 n`, column-major, symmetric, m/N.
     pub compliance: Vec<f64>,
-    /// Whether the compliance is the body's. If not, springs that exist only in the step's matrix are part of it,
-    /// because the body is not stable without them.
-    pub is_own: bool,
     /// Where each contact was in an earlier model, and the turn of its normal since; see
     /// [`Self::give_way_as`].
     known: Vec<Option<(usize, Mat3)>>,
@@ -75,13 +72,12 @@ impl LocalModel {
             contacts: Vec::with_capacity(n_contacts),
             tools: Vec::with_capacity(n_tools),
             compliance: Vec::with_capacity(9 * n_contacts * n_contacts),
-            is_own: true,
             known: Vec::with_capacity(n_contacts),
         }
     }
 
     /// Takes over the compliance of an earlier model of the same mesh, turned with the normals, where its own is
-    /// not the body's ([`Self::is_own`], [`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
+    /// that of a body made stiffer ([`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
     /// keep their own, and do not act on the others.
     pub fn give_way_as(&mut self, before: &Self) {
         let normal = |model: &Self, contact: &LocalContact| {
@@ -220,7 +216,7 @@ impl ContactProblem {
         let mut clusters = std::mem::take(&mut self.clusters);
         self.measure_onsets(&mut clusters.onsets);
         self.gather(skin, most, &mut clusters);
-        out.is_own = self.release();
+        self.release();
         self.measure_normals(&mut clusters);
         out.contacts.clear();
         for (cluster, normal) in clusters.all.iter().zip(&clusters.normals) {
@@ -472,8 +468,8 @@ impl ContactProblem {
     /// W + W N (1/κ − Nᵀ W N)⁻¹ Nᵀ W
     /// ```
     /// If the free body is not stable, this is not a valid compliance. Then only as much of the
-    /// supports is removed as leaves it stable. Returns whether they are removed.
-    fn release(&mut self) -> bool {
+    /// supports is removed as leaves it stable.
+    fn release(&mut self) {
         /// Shares of the supports that are removed, tried in this order.
         const SHARES: [f64; 5] = [1.0, 0.9, 0.7, 0.4, 0.1];
         let (n, has_friction) = (self.candidates.len(), self.has_friction);
@@ -491,7 +487,7 @@ impl ContactProblem {
         let rows = &rows[..m];
         let candidates = &self.candidates;
         let (mut factor, mut row) = (std::mem::take(&mut self.factor), [0.0; MOST_CANDIDATES]);
-        let released = SHARES.iter().find(|&share| {
+        let is_stable = SHARES.iter().any(|share| {
             let entry = |r: usize, c: usize| {
                 let own = if r == c {
                     1.0 / (share * candidates[rows[r]].support)
@@ -504,9 +500,9 @@ impl ContactProblem {
                 && (0..m).all(|r| factor[r * m + r] > LEAST_RELEASE * entry(r, r))
         });
         self.factor = factor;
-        let Some(released) = released else {
-            return false;
-        };
+        if !is_stable {
+            return;
+        }
         // Column r of the spread: displacements by a unit force along the normal of row r.
         for (r, &i) in rows.iter().enumerate() {
             for k in 0..size {
@@ -534,7 +530,6 @@ impl ContactProblem {
                 }
             }
         }
-        *released >= 1.0
     }
 
     /// Compliance along the normals in the step's matrix.

@@ -108,7 +108,7 @@ impl LiveTissue {
         let live = self.body.live_mut();
         live.local_model(MAX_CONTACTS, &mut self.local);
         let mesh = self.body.n_meshes()[0];
-        if (is_altered || !self.local.is_own) && mesh == self.local_mesh {
+        if is_altered && mesh == self.local_mesh {
             self.local.give_way_as(&self.before);
         }
         self.local_mesh = mesh;
@@ -186,10 +186,8 @@ impl Tissue for LiveTissue {
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
         let report = self.body.step(&self.posed, input.dt);
-        // Triangles left out bear nothing, so the force is too small; and a compliance that is not the body's at
-        // this moment makes the force between two steps less sure.
-        let is_finished =
-            report.residual <= self.tolerance && report.n_left_out == 0 && !report.is_altered;
+        // Triangles left out bear nothing, so the force is too small.
+        let is_finished = report.residual <= self.tolerance && report.n_left_out == 0;
         let status = match report.outcome {
             StepOutcome::Arrived if is_finished => StepStatus::Converged,
             StepOutcome::Arrived => StepStatus::Unfinished,

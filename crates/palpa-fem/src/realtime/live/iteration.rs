@@ -38,9 +38,6 @@ pub(super) enum Pass {
     Follow,
     /// A later one, with a new stiffness and new candidates.
     Anew,
-    /// One more at the end, for the compliance: with a new stiffness, which is the body's own if springs make it
-    /// positive definite.
-    Last,
     /// A later one near equilibrium, with the factor, compliance and candidates of the previous
     /// one.
     Near,
@@ -95,8 +92,8 @@ impl Live {
                 report.residual = residual;
                 return Ok(());
             }
-            if matches!(pass, Pass::Anew | Pass::Last) || !self.keeps_factor() {
-                self.refactor(pass, report)?;
+            if pass == Pass::Anew || !self.keeps_factor() {
+                self.refactor(report)?;
             }
         }
         // Where the tool has moved along the skin, its pressure turns before anything else changes.

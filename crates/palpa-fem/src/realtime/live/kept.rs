@@ -75,10 +75,13 @@ impl Kept {
         self.factor == Factor::Altered
     }
 
-    /// Called with a new factor, which is that of the body's own stiffness or not. Candidates need a new compliance
-    /// then.
-    pub(super) fn renew_factor(&mut self, is_own: bool) {
-        self.factor = if is_own { Factor::Own } else { Factor::Altered };
+    /// Called with a new factor. Candidates need a new compliance then.
+    pub(super) fn renew_factor(&mut self, is_altered: bool) {
+        self.factor = if is_altered {
+            Factor::Altered
+        } else {
+            Factor::Own
+        };
         self.n_extra = 0;
     }
 }

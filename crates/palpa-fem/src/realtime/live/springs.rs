@@ -3,7 +3,6 @@
 
 use super::super::plan::Trouble;
 use super::Live;
-use super::iteration::Pass;
 use super::report::LiveReport;
 use crate::batch::Pressure;
 
@@ -69,9 +68,10 @@ impl Springs {
         self.share = (self.share * GROWTH).clamp(FIRST, MOST);
     }
 
-    /// Called after the zone was factored with these springs; `is_own` says whether they were enough.
-    fn settle(&mut self, usual: f64, is_own: bool) {
-        if !is_own {
+    /// Called after the zone was factored with these springs, with so many entries of its diagonal
+    /// raised.
+    fn settle(&mut self, usual: f64, n_raised: usize) {
+        if n_raised > 0 {
             // They do not help. If kept, they would hold the skin for a hundred steps.
             self.share = usual;
         }
@@ -83,9 +83,9 @@ impl Springs {
 
 impl Live {
     /// Assembles and factors the zone's stiffness, with springs as soft as possible. Where it is not positive
-    /// definite, it loses the pressure of the volume; at the end of a step it has stiffer springs before that, which
-    /// the contact problem takes out again. Where nothing else helps its diagonal is raised: four factors at most.
-    pub(super) fn refactor(&mut self, pass: Pass, report: &mut LiveReport) -> Result<(), Trouble> {
+    /// definite, it loses the pressure of the volume; where that is not enough, it has stiffer springs, and its
+    /// diagonal is raised: three factors at most.
+    pub(super) fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
         self.assemble(Pressure::Own)?;
         let pressed = self.problem.pressing().filter(|c| !c.is_far);
         let pressed = pressed.map(|c| c.vertex);
@@ -93,39 +93,22 @@ impl Live {
         let was_eased = self.springs.ease();
         let usual = self.springs.share;
         self.hold_pressed(size, 0.0);
-        let mut is_own = self.has_factored(report);
-        if !is_own && pass == Pass::Last {
-            self.springs.stiffen(was_eased);
-            self.hold_pressed(size, usual * size);
-            is_own = self.has_factored(report);
+        let mut n_raised = 0;
+        let is_altered = !self.has_factored(report);
+        if is_altered {
+            self.assemble(Pressure::None)?;
+            self.hold_pressed(size, 0.0);
+            if !self.has_factored(report) {
+                self.springs.stiffen(was_eased);
+                self.hold_pressed(size, usual * size);
+                report.n_factors += 1;
+                n_raised = self.inside.factor_raised(&self.plan, &self.outside)?;
+            }
         }
-        if !is_own {
-            self.alter(size, was_eased, report)?;
-        }
-        report.spring = self.springs.share;
-        self.springs.settle(usual, is_own);
-        self.kept.renew_factor(is_own);
-        Ok(())
-    }
-
-    /// Factors a stiffness that is positive definite instead of the zone's own.
-    fn alter(
-        &mut self,
-        size: f64,
-        was_eased: bool,
-        report: &mut LiveReport,
-    ) -> Result<(), Trouble> {
-        self.assemble(Pressure::None)?;
-        self.hold_pressed(size, 0.0);
-        if self.has_factored(report) {
-            return Ok(());
-        }
-        let before = self.springs.share * size;
-        self.springs.stiffen(was_eased);
-        self.hold_pressed(size, before);
-        report.n_factors += 1;
-        let n_raised = self.inside.factor_raised(&self.plan, &self.outside)?;
         report.n_raised = report.n_raised.max(n_raised);
+        report.spring = self.springs.share;
+        self.springs.settle(usual, n_raised);
+        self.kept.renew_factor(is_altered);
         Ok(())
     }
 

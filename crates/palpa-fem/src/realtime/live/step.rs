@@ -148,7 +148,7 @@ impl Live {
             return;
         }
         report.iterations += 1;
-        if self.iterate(dt, Pass::Last, report).is_err() {
+        if self.iterate(dt, Pass::Anew, report).is_err() {
             report.outcome = StepOutcome::Failed;
         }
         report.is_altered = self.kept.is_altered();
