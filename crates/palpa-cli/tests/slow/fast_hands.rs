@@ -56,7 +56,7 @@ fn largest_jolt(name: &str, place: usize) -> f64 {
     let across = driven.felt.iter().filter(|felt| felt.part == Part::Stroke);
     let pressed = across.filter(|felt| felt.depth > 2e-3);
     let forces: Vec<f64> = pressed.map(|felt| felt.force.norm()).collect();
-    assert!(forces.len() > 1_000, "{}", forces.len());
+    assert!(forces.len() > 2_000, "{}", forces.len());
     let changes = forces
         .windows(2)
         .map(|pair| (pair[1] / pair[0] - 1.0).abs());

@@ -251,38 +251,48 @@ fn forces_and_stiffness_are_the_elements(strain: Strain) {
     }
 }
 
-/// Twice the energy of displacements `x` by a stiffness.
-fn energy(model: &Model, blocks: &[[f32; 9]], x: &[Vec3]) -> f64 {
-    let mut sum = 0.0;
-    model.structure.for_each_block(|i, row, column| {
-        let block = Mat3::from_fn(|r, c| f64::from(blocks[i][r + 3 * c]));
-        let both = if row == column { 1.0 } else { 2.0 };
-        sum += both * x[row].dot(&(block * x[column]));
-    });
-    sum
+/// A nearly incompressible body that nothing holds.
+fn free_body() -> Model {
+    let soft = Law::from(NeoHookean::from_young(5e3, 0.49).unwrap());
+    let materials = materials(&[soft; 3], false);
+    let params = ModelParams::default();
+    Model::build(&body(), &materials, &Supports::default(), params).unwrap()
+}
+
+/// A small turn of a body about x.
+fn turn_of(model: &Model) -> Vec<Vec3> {
+    let positions = model.body.positions.iter();
+    positions.map(|x| Vec3::x().cross(x)).collect()
+}
+
+/// Twice the energy of a small turn by the stiffness at the displacements `u`, with each of these pressures.
+fn energies<const N: usize>(model: &Model, u: &[Vec3], pressures: [Pressure<'_>; N]) -> [f64; N] {
+    let memory = Memory::new(model);
+    let pattern = model.structure.pattern.clone();
+    let mut batches = Batches::new(model, &memory, &pattern, &|_| true, Tangent::Single);
+    let turn = turn_of(model);
+    pressures.map(|pressure| {
+        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
+        batches
+            .add_stiffness(model, &memory, u, &mut blocks, pressure)
+            .unwrap();
+        let mut sum = 0.0;
+        model.structure.for_each_block(|i, row, column| {
+            let block = Mat3::from_fn(|r, c| f64::from(blocks[i][r + 3 * c]));
+            let both = if row == column { 1.0 } else { 2.0 };
+            sum += both * turn[row].dot(&(block * turn[column]));
+        });
+        sum
+    })
 }
 
 #[test]
 fn a_compressed_body_is_stable_without_its_pressure_only() {
-    let body = body();
-    let soft = Law::from(NeoHookean::from_young(5e3, 0.49).unwrap());
-    let materials = materials(&[soft; 3], false);
-    let params = ModelParams::default();
-    let model = Model::build(&body, &materials, &Supports::default(), params).unwrap();
-    let memory = Memory::new(&model);
-    let pattern = model.structure.pattern.clone();
-    let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, Tangent::Single);
-    // A volume 5 % too small in every direction, and a small turn.
-    let positions = &model.body.positions;
-    let u: Vec<Vec3> = positions.iter().map(|x| x * -0.05).collect();
-    let turn: Vec<Vec3> = positions.iter().map(|x| Vec3::x().cross(x)).collect();
-    let [own, none] = [Pressure::Own, Pressure::None].map(|pressure| {
-        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
-        batches
-            .add_stiffness(&model, &memory, &u, &mut blocks, pressure)
-            .unwrap();
-        energy(&model, &blocks, &turn)
-    });
+    let model = free_body();
+    // Every length 5 % too small.
+    let positions = model.body.positions.iter();
+    let u: Vec<Vec3> = positions.map(|x| x * -0.05).collect();
+    let [own, none] = energies(&model, &u, [Pressure::Own, Pressure::None]);
     // Second variation of the volume by a turn about x: 2 J/λ² for each volume at rest, times the pressure.
     let volume = 0.02 * 0.015 * 9e-3;
     let (stretch, bulk) = (0.95_f64, 5e3 / (3.0 * (1.0 - 2.0 * 0.49)));
@@ -298,18 +308,9 @@ fn a_compressed_body_is_stable_without_its_pressure_only() {
 
 #[test]
 fn the_pressure_of_a_predicted_volume_has_no_error_of_the_second_order() {
-    let body = body();
-    let soft = Law::from(NeoHookean::from_young(5e3, 0.49).unwrap());
-    let materials = materials(&[soft; 3], false);
-    let params = ModelParams::default();
-    let model = Model::build(&body, &materials, &Supports::default(), params).unwrap();
-    let memory = Memory::new(&model);
-    let pattern = model.structure.pattern.clone();
-    let mut batches = Batches::new(&model, &memory, &pattern, &|_| true, Tangent::Single);
+    let model = free_body();
     // A turn by 0.2, extrapolated from the rest: the volume grows by 0.04, but none was predicted.
-    let positions = &model.body.positions;
-    let turn: Vec<Vec3> = positions.iter().map(|x| Vec3::x().cross(x)).collect();
-    let u: Vec<Vec3> = turn.iter().map(|x| x * 0.2).collect();
+    let u: Vec<Vec3> = turn_of(&model).iter().map(|x| x * 0.2).collect();
     let rest = vec![Vec3::zeros(); u.len()];
     let from = |displacements, is_known| {
         Pressure::Predicted(From {
@@ -327,13 +328,7 @@ fn the_pressure_of_a_predicted_volume_has_no_error_of_the_second_order() {
         from(&rest, &all),
         from(&u, &none),
     ];
-    let energies = pressures.map(|pressure| {
-        let mut blocks = vec![[0.0_f32; 9]; pattern.n_blocks() + 1];
-        batches
-            .add_stiffness(&model, &memory, &u, &mut blocks, pressure)
-            .unwrap();
-        energy(&model, &blocks, &turn)
-    });
+    let energies = energies(&model, &u, pressures);
     let of_own = energies[1] - energies[0];
     let of = |k: usize| (energies[k] - energies[0]) / of_own;
     assert!(of(2).abs() < 1e-3, "{}", of(2));

@@ -77,7 +77,7 @@ impl LocalModel {
     }
 
     /// Takes over the compliance of an earlier model of the same mesh, turned with the normals, where its own is
-    /// that of a body made stiffer ([`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
+    /// not the body's ([`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
     /// keep their own, and do not act on the others.
     pub fn give_way_as(&mut self, before: &Self) {
         let normal = |model: &Self, contact: &LocalContact| {

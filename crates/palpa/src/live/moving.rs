@@ -102,7 +102,8 @@ impl LiveTissue {
             }));
     }
 
-    /// Makes the local model of the state reached, with the compliance of the last one if its own is too stiff.
+    /// Makes the local model of the state reached, with the compliance of the last one if its own is not the
+    /// body's.
     fn renew_local(&mut self, is_altered: bool) {
         std::mem::swap(&mut self.local, &mut self.before);
         let live = self.body.live_mut();

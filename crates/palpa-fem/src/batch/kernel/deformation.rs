@@ -8,7 +8,7 @@
 
 use super::algebra::{M3, V3, axpy, cofactor, dot};
 use super::unit::NO_VOLUME;
-use super::{LaneGroup, Lanes, Local, N_NODES};
+use super::{LaneGroup, Lanes, Local, N_NODES, Row};
 
 /// Deformation and change of volume of the two wedges at their points.
 pub(super) struct Wedges<R> {
@@ -66,6 +66,25 @@ pub(super) struct Unit<R, const N: usize> {
     pub(super) node: usize,
 }
 
+/// Gradient of displacements in a wedge at one of its points.
+#[inline(always)]
+fn gradient<R: Lanes>(
+    group: &LaneGroup<'_, R>,
+    w: usize,
+    q: usize,
+    displacements: &[[Row<R::Element>; 3]; N_NODES],
+) -> M3<R> {
+    let mut h = [[group.splat(0.0); 3]; 3];
+    for n in 0..6 {
+        let g = group.load3(&group.geometry.gradients[w][q][n]);
+        let u = group.load3(&displacements[2 * w + n]);
+        for r in 0..3 {
+            h[r] = axpy(u[r], &g, &h[r]);
+        }
+    }
+    h
+}
+
 impl<R: Lanes> Wedges<R> {
     #[inline(always)]
     pub(super) fn new(group: &LaneGroup<'_, R>, local: &Local<R::Element>) -> Self {
@@ -80,14 +99,7 @@ impl<R: Lanes> Wedges<R> {
         };
         for w in 0..2 {
             for q in 0..2 {
-                let mut h = [[zero; 3]; 3];
-                for n in 0..6 {
-                    let g = group.load3(&geometry.gradients[w][q][n]);
-                    let u = group.load3(&local.displacements[2 * w + n]);
-                    for r in 0..3 {
-                        h[r] = axpy(u[r], &g, &h[r]);
-                    }
-                }
+                let mut h = gradient(group, w, q, &local.displacements);
                 for r in 0..3 {
                     h[r][r] = h[r][r] + one;
                 }
@@ -120,14 +132,7 @@ impl<R: Lanes> Wedges<R> {
         let mut changes = [zero; 2];
         for w in 0..2 {
             for q in 0..2 {
-                let mut since = [[zero; 3]; 3];
-                for n in 0..6 {
-                    let g = group.load3(&group.geometry.gradients[w][q][n]);
-                    let u = group.load3(&local.since[2 * w + n]);
-                    for r in 0..3 {
-                        since[r] = axpy(u[r], &g, &since[r]);
-                    }
-                }
+                let since = gradient(group, w, q, &local.since);
                 let mut before = self.f[w][q];
                 for r in 0..3 {
                     for c in 0..3 {
