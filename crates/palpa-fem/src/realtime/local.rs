@@ -60,6 +60,9 @@ pub struct LocalModel {
     pub tools: Vec<LocalTool>,
     /// Compliance `W`, `3 n × 3 n`, column-major, symmetric, m/N.
     pub compliance: Vec<f64>,
+    /// Whether the compliance is free of springs that exist only in the step's matrix. Where the body is not stable
+    /// without them, it is not, and is not the body's.
+    pub is_own: bool,
     /// Where each contact was in an earlier model, and the turn of its normal since; see
     /// [`Self::give_way_as`].
     known: Vec<Option<(usize, Mat3)>>,
@@ -72,12 +75,13 @@ impl LocalModel {
             contacts: Vec::with_capacity(n_contacts),
             tools: Vec::with_capacity(n_tools),
             compliance: Vec::with_capacity(9 * n_contacts * n_contacts),
+            is_own: true,
             known: Vec::with_capacity(n_contacts),
         }
     }
 
     /// Takes over the compliance of an earlier model of the same mesh, turned with the normals, where its own is
-    /// not the body's ([`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
+    /// not the body's ([`Self::is_own`], [`super::LiveReport::is_altered`]). Contacts that were not in the earlier one
     /// keep their own, and do not act on the others.
     pub fn give_way_as(&mut self, before: &Self) {
         let normal = |model: &Self, contact: &LocalContact| {
@@ -216,7 +220,7 @@ impl ContactProblem {
         let mut clusters = std::mem::take(&mut self.clusters);
         self.measure_onsets(&mut clusters.onsets);
         self.gather(skin, most, &mut clusters);
-        self.release();
+        out.is_own = self.release();
         self.measure_normals(&mut clusters);
         out.contacts.clear();
         for (cluster, normal) in clusters.all.iter().zip(&clusters.normals) {
@@ -236,6 +240,7 @@ impl ContactProblem {
     pub(super) fn no_local_model(&mut self, tools: &[PosedTool], out: &mut LocalModel) {
         out.contacts.clear();
         out.compliance.clear();
+        out.is_own = true;
         self.describe_tools(tools, false, &mut out.tools);
     }
 
@@ -468,8 +473,8 @@ impl ContactProblem {
     /// W + W N (1/κ − Nᵀ W N)⁻¹ Nᵀ W
     /// ```
     /// If the free body is not stable, this is not a valid compliance. Then only as much of the
-    /// supports is removed as leaves it stable.
-    fn release(&mut self) {
+    /// supports is removed as leaves it stable. Returns whether they are removed.
+    fn release(&mut self) -> bool {
         /// Shares of the supports that are removed, tried in this order.
         const SHARES: [f64; 5] = [1.0, 0.9, 0.7, 0.4, 0.1];
         let (n, has_friction) = (self.candidates.len(), self.has_friction);
@@ -487,7 +492,7 @@ impl ContactProblem {
         let rows = &rows[..m];
         let candidates = &self.candidates;
         let (mut factor, mut row) = (std::mem::take(&mut self.factor), [0.0; MOST_CANDIDATES]);
-        let is_stable = SHARES.iter().any(|share| {
+        let released = SHARES.iter().find(|&share| {
             let entry = |r: usize, c: usize| {
                 let own = if r == c {
                     1.0 / (share * candidates[rows[r]].support)
@@ -500,9 +505,9 @@ impl ContactProblem {
                 && (0..m).all(|r| factor[r * m + r] > LEAST_RELEASE * entry(r, r))
         });
         self.factor = factor;
-        if !is_stable {
-            return;
-        }
+        let Some(released) = released else {
+            return false;
+        };
         // Column r of the spread: displacements by a unit force along the normal of row r.
         for (r, &i) in rows.iter().enumerate() {
             for k in 0..size {
@@ -530,6 +535,7 @@ impl ContactProblem {
                 }
             }
         }
+        *released >= 1.0
     }
 
     /// Compliance along the normals in the step's matrix.

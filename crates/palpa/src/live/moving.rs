@@ -109,7 +109,7 @@ impl LiveTissue {
         let live = self.body.live_mut();
         live.local_model(MAX_CONTACTS, &mut self.local);
         let mesh = self.body.n_meshes()[0];
-        if is_altered && mesh == self.local_mesh {
+        if (is_altered || !self.local.is_own) && mesh == self.local_mesh {
             self.local.give_way_as(&self.before);
         }
         self.local_mesh = mesh;
@@ -187,8 +187,7 @@ impl Tissue for LiveTissue {
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
         let report = self.body.step(&self.posed, input.dt);
-        // Triangles left out bear nothing, so the force is too small.
-        let is_finished = report.residual <= self.tolerance && report.n_left_out == 0;
+        let is_finished = report.residual <= self.tolerance && report.is_whole();
         let status = match report.outcome {
             StepOutcome::Arrived if is_finished => StepStatus::Converged,
             StepOutcome::Arrived => StepStatus::Unfinished,

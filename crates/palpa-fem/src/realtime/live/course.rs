@@ -8,8 +8,8 @@ use crate::posed_tool::PosedTool;
 /// Distance of a pressed vertex from the zone's centre, as a share of the radius, at which tools
 /// are not followed any farther in that direction.
 const EDGE: f64 = 0.95;
-/// Weight of the last step in the smoothed movement.
-const NEW: f64 = 0.2;
+/// Time over which the tools' velocity is smoothed, s.
+const SMOOTHED: f64 = 5e-3;
 /// Longest move of a tool that presses, m. After a step that took long the tools are far ahead; several
 /// steps catch up with them sooner than one that goes so far that its iterations do not converge.
 const LONGEST_PRESSED: f64 = 1.2e-3;
@@ -19,8 +19,8 @@ const LONGEST_PRESSED: f64 = 1.2e-3;
 pub(super) struct Course {
     /// The tools at the poses that the body has followed them to.
     pub(super) tools: Vec<PosedTool>,
-    /// Smoothed movement of the tools per step, m.
-    pub(super) drift: Vec3,
+    /// Smoothed velocity of the tools, m/s.
+    pub(super) velocity: Vec3,
     /// Least gap between tools and the zone's skin, m; 0 if unknown.
     pub(super) clearance: f64,
 }
@@ -29,14 +29,14 @@ impl Course {
     pub(super) fn new(tools: &[PosedTool]) -> Self {
         Self {
             tools: tools.to_vec(),
-            drift: Vec3::zeros(),
+            velocity: Vec3::zeros(),
             clearance: 0.0,
         }
     }
 
     /// Moves the tools towards their targets, each by at most `most`, m, and not in the direction
-    /// `held`. Returns whether any tool stays short of its target.
-    fn advance(&mut self, targets: &[PosedTool], held: Option<Vec3>, most: f64) -> bool {
+    /// `held`, in a step of `dt`, s. Returns whether any tool stays short of its target.
+    fn advance(&mut self, targets: &[PosedTool], held: Option<Vec3>, most: f64, dt: f64) -> bool {
         debug_assert_eq!(self.tools.len(), targets.len());
         let mut is_short = false;
         let before: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
@@ -62,15 +62,17 @@ impl Course {
         }
         let after: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
         let way = (after - before) / self.tools.len().max(1) as f64;
-        self.drift += (way - self.drift) * NEW;
+        if dt > 0.0 {
+            self.velocity += (way / dt - self.velocity) * -(-dt / SMOOTHED).exp_m1();
+        }
         is_short
     }
 }
 
 impl Live {
-    /// Moves the tools within the limits of one step. Returns whether any tool stays short of its
-    /// target.
-    pub(super) fn move_tools(&mut self, targets: &[PosedTool]) -> bool {
+    /// Moves the tools within the limits of one step of `dt`, s. Returns whether any tool stays short
+    /// of its target.
+    pub(super) fn move_tools(&mut self, targets: &[PosedTool], dt: f64) -> bool {
         let held = self.held_direction();
         let is_pressed = self.problem.pressing().next().is_some();
         let longest = if is_pressed {
@@ -79,7 +81,7 @@ impl Live {
             self.params.longest_move
         };
         let most = (longest * self.recovery.pace).max(self.course.clearance);
-        self.course.advance(targets, held, most)
+        self.course.advance(targets, held, most, dt)
     }
 
     /// The direction along the skin in which tools are not followed, because pressed vertices have

@@ -34,10 +34,10 @@ pub(super) struct Jobs {
     /// Number of jobs requested so far. Factors and zones take their numbers from it.
     pub(super) n_asked: u64,
     pub(super) n_zones: u64,
-    /// Steps since the job was requested.
-    age: u32,
-    /// Duration of the last job in steps.
-    pub(super) latency: u32,
+    /// Time since the job was requested, s.
+    age: f64,
+    /// Duration of the last job, s.
+    pub(super) latency: f64,
     /// Indentation at the last factor of the exterior, m; infinite to request a new factor.
     depth_at_factor: f64,
     /// Longest time by which the memory of a linear exterior may lag behind, s.
@@ -72,8 +72,8 @@ impl Jobs {
             job: Job::Idle(Some(room)),
             n_asked,
             n_zones,
-            age: 0,
-            latency: 0,
+            age: 0.0,
+            latency: 0.0,
             depth_at_factor: 0.0,
             longest_lag: longest_lag(model),
             lag_out: 0.0,
@@ -81,9 +81,11 @@ impl Jobs {
         }
     }
 
-    /// Counts a step.
-    pub(super) fn grow_older(&mut self) {
-        self.age = self.age.saturating_add(1);
+    /// Counts a step of `dt`, s; infinite for one that takes viscous materials to their end.
+    pub(super) fn grow_older(&mut self, dt: f64) {
+        if dt.is_finite() {
+            self.age += dt;
+        }
     }
 
     /// Requests a new factor of the exterior.
@@ -134,7 +136,7 @@ impl Live {
         };
         if let Some(Due { zone, depth }) = due {
             self.jobs.n_asked += 1;
-            self.jobs.age = 0;
+            self.jobs.age = 0.0;
             self.jobs.depth_at_factor = depth;
             job.id = self.jobs.n_asked;
             job.target = zone.map(|(centres, radii)| {
@@ -177,10 +179,7 @@ impl Live {
     /// The job that is due: a new zone if the tools leave the present one or press its ring, or a
     /// new factor if the exterior's is out of date.
     fn due(&self) -> Option<Due> {
-        let ring = self.first_ring_dof();
-        let reaches_ring = self
-            .pressing_firmly()
-            .any(|c| self.plan.tree.first_dof(c.vertex as usize) >= ring);
+        let reaches_ring = self.pressing_firmly().any(|c| self.is_at_ring(c.vertex));
         let radius = self.plan.radius;
         let centres = self.next_centres();
         let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
@@ -198,6 +197,23 @@ impl Live {
             (centres, [INNER * on_its_way, radius])
         });
         Some(Due { zone, depth })
+    }
+
+    /// Whether a vertex lies on the ring: the zone's outermost columns, which answer nearly linearly.
+    fn is_at_ring(&self, vertex: u32) -> bool {
+        self.plan.tree.first_dof(vertex as usize) >= self.first_ring_dof()
+    }
+
+    /// Share of the tools' force that vertices of the ring bear.
+    pub(super) fn ring_share(&self) -> f64 {
+        if self.plan.exterior.is_empty() {
+            return 0.0;
+        }
+        let at_ring = self
+            .problem
+            .pressing()
+            .filter(|c| !c.is_far && self.is_at_ring(c.vertex));
+        at_ring.map(|c| c.force().norm()).sum::<f64>() / self.tools_force()
     }
 
     /// Centres at rest of a zone requested now, one for each tool, m.
@@ -225,7 +241,7 @@ impl Live {
 
     /// The way that the tools will go until a job requested now is done, m.
     fn way(&self) -> Vec3 {
-        let way = self.course.drift * f64::from(self.jobs.latency);
+        let way = self.course.velocity * self.jobs.latency;
         let most = LONGEST_AHEAD * self.params.zone_radius;
         way * (most / way.norm()).min(1.0)
     }

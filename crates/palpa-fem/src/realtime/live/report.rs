@@ -5,8 +5,8 @@
 pub enum StepOutcome {
     /// The tools have reached their targets.
     Arrived,
-    /// The tools are on the way to their targets, which were too far for one step. The local model
-    /// is that of the place reached.
+    /// The tools are on the way to their targets, which were too far for one step, and the local model is that of
+    /// the place reached; or the next zone is late, and they press the edge of the present one.
     Behind,
     /// The step was cut short because tissue would have turned inside out, or it ended far from
     /// equilibrium, or the contact did not settle. The next steps continue from here. The local model must not be rendered.
@@ -58,4 +58,12 @@ pub struct LiveReport {
     pub zone: u64,
     /// Number of the exterior's factor that was used.
     pub factor: u64,
+}
+
+impl LiveReport {
+    /// Whether the force and the local model are the body's, apart from the residual: triangles left out bear
+    /// nothing, and an altered compliance is not that of the state.
+    pub fn is_whole(&self) -> bool {
+        self.n_left_out == 0 && !self.is_altered
+    }
 }

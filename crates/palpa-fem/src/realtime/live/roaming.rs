@@ -25,6 +25,8 @@ const REST_CHANGE: f64 = 1e-8;
 /// which the next centre lies ahead of them; both as a share of the radius of the fine part.
 const LEAVE: f64 = 0.25;
 const LEAD: f64 = 0.5;
+/// Speed of the tools below which they head nowhere, m/s.
+const SLOWEST: f64 = 1e-3;
 
 /// Meshes of one body, each fine around another place. All have the same levels and the same skin
 /// at rest.
@@ -268,7 +270,7 @@ impl Moved {
         let lag = live.exterior.lag() + old.exterior.lag() - self.lag;
         live.exterior.set_lag(lag.max(0.0));
         live.course.tools.copy_from_slice(&old.course.tools);
-        live.course.drift = old.course.drift;
+        live.course.velocity = old.course.velocity;
         live.course.clearance = old.course.clearance;
         live.jobs.latency = old.jobs.latency;
         live.recovery.pace = old.recovery.pace;
@@ -415,8 +417,9 @@ impl Roaming {
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
         if let Some(Pressed { middle, along }) = live.pressed() {
-            let drift = live.course.drift - along * along.dot(&live.course.drift);
-            let ahead = drift.try_normalize(1e-6).unwrap_or_default();
+            let velocity = live.course.velocity;
+            let aside = velocity - along * along.dot(&velocity);
+            let ahead = aside.try_normalize(SLOWEST).unwrap_or_default();
             return (middle, ahead * (LEAD * radius));
         }
         let displacements = &live.state.displacements;
