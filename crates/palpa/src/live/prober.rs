@@ -17,8 +17,12 @@ const AFTER_ALL: Wish = Wish {
     priority: Priority::Nice(19),
     core: None,
 };
+const AS_OTHERS: Wish = Wish {
+    priority: Priority::Normal,
+    core: None,
+};
 
-/// A thread of the lowest priority that computes error bars of the live mesh, one at a time.
+/// A thread that computes error bars of the live mesh, one at a time.
 ///
 /// Static steps run in rayon's pools. This one has a single thread, so that the probes never use
 /// more than one core, and none that the loop needs. When dropped, it gives up what it does.
@@ -33,18 +37,31 @@ pub struct Prober {
 }
 
 impl Prober {
-    /// Starts the thread.
+    /// Starts a thread of the lowest priority, to use beside the loop.
     ///
     /// # Errors
     /// When the system gives no thread.
     pub fn start() -> anyhow::Result<Self> {
+        Self::with(AFTER_ALL)
+    }
+
+    /// Starts a thread of ordinary priority, to use without the loop. Beside other programs that use all cores,
+    /// one of the lowest priority would take fifty times as long.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn start_as_others() -> anyhow::Result<Self> {
+        Self::with(AS_OTHERS)
+    }
+
+    fn with(wish: Wish) -> anyhow::Result<Self> {
         let (tell, told) = sync_channel(1);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .thread_name(|_| NAME.to_owned())
             .start_handler(move |_| {
                 // Only the thread itself can request this. The receiver waits for it.
-                let _ = tell.send(AFTER_ALL.ask(NAME));
+                let _ = tell.send(wish.ask(NAME));
             })
             .build()
             .context("no thread for error bars")?;
@@ -147,6 +164,12 @@ mod tests {
             Err(NoBar::NoEquilibrium)
         }));
         assert_eq!(prober.wait(), Some(Err(NoBar::NoEquilibrium)));
+    }
+
+    #[test]
+    fn without_the_loop_it_has_ordinary_priority() {
+        let prober = Prober::start_as_others().unwrap();
+        assert!(prober.granted().to_string().contains("ordinary"));
     }
 
     #[test]

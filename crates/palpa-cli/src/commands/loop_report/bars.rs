@@ -146,6 +146,11 @@ impl<M> Spots<M> {
         spot.moment.take()
     }
 
+    /// Whether a look was taken whose result has not been entered.
+    fn is_probing(&self) -> bool {
+        self.probing.is_some()
+    }
+
     /// Enters the result of the look that was taken last. If a deeper one came meanwhile, the result
     /// is dropped.
     fn enter(&mut self, result: Result<LiveBar, NoBar>) {
@@ -176,6 +181,8 @@ impl<M> Spots<M> {
 pub(super) struct Bars<'a> {
     live: &'a LiveScene,
     prober: Prober,
+    /// What it probes, or has probed last.
+    under_way: Option<Moment>,
     parts: Parts,
     spots: Spots<Moment>,
 }
@@ -192,6 +199,7 @@ impl<'a> Bars<'a> {
         Ok(Self {
             live,
             prober: Prober::start()?,
+            under_way: None,
             parts: Parts {
                 across,
                 above: motion.above,
@@ -243,6 +251,20 @@ impl<'a> Bars<'a> {
         if !self.prober.is_busy()
             && let Some(moment) = self.spots.take(but)
         {
+            self.under_way = Some(moment.clone());
+            self.prober.begin(&self.live.prepared, moment);
+        }
+    }
+
+    /// Goes on at ordinary priority, which the loop needs no more: other programs may keep all cores busy. What
+    /// is under way begins again.
+    fn hurry(&mut self) {
+        let Ok(prober) = Prober::start_as_others() else {
+            return;
+        };
+        self.prober.give_up();
+        self.prober = prober;
+        if let Some(moment) = self.under_way.take().filter(|_| self.spots.is_probing()) {
             self.prober.begin(&self.live.prepared, moment);
         }
     }
@@ -250,6 +272,10 @@ impl<'a> Bars<'a> {
     /// Probes the rest, after the engine has ended; an interrupt gives it up.
     pub(super) fn finish(mut self, context: &Context) -> Vec<BarFigures> {
         let bar = context.progress(N_PARTS, "error bars");
+        if let Some(result) = self.prober.take() {
+            self.spots.enter(result);
+        }
+        self.hurry();
         loop {
             if !context.is_interrupted() {
                 self.begin(None);
