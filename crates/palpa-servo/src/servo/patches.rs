@@ -66,9 +66,9 @@ impl Servo {
             self.solver.clear();
             return [ToolLoad::ZERO; MAX_TOOLS];
         };
-        self.solver.adopt(patch);
+        let poses = self.poses();
+        self.solver.adopt(patch, &poses);
         if !was_used {
-            let poses = self.poses();
             self.solver.release_anchors(patch, &poses);
         }
         let loads = self.evaluate(patch, 2, report);

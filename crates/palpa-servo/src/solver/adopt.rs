@@ -1,8 +1,11 @@
 //! Taking over a new patch: vertices of the previous patch keep their forces. The tissue decides what
 //! sticks and where, so the anchors are those of the patch.
 
-use super::{ContactSolver, add_columns};
-use crate::{Candidate, ContactPatch, MAX_CONTACTS, Vec3};
+use super::{ContactSolver, add_columns, tool_of};
+use crate::{Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Pose, ToolContact, Vec3};
+
+/// A contact slides if its friction is at least this share of the largest possible.
+const SLIDES: f64 = 0.9;
 
 /// Identity of a contact from patch to patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,8 +38,9 @@ struct Known {
 impl ContactSolver {
     /// Takes over a patch. Vertices of the previous patch keep their forces; the others start with
     /// those of the new patch.
-    pub(crate) fn adopt(&mut self, patch: &ContactPatch) {
+    pub(crate) fn adopt(&mut self, patch: &ContactPatch, poses: &[Pose; MAX_TOOLS]) {
         self.carry_over(patch);
+        self.slide_on(patch, poses);
         for (i, own) in self.own.iter_mut().enumerate().take(self.n) {
             *own = patch.block(i, i);
         }
@@ -80,6 +84,25 @@ impl ContactSolver {
         }
     }
 
+    /// Takes the anchors of contacts that slide along, where a tool has not come yet to the pose of its patch. Else
+    /// friction would seem to be let go of on the way from there back to the tool.
+    fn slide_on(&mut self, patch: &ContactPatch, poses: &[Pose; MAX_TOOLS]) {
+        for (candidate, anchor) in patch.contacts.iter().zip(&mut self.anchor).take(self.n) {
+            let (Some(tool), Some(pose)) = (
+                tool_of(patch, candidate.tool),
+                poses.get(candidate.tool as usize),
+            ) else {
+                continue;
+            };
+            let place = tool.pose * nalgebra::Point3::from(*anchor);
+            let ahead = place - pose * nalgebra::Point3::from(*anchor);
+            let friction = friction_of(candidate, tool);
+            if slides(candidate, tool, &friction) && friction.dot(&ahead) > 0.0 {
+                *anchor = pose.inverse_transform_point(&place).coords;
+            }
+        }
+    }
+
     /// Computes the positions without forces, and those with the forces that were carried over.
     fn place_vertices(&mut self, patch: &ContactPatch) {
         for (free, candidate) in self.free.chunks_exact_mut(3).zip(&patch.contacts) {
@@ -100,4 +123,17 @@ impl ContactSolver {
             add_columns(&patch.compliance, j, used, force, &mut self.position);
         }
     }
+}
+
+/// The force on a contact across the tool's normal, N.
+fn friction_of(candidate: &Candidate, tool: &ToolContact) -> Vec3 {
+    let normal = tool.pose.rotation * candidate.normal;
+    candidate.force - normal * normal.dot(&candidate.force)
+}
+
+/// Whether a contact with this friction slides.
+fn slides(candidate: &Candidate, tool: &ToolContact, friction: &Vec3) -> bool {
+    let normal = tool.pose.rotation * candidate.normal;
+    let most = tool.friction * normal.dot(&candidate.force);
+    !tool.is_bonded && most > 0.0 && friction.norm() >= SLIDES * most
 }

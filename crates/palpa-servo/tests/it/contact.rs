@@ -185,6 +185,51 @@ fn friction_remembers_across_patches() {
     );
 }
 
+/// A step looks ahead of the tool. A vertex that slid there slides here too; one that stuck is let go of on the way
+/// back to the tool.
+#[test]
+fn a_patch_of_a_place_ahead_keeps_the_friction_of_what_slides() {
+    const AHEAD: f64 = 1e-4;
+    let (friction, push) = (0.4, 1.0);
+    let bed = HalfSpace {
+        spacing: 2e-3,
+        compliance: 1e-3,
+        friction,
+        n: 1,
+    };
+    let own = bed.block(&Vec3::zeros(), &Vec3::zeros());
+    let patch_of = |share: f64, id: u64| {
+        let force = Vec3::new(share * friction * push, 0.0, -push);
+        let (position, down) = (own * force, -Vec3::z());
+        let centre = position - down * RADIUS;
+        let mut patch = Box::new(ContactPatch::EMPTY);
+        bed.fill(centre, id, &mut patch);
+        let contact = &mut patch.contacts[0];
+        (contact.position, contact.force) = (position, force);
+        (contact.normal, contact.surface) = (down, down * RADIUS);
+        contact.anchor = down * RADIUS;
+        (patch, centre)
+    };
+    for (share, kept) in [(1.0, true), (0.5, false)] {
+        let (patch, centre) = patch_of(share, 1);
+        let here = centre - Vec3::x() * AHEAD;
+        let mut servo = Loop::new(&ServoParams::default(), SPEC);
+        servo.settle(&patch, here, 700);
+        let (next, _) = patch_of(share, 10_000);
+        servo.send(next);
+        servo.tick(Some(here));
+        let found = servo.tick(Some(here)).tools[0].tissue_force;
+        let lost = if kept { 0.0 } else { AHEAD / own.m11 };
+        let expected = share * friction * push - lost;
+        println!("{share}: {found}, {expected} N of friction expected");
+        assert!(
+            (found.x + expected).abs() < 0.02 * friction,
+            "{share}: {found}"
+        );
+        assert!((found.z - push).abs() < 0.02, "{share}: {found}");
+    }
+}
+
 #[test]
 fn the_world_may_be_turned() {
     let bed = HalfSpace {
