@@ -5,6 +5,7 @@ use palpa::live::{RehearsalParams, RehearsalTick, rehearse};
 use palpa_device::{DeviceModel, Path as Way, Scripted, Vec3, band_rms};
 use palpa_lab::trace::converged_forces;
 use palpa_plot::{Axis, Chart, Guide, Series, panels};
+use palpa_servo::Mat3;
 use palpa_testkit::{Lump, Scene};
 use serde::Serialize;
 
@@ -77,20 +78,21 @@ struct Row {
     error_n: f64,
 }
 
-/// Place and height of the parabola through the highest point and its neighbours, mm and N.
+/// Place and height of the parabola that fits the points above four fifths of the highest best, mm and N. The three
+/// highest alone lie on so flat a curve that 0.003 N from tick to tick moves their peak by a millimetre.
 fn peak(points: &[[f64; 2]]) -> [f64; 2] {
-    let top = (1..points.len() - 1)
-        .max_by(|&i, &j| points[i][1].total_cmp(&points[j][1]))
-        .unwrap();
-    let [[x0, y0], [x1, y1], [x2, y2]] = [points[top - 1], points[top], points[top + 1]];
-    let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
-    let curve = (right - left) / (x2 - x0);
-    let slope = left + curve * (x1 - x0);
-    let by = -0.5 * slope / curve;
-    [x1 + by, y1 + by * (slope + curve * by)]
+    let top = points.iter().map(|p| p[1]).fold(0.0, f64::max);
+    let high = || points.iter().filter(|p| p[1] >= 0.8 * top);
+    let row = |x: f64| Vec3::new(1.0, x, x * x);
+    let normal: Mat3 = high().map(|p| row(p[0]) * row(p[0]).transpose()).sum();
+    let right: Vec3 = high().map(|p| row(p[0]) * p[1]).sum();
+    let fit = normal.try_inverse().unwrap() * right;
+    assert!(fit.z < 0.0, "{fit}");
+    let at = -0.5 * fit.y / fit.z;
+    [at, row(at).dot(&fit)]
 }
 
-/// The promise: the peak within 15 % and 1 mm of the converged one, and nothing in it that hands
+/// The promise: the peak within 15 % and half a millimetre of the converged one, and nothing in it that hands
 /// feel as a vibration or a knock, 0.02 N.
 #[test]
 fn a_lump_is_felt_where_it_lies_and_as_hard_as_it_is() {
@@ -129,7 +131,7 @@ fn a_lump_is_felt_where_it_lies_and_as_hard_as_it_is() {
         across(|r| r.converged_x_n),
     );
     assert!((height / true_height - 1.0).abs() < 0.15);
-    assert!((at - true_at).abs() < 1.0);
+    assert!((at - true_at).abs() < 0.5);
     assert!(error < 0.15 * true_height);
     for (name, stroke) in [("lump", &with), ("no lump", &without)] {
         let forces: Vec<Vec3> = stroke.ticks.iter().map(|t| t.force).collect();
