@@ -94,10 +94,12 @@ impl ContactSolver {
             ) else {
                 continue;
             };
+            let Some(friction) = sliding_friction(candidate, tool) else {
+                continue;
+            };
             let place = tool.pose * nalgebra::Point3::from(*anchor);
             let ahead = place - pose * nalgebra::Point3::from(*anchor);
-            let friction = friction_of(candidate, tool);
-            if slides(candidate, tool, &friction) && friction.dot(&ahead) > 0.0 {
+            if friction.dot(&ahead) > 0.0 {
                 *anchor = pose.inverse_transform_point(&place).coords;
             }
         }
@@ -125,15 +127,12 @@ impl ContactSolver {
     }
 }
 
-/// The force on a contact across the tool's normal, N.
-fn friction_of(candidate: &Candidate, tool: &ToolContact) -> Vec3 {
+/// The friction on a contact, N, if it slides: the force across the tool's normal.
+fn sliding_friction(candidate: &Candidate, tool: &ToolContact) -> Option<Vec3> {
     let normal = tool.pose.rotation * candidate.normal;
-    candidate.force - normal * normal.dot(&candidate.force)
-}
-
-/// Whether a contact with this friction slides.
-fn slides(candidate: &Candidate, tool: &ToolContact, friction: &Vec3) -> bool {
-    let normal = tool.pose.rotation * candidate.normal;
-    let most = tool.friction * normal.dot(&candidate.force);
-    !tool.is_bonded && most > 0.0 && friction.norm() >= SLIDES * most
+    let push = normal.dot(&candidate.force);
+    let friction = candidate.force - normal * push;
+    let most = tool.friction * push;
+    let slides = !tool.is_bonded && most > 0.0 && friction.norm() >= SLIDES * most;
+    slides.then_some(friction)
 }

@@ -146,11 +146,6 @@ impl<M> Spots<M> {
         spot.moment.take()
     }
 
-    /// Whether a look was taken whose result has not been entered.
-    fn is_probing(&self) -> bool {
-        self.probing.is_some()
-    }
-
     /// Enters the result of the look that was taken last. If a deeper one came meanwhile, the result
     /// is dropped.
     fn enter(&mut self, result: Result<LiveBar, NoBar>) {
@@ -262,9 +257,9 @@ impl<'a> Bars<'a> {
         let Ok(prober) = Prober::start_as_others() else {
             return;
         };
-        self.prober.give_up();
-        self.prober = prober;
-        if let Some(moment) = self.under_way.take().filter(|_| self.spots.is_probing()) {
+        // When dropped, the old one gives up what it does.
+        let was_busy = std::mem::replace(&mut self.prober, prober).is_busy();
+        if let Some(moment) = self.under_way.take().filter(|_| was_busy) {
             self.prober.begin(&self.live.prepared, moment);
         }
     }

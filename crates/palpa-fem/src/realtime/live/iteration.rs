@@ -230,7 +230,7 @@ impl Live {
             .plan
             .vertices
             .iter()
-            .filter(|&&v| self.plan.tree.first_dof(v as usize) < ring)
+            .filter(|&&v| !self.is_at_ring(v))
             .map(|&v| {
                 let node = self.model.body.node(v as usize, 0);
                 let pressed = self

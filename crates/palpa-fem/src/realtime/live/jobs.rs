@@ -200,7 +200,7 @@ impl Live {
     }
 
     /// Whether a vertex lies on the ring: the zone's outermost columns, which answer nearly linearly.
-    fn is_at_ring(&self, vertex: u32) -> bool {
+    pub(super) fn is_at_ring(&self, vertex: u32) -> bool {
         self.plan.tree.first_dof(vertex as usize) >= self.first_ring_dof()
     }
 
