@@ -54,7 +54,7 @@ fn meshes_of_the_loop_and_of_its_audit_agree_with_an_axisymmetric_solution() {
             let tip = pose.translation.vector;
             let finer = Reference::round(&live.prepared, tip, REFERENCE_SHARE).unwrap();
             for (mesh, most) in [(&own, 0.04), (&finer, 0.015)] {
-                let error = mesh.press(&tool).unwrap().norm() / expected - 1.0;
+                let error = mesh.press(&tool).force.unwrap().norm() / expected - 1.0;
                 println!(
                     "{} nodes, {:.0} mm deep: {:+.2} %",
                     mesh.n_nodes(),

@@ -35,7 +35,7 @@ fn a_reference_is_finer_than_the_mesh_of_the_loop_and_near_to_a_still_finer_one(
     let live = live(&block());
     let tool = stop(&live, 1.3e-3, 3e-3, 0.0).tool;
     let at = tool.pose.translation.vector;
-    let force = |mesh: &Reference| mesh.press(&tool).unwrap().z;
+    let force = |mesh: &Reference| mesh.press(&tool).force.unwrap().z;
     let own = Reference::on(&live.prepared).unwrap();
     let round = |times: f64| {
         let share = times * REFERENCE_SHARE;
@@ -68,7 +68,7 @@ fn without_friction_the_way_does_not_matter_and_with_friction_it_does() {
         let mesh = Reference::on(&live.prepared).unwrap();
         let forces = mesh.follow(&way, || true);
         let gone = forces.last().unwrap().unwrap();
-        let straight = mesh.press(&way[14].tool).unwrap();
+        let straight = mesh.press(&way[14].tool).force.unwrap();
         let differ = (gone - straight).norm() / straight.norm();
         if friction > 0.0 {
             assert!(differ > 0.1 && -gone.x > 0.1 * gone.z, "{gone} {straight}");

@@ -5,8 +5,8 @@
 //! ```
 
 use palpa::audit::{
-    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Quality, REFERENCE_SHARE, Reference, Stop, quantile,
-    relaxes, rubs, thinned,
+    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Pressed, Quality, REFERENCE_SHARE, Reference, Stop,
+    quantile, relaxes, rubs, thinned,
 };
 use palpa::live::LiveScene;
 use palpa_rt::{Log, StepRecord, TickEntry};
@@ -199,23 +199,16 @@ pub(super) fn audit(
         found
     };
     audit.judge_reference(&all, &found, live, context);
-    let on_loop = if audit.goes_the_way || scene.mesh.moves {
-        None
-    } else {
-        Some(Reference::on(&live.prepared)?)
-    };
     let turn = |force: Vec3| {
         live.scene_from_device
             .rotation
             .inverse_transform_vector(&force)
     };
-    for (i, force) in found {
+    for (i, Pressed { force, on_loop }) in found {
         let pose = &all[i];
         let stop = pose.stop(live);
-        let on_loop = on_loop
-            .as_ref()
-            .filter(|_| !context.is_interrupted())
-            .and_then(|mesh| mesh.press(&stop.tool));
+        // A mesh that moves was another one then.
+        let on_loop = on_loop.filter(|_| !scene.mesh.moves);
         let felt = pose.felt();
         let error = |found: Vec3, force: Vec3| (found - force).norm() / force.norm();
         audit.poses.push(Audited {
@@ -241,7 +234,7 @@ fn along_the_way(
     live: &LiveScene,
     context: &Context,
     audit: &mut Audit,
-) -> anyhow::Result<Vec<(usize, Option<Vec3>)>> {
+) -> anyhow::Result<Vec<(usize, Pressed)>> {
     let contacts = contacts(all);
     let relaxes = relaxes(scene);
     let (ways, n_left): (Vec<std::ops::Range<usize>>, usize) = if relaxes {
@@ -294,7 +287,10 @@ fn along_the_way(
         });
         audit.ways.push(on_way.collect());
         let of_chosen = (kept.iter().zip(forces)).filter(|(i, _)| in_way.binary_search(i).is_ok());
-        found.extend(of_chosen.map(|(i, force)| (way.start + i, force)));
+        found.extend(of_chosen.map(|(i, force)| {
+            let on_loop = None;
+            (way.start + i, Pressed { force, on_loop })
+        }));
         audit.keep_coarsest(&reference);
     }
     Ok(found)
@@ -342,7 +338,7 @@ impl Audit {
     fn judge_reference(
         &mut self,
         all: &[Pose<'_>],
-        found: &[(usize, Option<Vec3>)],
+        found: &[(usize, Pressed)],
         live: &LiveScene,
         context: &Context,
     ) {

@@ -2,8 +2,8 @@
 
 use fastrand::Rng;
 use palpa::audit::{
-    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Quality, REFERENCE_SHARE, Reference, Stop, has_history,
-    quantile, relaxes, thinned,
+    LEAST_FORCE, LONGEST_TIME, LONGEST_WAY, Pressed, Quality, REFERENCE_SHARE, Reference, Stop,
+    has_history, quantile, relaxes, thinned,
 };
 use palpa::live::{ACCURACY, LiveScene};
 use palpa_mesh::Vec3;
@@ -195,8 +195,7 @@ fn audit(
         audit.change = Quality::find(prepared, tool, goes_on).map(|quality| quality.change);
     }
     let scene = &prepared.scene;
-    let mut forces = Vec::new();
-    let mut on_loop = None;
+    let mut forces: Vec<Pressed> = Vec::new();
     if has_history(scene) {
         let longest_time = relaxes(scene).then_some(LONGEST_TIME);
         let kept = thinned(&stops[..=last], chosen, LONGEST_WAY, longest_time);
@@ -205,13 +204,15 @@ fn audit(
         audit.nodes = Some(mesh.n_nodes());
         let found = kept.iter().zip(mesh.follow(&way, goes_on));
         let found = found.filter(|(i, _)| chosen.binary_search(i).is_ok());
-        forces.extend(found.map(|(_, force)| force));
+        forces.extend(found.map(|(_, force)| Pressed {
+            force,
+            on_loop: None,
+        }));
         if !goes_on() {
             // These were not solved, so they have not failed.
-            forces.retain(Option::is_some);
+            forces.retain(|found| found.force.is_some());
         }
     } else {
-        on_loop = Some(Reference::on(prepared)?);
         for stop in &of_chosen {
             if !goes_on() {
                 break;
@@ -223,10 +224,10 @@ fn audit(
             forces.push(mesh.press(&stop.tool));
         }
     }
-    let poses = chosen.iter().zip(forces).map(|(&i, force)| {
+    let poses = chosen.iter().zip(forces).map(|(&i, found)| {
         let felt = &felt[i];
+        let Pressed { force, on_loop } = found;
         let error = |found: Vec3| Some(share(found, force?));
-        let on_mesh = on_loop.as_ref().and_then(|mesh| mesh.press(&felt.tool));
         PoseRow {
             case: row.case.clone(),
             accuracy: row.accuracy,
@@ -235,9 +236,9 @@ fn audit(
             depth_mm: felt.depth * 1e3,
             force_n: felt.force.norm(),
             static_n: force.map(|force| force.norm()),
-            on_mesh_n: on_mesh.map(|force| force.norm()),
+            on_mesh_n: on_loop.map(|force| force.norm()),
             total_error: error(felt.force),
-            mesh_error: on_mesh.and_then(error),
+            mesh_error: on_loop.and_then(error),
         }
     });
     audit.poses = poses.collect();

@@ -5,9 +5,12 @@
 //!  poses of the tool ─► two meshes finer than the loop's round them ─► static steps along the way ─► forces
 //! ```
 //! The second mesh has every interval halved, and a third of what that changes is added to its force.
-//! Tissue that neither relaxes nor rubs has one equilibrium at each pose, so each is pressed straight
-//! from above ([`Reference::press`]). Else the way to the pose matters, and
-//! [`Reference::follow`] goes it again in quasi-static steps.
+//! Tissue that neither relaxes nor rubs has one equilibrium at each pose, so it is pressed straight from
+//! above on the loop's own mesh, and that state, carried to the finer ones, begins their equilibria
+//! ([`Reference::press`]). Else the way to the pose matters, and [`Reference::follow`] goes it again in
+//! quasi-static steps.
+
+mod carry;
 
 use std::sync::Arc;
 
@@ -56,13 +59,30 @@ const WAY_STEP: f64 = 4e-3;
 /// begins higher than any press is deep; in the air a step costs nothing.
 const HEIGHTS: [f64; 7] = [50e-3, 7.5e-3, 6e-3, 4.5e-3, 3e-3, 1.5e-3, 0.0];
 
-/// A mesh of a body round some places, or two of them, and what is needed to press it.
+/// Meshes of a body round some places, and what is needed to press them.
 #[derive(Debug)]
 pub struct Reference {
+    on_loop: Mesh,
+    finer: Option<Finer>,
+}
+
+/// Meshes that are finer than the loop's.
+#[derive(Debug)]
+struct Finer {
     mesh: Mesh,
-    /// The same with every interval divided in two: what the force changes by with it, the finer mesh
-    /// still lacks a third of ([`extrapolated`]).
-    halved: Option<Mesh>,
+    /// The same with every interval divided in two: what the force changes by with it, it still lacks a
+    /// third of ([`extrapolated`]).
+    halved: Mesh,
+}
+
+/// Static forces of the tissue on a tool, N, in the scene's frame; `None` where no equilibrium was
+/// found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pressed {
+    /// The best that the reference knows.
+    pub force: Option<Vec3>,
+    /// On the loop's own mesh.
+    pub on_loop: Option<Vec3>,
 }
 
 /// A mesh, and what is needed to press it.
@@ -85,18 +105,18 @@ pub struct Stop {
 }
 
 impl Reference {
-    /// The mesh of a scene as it is, such as that of the loop.
+    /// The mesh of a scene as it is, such as that of the loop, and no finer ones.
     ///
     /// # Errors
     /// When the body cannot be pressed, or has no equilibrium at rest.
     pub fn on(prepared: &Prepared) -> anyhow::Result<Self> {
         Ok(Self {
-            mesh: Mesh::of(prepared)?,
-            halved: None,
+            on_loop: Mesh::of(prepared)?,
+            finer: None,
         })
     }
 
-    /// A mesh of the body of `of` that is fine round the place of the skin nearest to `at`. `share`
+    /// Meshes of the body of `of` that are fine round the place of the skin nearest to `at`. `share`
     /// is that of [`REFERENCE_SHARE`].
     ///
     /// # Errors
@@ -105,7 +125,7 @@ impl Reference {
         Self::build(of, at, &[at], &[], share)
     }
 
-    /// A mesh of the body of `of` that is fine along the way of these stops across the skin.
+    /// Meshes of the body of `of` that are fine along the way of these stops across the skin.
     ///
     /// # Errors
     /// As [`Self::round`].
@@ -171,37 +191,39 @@ impl Reference {
             Mesh::of(&prepared)
         };
         Ok(Self {
-            mesh: build(false)?,
-            halved: Some(build(true)?),
+            on_loop: Mesh::of(of)?,
+            finer: Some(Finer {
+                mesh: build(false)?,
+                halved: build(true)?,
+            }),
         })
     }
 
     /// Number of nodes of the finest mesh.
     pub fn n_nodes(&self) -> usize {
-        let finest = self.halved.as_ref().unwrap_or(&self.mesh);
+        let finest = (self.finer.as_ref()).map_or(&self.on_loop, |finer| &finer.halved);
         finest.model.n_nodes()
     }
 
     /// Mean length of the skin's edges near the tool, m.
     pub fn mesh_size(&self) -> f64 {
-        self.mesh.size
+        let mesh = (self.finer.as_ref()).map_or(&self.on_loop, |finer| &finer.mesh);
+        mesh.size
     }
 
-    /// Static force of the tissue on a tool that was pressed straight along its own axis to its pose,
-    /// N, in the scene's frame; `None` if no equilibrium was found. It is instantaneous: nothing
+    /// Presses the tool straight along its own axis to its pose. The forces are instantaneous: nothing
     /// relaxes.
-    pub fn press(&self, tool: &PosedTool) -> Option<Vec3> {
-        let mut coarse = Walk::new(&self.mesh, above(tool, HEIGHTS[0]));
-        let force = coarse.press(tool)?;
-        let Some(fine) = &self.halved else {
-            return Some(force);
+    pub fn press(&self, tool: &PosedTool) -> Pressed {
+        let on_loop = Walk::press(&self.on_loop, None, tool);
+        let of_loop = on_loop.as_ref().map(|(_, force)| *force);
+        let force = match &self.finer {
+            None => of_loop,
+            Some(finer) => finer.press(on_loop.as_ref().map(|(walk, _)| walk), tool),
         };
-        // It goes the way itself only where the state of the other mesh does not lead to its own.
-        let pose = above(tool, 0.0);
-        let fine = (Walk::at_state_of(&coarse, fine, pose))
-            .and_then(|mut walk| walk.go(pose, TOLERANCE))
-            .or_else(|| Walk::new(fine, above(tool, HEIGHTS[0])).press(tool))?;
-        Some(extrapolated(force, fine))
+        Pressed {
+            force,
+            on_loop: of_loop,
+        }
     }
 
     /// Static forces of the tissue on a tool that goes from stop to stop, N, in the scene's frame.
@@ -212,8 +234,13 @@ impl Reference {
         let Some(first) = stops.first() else {
             return forces;
         };
-        let mut coarse = Walk::new(&self.mesh, *first);
-        let mut fine = self.halved.as_ref().map(|mesh| Walk::new(mesh, *first));
+        let (mut coarse, mut fine) = match &self.finer {
+            None => (Walk::new(&self.on_loop, *first), None),
+            Some(finer) => {
+                let [coarse, fine] = [&finer.mesh, &finer.halved].map(|mesh| Walk::new(mesh, *first));
+                (coarse, Some(fine))
+            }
+        };
         for (force, stop) in forces.iter_mut().zip(stops) {
             if !goes_on() {
                 break;
@@ -229,6 +256,16 @@ impl Reference {
             *force = found;
         }
         forces
+    }
+}
+
+impl Finer {
+    /// The static force on a tool that was pressed to its pose, N; `on_loop` is the same on the loop's
+    /// mesh.
+    fn press(&self, on_loop: Option<&Walk<'_>>, tool: &PosedTool) -> Option<Vec3> {
+        let (coarse, force) = Walk::press(&self.mesh, on_loop, tool)?;
+        let (_, fine) = Walk::press(&self.halved, Some(&coarse), tool)?;
+        Some(extrapolated(force, fine))
     }
 }
 
@@ -263,6 +300,9 @@ struct Walk<'a> {
     state: State,
     ws: Workspace,
     at: Stop,
+    /// Whether the state is near the equilibrium that is looked for, so that the factor of its stiffness
+    /// serves all iterations: a new one of a mesh with intervals halved takes seconds.
+    is_near: bool,
 }
 
 impl<'a> Walk<'a> {
@@ -272,36 +312,40 @@ impl<'a> Walk<'a> {
             state: mesh.rest.clone(),
             ws: Workspace::new(&mesh.model),
             at,
+            is_near: false,
         }
     }
 
-    /// A tool at `at` on a mesh that has every interval of another halved, in the state of the other: `None` if
-    /// it is not that mesh.
-    fn at_state_of(other: &Self, mesh: &'a Mesh, at: Stop) -> Option<Self> {
-        let [coarse, fine] = [&other.mesh.model, &mesh.model].map(|model| model.body());
-        if fine.skin.points != coarse.skin.points || fine.n_levels != 2 * coarse.n_levels - 1 {
-            return None;
-        }
-        let mut walk = Self::new(mesh, at);
-        let moves = &other.state.displacements;
-        for v in 0..coarse.n_vertices() {
-            for level in 0..fine.n_levels {
-                let at = |level: usize| moves[coarse.node(v, level)];
-                walk.state.displacements[fine.node(v, level)] =
-                    0.5 * (at(level / 2) + at(level.div_ceil(2)));
+    /// Presses a tool straight to its pose: from the state of the same on another mesh of the body, if
+    /// there is one and it leads to an equilibrium, else from above. The walk at its end and the force,
+    /// N, if an equilibrium is found.
+    fn press(mesh: &'a Mesh, beside: Option<&Walk<'_>>, tool: &PosedTool) -> Option<(Self, Vec3)> {
+        let at_once = beside.and_then(|other| {
+            let pose = above(tool, 0.0);
+            let mut walk = Self::new(mesh, pose);
+            walk.take_state(other);
+            let force = walk.go(pose, TOLERANCE)?;
+            Some((walk, force))
+        });
+        at_once.or_else(|| {
+            let (last, way) = HEIGHTS.split_last()?;
+            let mut walk = Self::new(mesh, above(tool, HEIGHTS[0]));
+            for height in way {
+                walk.go(above(tool, *height), ON_THE_WAY)?;
             }
-        }
-        walk.state.touches.clone_from(&other.state.touches);
-        Some(walk)
+            let force = walk.go(above(tool, *last), TOLERANCE)?;
+            Some((walk, force))
+        })
     }
 
-    /// Comes down to a pose along the tool's own axis; the force there, N, if an equilibrium is found.
-    fn press(&mut self, tool: &PosedTool) -> Option<Vec3> {
-        let (last, way) = HEIGHTS.split_last()?;
-        for height in way {
-            self.go(above(tool, *height), ON_THE_WAY)?;
+    /// Takes the state of a walk on another mesh of the body.
+    fn take_state(&mut self, other: &Walk<'_>) {
+        let [from, to] = [&other.mesh.model, &self.mesh.model].map(|model| model.body());
+        self.state.displacements = carry::carried(from, &other.state.displacements, to);
+        if from.skin.points == to.skin.points {
+            self.state.touches.clone_from(&other.state.touches);
         }
-        self.go(above(tool, *last), TOLERANCE)
+        self.is_near = true;
     }
 
     /// Goes on to a stop; the force there, N, if an equilibrium is found.
@@ -318,6 +362,7 @@ impl<'a> Walk<'a> {
         };
         let params = SolveParams {
             tolerance,
+            is_near: self.is_near,
             ..self.mesh.params
         };
         let model = &self.mesh.model;
@@ -350,7 +395,7 @@ impl Quality {
         let at = tool.pose.translation.vector;
         let mut press = |times: f64| {
             let mesh = Reference::round(of, at, times * REFERENCE_SHARE).ok()?;
-            let force = goes_on().then(|| mesh.press(tool))??;
+            let force = goes_on().then(|| mesh.press(tool).force)??;
             Some((mesh.n_nodes(), force))
         };
         let ((_, usual), (finer_nodes, finer)) = (press(1.0)?, press(FINER)?);
