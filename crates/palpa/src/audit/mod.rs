@@ -237,7 +237,8 @@ impl Reference {
         let (mut coarse, mut fine) = match &self.finer {
             None => (Walk::new(&self.on_loop, *first), None),
             Some(finer) => {
-                let [coarse, fine] = [&finer.mesh, &finer.halved].map(|mesh| Walk::new(mesh, *first));
+                let [coarse, fine] =
+                    [&finer.mesh, &finer.halved].map(|mesh| Walk::new(mesh, *first));
                 (coarse, Some(fine))
             }
         };
