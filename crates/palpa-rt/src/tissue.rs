@@ -26,6 +26,13 @@ pub struct TissueInput {
     pub n_tools: usize,
 }
 
+impl TissueInput {
+    /// Time at which the tools will be at the poses, if their hands go on as they do, s.
+    pub fn time_of_poses(&self) -> f64 {
+        self.sampled_at + lead(self.period)
+    }
+}
+
 /// Time by which a step looks ahead of the poses that were taken, in patch periods: its patch comes one
 /// period later and serves for another, and both are longer than usual where the step needs a new factor.
 const LEAD: f64 = 2.0;
@@ -36,12 +43,17 @@ const LONGEST_WAY: f64 = 1e-3;
 /// About where a tool with this velocity, m/s, will be while the patch of the next step serves, if patches
 /// come every `period`, s. There the linear model of the tissue is best.
 pub fn ahead(mut pose: Pose, velocity: &Vec3, period: f64) -> Pose {
-    let way = velocity * (LEAD * period).min(LONGEST_LEAD);
+    let way = velocity * lead(period);
     let length = way.norm();
     if length.is_finite() {
         pose.translation.vector += way * (LONGEST_WAY / length.max(LONGEST_WAY));
     }
     pose
+}
+
+/// Time by which the poses of a step are ahead of when they were taken, s.
+fn lead(period: f64) -> f64 {
+    (LEAD * period).min(LONGEST_LEAD)
 }
 
 /// Status of a step.

@@ -214,7 +214,7 @@ impl Counts {
         }
         let halves = sizes.into_iter().zip(&self.touched);
         let of_halves = halves.map(|(n, touched)| work(n, line + touched[half] as usize));
-        Some(front(line as f64, border as f64) + of_halves.sum::<f64>())
+        Some(multiplications(line as f64, border as f64) + of_halves.sum::<f64>())
     }
 }
 
@@ -236,7 +236,7 @@ fn work(n: usize, border: usize) -> f64 {
     let (mut work, mut times) = (0.0, 1.0);
     while n > LEAF as f64 {
         let line = LINE * n.sqrt();
-        work += times * front(line, border);
+        work += times * multiplications(line, border);
         border = 0.5 * border + line;
         n = 0.5 * (n - line);
         times *= 2.0;
@@ -244,8 +244,8 @@ fn work(n: usize, border: usize) -> f64 {
     work
 }
 
-/// Multiplications for a front with so many own columns and columns of its border, of one unknown each.
-fn front(own: f64, border: f64) -> f64 {
+/// Multiplications for a front with so many unknowns of its own and of its border.
+pub(super) fn multiplications(own: f64, border: f64) -> f64 {
     own * (own * own / 3.0 + own * border + border * border)
 }
 

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::dissect::{Part, dissect, ranks};
+use super::dissect::{Part, dissect, multiplications, ranks};
 use crate::TooLarge;
 use crate::blocks::ColumnPattern;
 
@@ -66,11 +66,8 @@ impl Front {
 
     /// Multiplications for factoring this front, with `width` unknowns in a column.
     fn flops(&self, width: usize) -> f64 {
-        let (s, r) = (
-            (self.own.len() * width) as f64,
-            (self.border.len() * width) as f64,
-        );
-        s * s * s / 3.0 + s * s * r + s * r * r
+        let unknowns = |columns: usize| (columns * width) as f64;
+        multiplications(unknowns(self.own.len()), unknowns(self.border.len()))
     }
 }
 

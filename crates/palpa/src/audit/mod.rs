@@ -14,7 +14,10 @@ mod carry;
 
 use std::sync::Arc;
 
-use palpa_fem::{Load, Model, Outcome, PosedTool, SolveParams, State, Workspace, advance};
+use palpa_fem::{
+    Load, Model, Outcome, PosedTool, SolveParams, State, StepReport, Workspace, advance,
+    equilibrate,
+};
 use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_scene::{Scene, Target};
 
@@ -214,7 +217,7 @@ impl Reference {
     /// Presses the tool straight along its own axis to its pose. The forces are instantaneous: nothing
     /// relaxes.
     pub fn press(&self, tool: &PosedTool) -> Pressed {
-        let on_loop = Walk::press(&self.on_loop, None, tool);
+        let on_loop = Walk::from_above(&self.on_loop, tool);
         let of_loop = on_loop.as_ref().map(|(_, force)| *force);
         let force = match &self.finer {
             None => of_loop,
@@ -264,8 +267,9 @@ impl Finer {
     /// The static force on a tool that was pressed to its pose, N; `on_loop` is the same on the loop's
     /// mesh.
     fn press(&self, on_loop: Option<&Walk<'_>>, tool: &PosedTool) -> Option<Vec3> {
-        let (coarse, force) = Walk::press(&self.mesh, on_loop, tool)?;
-        let (_, fine) = Walk::press(&self.halved, Some(&coarse), tool)?;
+        let (coarse, force) = (on_loop.and_then(|other| Walk::beside(other, &self.mesh)))
+            .or_else(|| Walk::from_above(&self.mesh, tool))?;
+        let (_, fine) = Walk::beside(&coarse, &self.halved)?;
         Some(extrapolated(force, fine))
     }
 }
@@ -301,9 +305,6 @@ struct Walk<'a> {
     state: State,
     ws: Workspace,
     at: Stop,
-    /// Whether the state is near the equilibrium that is looked for, so that the factor of its stiffness
-    /// serves all iterations: a new one of a mesh with intervals halved takes seconds.
-    is_near: bool,
 }
 
 impl<'a> Walk<'a> {
@@ -313,40 +314,42 @@ impl<'a> Walk<'a> {
             state: mesh.rest.clone(),
             ws: Workspace::new(&mesh.model),
             at,
-            is_near: false,
         }
     }
 
-    /// Presses a tool straight to its pose: from the state of the same on another mesh of the body, if
-    /// there is one and it leads to an equilibrium, else from above. The walk at its end and the force,
-    /// N, if an equilibrium is found.
-    fn press(mesh: &'a Mesh, beside: Option<&Walk<'_>>, tool: &PosedTool) -> Option<(Self, Vec3)> {
-        let at_once = beside.and_then(|other| {
-            let pose = above(tool, 0.0);
-            let mut walk = Self::new(mesh, pose);
-            walk.take_state(other);
-            let force = walk.go(pose, TOLERANCE)?;
-            Some((walk, force))
-        });
-        at_once.or_else(|| {
-            let (last, way) = HEIGHTS.split_last()?;
-            let mut walk = Self::new(mesh, above(tool, HEIGHTS[0]));
-            for height in way {
-                walk.go(above(tool, *height), ON_THE_WAY)?;
-            }
-            let force = walk.go(above(tool, *last), TOLERANCE)?;
-            Some((walk, force))
-        })
+    /// Presses a tool straight to its pose, from above. The walk at its end and the force, N, if an
+    /// equilibrium is found.
+    fn from_above(mesh: &'a Mesh, tool: &PosedTool) -> Option<(Self, Vec3)> {
+        let (last, way) = HEIGHTS.split_last()?;
+        let mut walk = Self::new(mesh, above(tool, HEIGHTS[0]));
+        for height in way {
+            walk.go(above(tool, *height), ON_THE_WAY)?;
+        }
+        let force = walk.go(above(tool, *last), TOLERANCE)?;
+        Some((walk, force))
     }
 
-    /// Takes the state of a walk on another mesh of the body.
-    fn take_state(&mut self, other: &Walk<'_>) {
-        let [from, to] = [&other.mesh.model, &self.mesh.model].map(|model| model.body());
-        self.state.displacements = carry::carried(from, &other.state.displacements, to);
+    /// The same on another mesh of the body, from the state that a walk ended in: all at once.
+    fn beside(other: &Walk<'_>, mesh: &'a Mesh) -> Option<(Self, Vec3)> {
+        let mut walk = Self::new(mesh, other.at);
+        let [from, to] = [&other.mesh.model, &mesh.model].map(|model| model.body());
+        walk.state.displacements = carry::carried(from, &other.state.displacements, to);
         if from.skin.points == to.skin.points {
-            self.state.touches.clone_from(&other.state.touches);
+            walk.state.touches.clone_from(&other.state.touches);
         }
-        self.is_near = true;
+        let load = Load {
+            tools: &[other.at.tool],
+            ..Load::default()
+        };
+        // A factor of a mesh with intervals halved takes seconds, and the first serves.
+        let params = SolveParams {
+            tolerance: TOLERANCE,
+            is_near: true,
+            ..mesh.params
+        };
+        let report = equilibrate(&mesh.model, &mut walk.state, &mut walk.ws, &load, &params);
+        let force = force_of(&report)?;
+        Some((walk, force))
     }
 
     /// Goes on to a stop; the force there, N, if an equilibrium is found.
@@ -363,17 +366,20 @@ impl<'a> Walk<'a> {
         };
         let params = SolveParams {
             tolerance,
-            is_near: self.is_near,
             ..self.mesh.params
         };
         let model = &self.mesh.model;
         let report = advance(model, &mut self.state, &mut self.ws, &last, &load, &params);
-        if report.outcome != Outcome::Converged {
-            return None;
-        }
+        let force = force_of(&report)?;
         self.at = to;
-        report.tool_forces.first().copied()
+        Some(force)
     }
+}
+
+/// The force on the tool, N, if there is an equilibrium.
+fn force_of(report: &StepReport) -> Option<Vec3> {
+    let is_there = report.outcome == Outcome::Converged;
+    is_there.then(|| report.tool_forces.first().copied())?
 }
 
 /// How good a reference is, at one pose.

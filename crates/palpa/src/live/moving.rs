@@ -186,6 +186,7 @@ impl Tissue for LiveTissue {
 
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
+        (self.body.live_mut()).set_time_of_poses(input.time_of_poses());
         let report = self.body.step(&self.posed, input.dt);
         let is_finished = report.residual <= self.tolerance && report.is_whole();
         let status = match report.outcome {

@@ -8,8 +8,12 @@ use crate::posed_tool::PosedTool;
 /// Distance of a pressed vertex from the zone's centre, as a share of the radius, at which tools
 /// are not followed any farther in that direction.
 const EDGE: f64 = 0.95;
-/// Time over which the tools' velocity is smoothed, s.
-const SMOOTHED: f64 = 5e-3;
+/// Times over which the hands' velocity is smoothed, s. How it differs between them tells how it changes.
+const SMOOTHED: [f64; 2] = [15e-3, 45e-3];
+/// Hands soon stop to gain speed: the time after which they are taken to go on evenly, s.
+const GAINING: f64 = 60e-3;
+/// The largest way that is added for that, as a share of the way at the present speed.
+const MOST_GAIN: f64 = 1.0;
 /// Longest move of a tool that presses, m. After a step that took long the tools are far ahead; several
 /// steps catch up with them sooner than one that goes so far that its iterations do not converge.
 const LONGEST_PRESSED: f64 = 1.2e-3;
@@ -19,8 +23,7 @@ const LONGEST_PRESSED: f64 = 1.2e-3;
 pub(super) struct Course {
     /// The tools at the poses that the body has followed them to.
     pub(super) tools: Vec<PosedTool>,
-    /// Smoothed velocity of the tools, m/s.
-    pub(super) velocity: Vec3,
+    pub(super) pace: Pace,
     /// Least gap between tools and the zone's skin, m; 0 if unknown.
     pub(super) clearance: f64,
 }
@@ -29,7 +32,7 @@ impl Course {
     pub(super) fn new(tools: &[PosedTool]) -> Self {
         Self {
             tools: tools.to_vec(),
-            velocity: Vec3::zeros(),
+            pace: Pace::default(),
             clearance: 0.0,
         }
     }
@@ -39,7 +42,7 @@ impl Course {
     fn advance(&mut self, targets: &[PosedTool], held: Option<Vec3>, most: f64, dt: f64) -> bool {
         debug_assert_eq!(self.tools.len(), targets.len());
         let mut is_short = false;
-        let before: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
+        self.pace.go_on(targets, dt);
         for (tool, target) in self.tools.iter_mut().zip(targets) {
             let mut target = *target;
             let way = target.pose.translation.vector - tool.pose.translation.vector;
@@ -60,16 +63,82 @@ impl Course {
                 pose,
             };
         }
-        let after: Vec3 = self.tools.iter().map(|t| t.pose.translation.vector).sum();
-        let way = (after - before) / self.tools.len().max(1) as f64;
-        if dt > 0.0 {
-            self.velocity += (way / dt - self.velocity) * -(-dt / SMOOTHED).exp_m1();
-        }
         is_short
     }
 }
 
+/// How fast the hands move the targets of the tools.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pace {
+    /// Mean place of the targets, m; `None` before the first.
+    place: Option<Vec3>,
+    /// Time of the targets' poses, s, and that of the next ones, if they are known.
+    at: Option<f64>,
+    next: Option<f64>,
+    /// Way of the targets, m, and the time that it took, s, each smoothed over these times.
+    gone: [(Vec3, f64); 2],
+}
+
+impl Pace {
+    fn go_on(&mut self, targets: &[PosedTool], dt: f64) {
+        let n = targets.len() as f64;
+        let sum: Vec3 = targets.iter().map(|t| t.pose.translation.vector).sum();
+        let place = (n > 0.0).then(|| sum / n);
+        let (before, at) = (self.place, self.at);
+        (self.place, self.at) = (place, self.next.take());
+        let took = self.at.zip(at).map_or(dt, |(now, before)| now - before);
+        if let (Some(before), Some(now), true) = (before, place, took.is_finite()) {
+            // Way and time, and not their ratio: poses are taken at uneven times, and look ahead by uneven times.
+            for ((way, time), smoothed) in self.gone.iter_mut().zip(SMOOTHED) {
+                let kept = (-dt / smoothed).exp();
+                *way = *way * kept + (now - before);
+                *time = *time * kept + took;
+            }
+        }
+    }
+
+    fn velocities(&self) -> [Vec3; 2] {
+        let [fast, slow] = [0, 1].map(|k| {
+            let (way, time) = self.gone[k];
+            way / time.max(0.5 * SMOOTHED[k])
+        });
+        [fast, slow]
+    }
+
+    /// Velocity, m/s.
+    pub(super) fn velocity(&self) -> Vec3 {
+        self.velocities()[0]
+    }
+
+    /// The way of the targets in a time, s, if the hands go on as they do, m.
+    pub(super) fn way_in(&self, time: f64) -> Vec3 {
+        let [fast, slow] = self.velocities();
+        let change = (fast - slow) / (SMOOTHED[1] - SMOOTHED[0]);
+        let velocity = fast + change * SMOOTHED[0];
+        let along = change.dot(&velocity);
+        if along < 0.0 {
+            // They slow down, and come to a stop at most.
+            let slows = -along / velocity.norm_squared();
+            let time = time.min(1.0 / slows);
+            return velocity * (time - 0.5 * slows * time * time);
+        }
+        let gaining = time.min(GAINING);
+        let (even, more) = (
+            fast * time,
+            change * (gaining * (time - 0.5 * gaining) + SMOOTHED[0] * time),
+        );
+        let most = MOST_GAIN * even.norm();
+        even + more * (most / more.norm().max(f64::MIN_POSITIVE)).min(1.0)
+    }
+}
+
 impl Live {
+    /// The time of the poses of the next step, s, by any clock. Without it, they are as much later than
+    /// those of the last step as the step itself.
+    pub fn set_time_of_poses(&mut self, time: f64) {
+        self.course.pace.next = Some(time);
+    }
+
     /// Moves the tools within the limits of one step of `dt`, s. Returns whether any tool stays short
     /// of its target.
     pub(super) fn move_tools(&mut self, targets: &[PosedTool], dt: f64) -> bool {

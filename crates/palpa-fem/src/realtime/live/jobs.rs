@@ -192,7 +192,8 @@ impl Live {
         }
         let zone = (is_leaving || reaches_ring).then(|| {
             let reach = self.reach();
-            let on_its_way = reach + (AHEAD - 1.0) * self.way().norm();
+            let even = self.course.pace.velocity().norm() * self.jobs.latency;
+            let on_its_way = reach + (AHEAD - 1.0) * even;
             let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
             (centres, [INNER * on_its_way, radius])
         });
@@ -216,14 +217,18 @@ impl Live {
         at_ring.map(|c| c.force().norm()).sum::<f64>() / self.tools_force()
     }
 
-    /// Centres at rest of a zone requested now, one for each tool, m.
+    /// Centres at rest of a zone requested now, one for each tool, m: ahead of the tools by the way that they will
+    /// go until the zone is ready, and half of that.
     pub(super) fn next_centres(&self) -> Centres {
-        Centres::new(self.course.tools.len(), |tool| self.next_centre(tool))
+        let way = self.course.pace.way_in(AHEAD * self.jobs.latency);
+        let most = AHEAD * LONGEST_AHEAD * self.params.zone_radius;
+        let way = way * (most / way.norm()).min(1.0);
+        Centres::new(self.course.tools.len(), |tool| self.centre_after(way, tool))
     }
 
-    /// Centre at rest of a zone requested now, m: the middle of the vertices that a tool presses,
-    /// moved ahead by the distance that the tools will go until the zone is ready, and half of that.
-    fn next_centre(&self, tool: usize) -> Vec3 {
+    /// Centre at rest of a zone for a tool that has gone this way, m: the middle of the vertices that it presses,
+    /// moved along the skin.
+    fn centre_after(&self, way: Vec3, tool: usize) -> Vec3 {
         let Some(Pressed { middle, along }) = self.pressed_by(tool) else {
             let displacements = &self.state.displacements;
             let tools = &self.course.tools;
@@ -235,15 +240,7 @@ impl Live {
             }
             return nearest_point(&self.model, displacements, tools, None).1;
         };
-        let way = self.way();
-        middle + (way - along * along.dot(&way)) * AHEAD
-    }
-
-    /// The way that the tools will go until a job requested now is done, m.
-    fn way(&self) -> Vec3 {
-        let way = self.course.velocity * self.jobs.latency;
-        let most = LONGEST_AHEAD * self.params.zone_radius;
-        way * (most / way.norm()).min(1.0)
+        middle + (way - along * along.dot(&way))
     }
 
     /// Writes the memory of the prisms whose memory is updated in every step into a history.

@@ -270,7 +270,7 @@ impl Moved {
         let lag = live.exterior.lag() + old.exterior.lag() - self.lag;
         live.exterior.set_lag(lag.max(0.0));
         live.course.tools.copy_from_slice(&old.course.tools);
-        live.course.velocity = old.course.velocity;
+        live.course.pace.clone_from(&old.course.pace);
         live.course.clearance = old.course.clearance;
         live.jobs.latency = old.jobs.latency;
         live.recovery.pace = old.recovery.pace;
@@ -417,7 +417,7 @@ impl Roaming {
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
         if let Some(Pressed { middle, along }) = live.pressed() {
-            let velocity = live.course.velocity;
+            let velocity = live.course.pace.velocity();
             let aside = velocity - along * along.dot(&velocity);
             let ahead = aside.try_normalize(SLOWEST).unwrap_or_default();
             return (middle, ahead * (LEAD * radius));
