@@ -169,3 +169,63 @@ impl Live {
         out.try_normalize(1e-9)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{Pose, Sphere, Tool};
+
+    /// The pace after steps at these times, s, each with poses that are so much later, s, of a hand that goes along x
+    /// as told.
+    fn pace(steps: &[[f64; 2]], x: impl Fn(f64) -> f64) -> Pace {
+        let tool = Tool::new(Sphere::new(8e-3).unwrap(), 0.0).unwrap();
+        let (mut pace, mut last) = (Pace::default(), 0.0);
+        for &[time, lead] in steps {
+            let pose = Pose::translation(x(time + lead), 0.0, 0.0);
+            pace.next = Some(time + lead);
+            pace.go_on(&[PosedTool { tool, pose }], time - last);
+            last = time;
+        }
+        pace
+    }
+
+    fn even(n: u32, dt: f64) -> Vec<[f64; 2]> {
+        (0..n).map(|k| [f64::from(k) * dt, 0.0]).collect()
+    }
+
+    #[test]
+    fn a_look_ahead_that_becomes_shorter_is_no_hand_that_stands_still() {
+        const SPEED: f64 = 50e-3;
+        // Long steps that look 24 ms ahead, then short ones that look ahead ever less.
+        let long = (0..10).map(|k| [12e-3 * f64::from(k), 24e-3]);
+        let short = (1..=12).map(|k| [0.108 + 2e-3 * f64::from(k), 24e-3 - 1e-3 * f64::from(k)]);
+        let steps: Vec<[f64; 2]> = long.chain(short).collect();
+        let pace = pace(&steps, |time| SPEED * time);
+        assert!((pace.velocity().x / SPEED - 1.0).abs() < 1e-9);
+        assert!((pace.way_in(0.1).x / (0.1 * SPEED) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn hands_that_gain_speed_are_met_farther_ahead_and_those_that_slow_down_where_they_stop() {
+        const GAIN: f64 = 0.5;
+        const TIME: f64 = 0.1;
+        let gaining = pace(&even(35, 2e-3), |time| {
+            0.5 * GAIN * (time - 0.02).max(0.0).powi(2)
+        });
+        let speed = GAIN * 0.048;
+        let far = gaining.way_in(TIME).x;
+        assert!(
+            far > 1.05 * speed * TIME && far < speed * TIME + 0.5 * GAIN * TIME * TIME,
+            "{far}"
+        );
+        // It stops 0.1 s after the last step, having gone 2.5 mm more.
+        let whole = 0.4;
+        let slowing = pace(&even(151, 2e-3), |time| GAIN * time * (whole - 0.5 * time));
+        let far = slowing.way_in(1.0).x;
+        assert!(far > 1.8e-3 && far < 3.2e-3, "{far}");
+        let stands = pace(&even(400, 2e-3), |time| {
+            GAIN * time.min(whole) * (whole - 0.5 * time.min(whole))
+        });
+        assert!(stands.way_in(1.0).norm() < 1e-6);
+    }
+}
