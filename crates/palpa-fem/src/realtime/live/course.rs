@@ -23,6 +23,7 @@ const LONGEST_PRESSED: f64 = 1.2e-3;
 pub(super) struct Course {
     /// The tools at the poses that the body has followed them to.
     pub(super) tools: Vec<PosedTool>,
+    /// How fast the targets move.
     pub(super) pace: Pace,
     /// Least gap between tools and the zone's skin, m; 0 if unknown.
     pub(super) clearance: f64,
@@ -97,12 +98,12 @@ impl Pace {
         }
     }
 
+    /// Velocities over the shorter and the longer time, m/s.
     fn velocities(&self) -> [Vec3; 2] {
-        let [fast, slow] = [0, 1].map(|k| {
+        [0, 1].map(|k| {
             let (way, time) = self.gone[k];
             way / time.max(0.5 * SMOOTHED[k])
-        });
-        [fast, slow]
+        })
     }
 
     /// Velocity, m/s.
