@@ -64,6 +64,8 @@ pub struct Prepared {
     /// For each lump that is a mesh, its surface in its place at rest, m; else `None`.
     drawn: Vec<Option<Surface>>,
     model: OnceLock<Arc<Model>>,
+    /// The state at rest of a body under tension.
+    rest: OnceLock<State>,
 }
 
 impl Prepared {
@@ -124,6 +126,7 @@ impl Prepared {
             notes,
             drawn,
             model: OnceLock::new(),
+            rest: OnceLock::new(),
         })
     }
 
@@ -139,6 +142,7 @@ impl Prepared {
             notes: Vec::new(),
             drawn: self.drawn.clone(),
             model: Arc::clone(model).into(),
+            rest: OnceLock::new(),
             scene,
         }
     }
@@ -162,6 +166,7 @@ impl Prepared {
             notes: Vec::new(),
             drawn: Vec::new(),
             model: OnceLock::new(),
+            rest: OnceLock::new(),
             scene,
         }
     }
@@ -214,7 +219,8 @@ impl Prepared {
         self.scene.layers.iter().any(|layer| layer.prestress != 0.0)
     }
 
-    /// The state before anything presses: in equilibrium with the tension of the layers, relaxed.
+    /// The state before anything presses: in equilibrium with the tension of the layers, relaxed. That is
+    /// solved for on the first call.
     ///
     /// # Errors
     /// When the body cannot be pressed, or no equilibrium at rest is found.
@@ -223,6 +229,9 @@ impl Prepared {
         let mut state = State::new(&model);
         if !self.is_tense() {
             return Ok(state);
+        }
+        if let Some(rest) = self.rest.get() {
+            return Ok(rest.clone());
         }
         let mut ws = Workspace::new(&model);
         let load = Load {
@@ -245,7 +254,7 @@ impl Prepared {
                 in_words(&report.outcome)
             );
         }
-        Ok(state)
+        Ok(self.rest.get_or_init(|| state).clone())
     }
 
     /// The straight way of the scene's tool, or of another one, down to the place. `rest` is the
