@@ -139,7 +139,7 @@ impl Outside {
     }
 
     /// Assembles and factors the exterior's stiffness at these displacements, and linearises about
-    /// them. `from` is what they were extrapolated from.
+    /// them. `from` is what they were extrapolated from. Gives up once `is_wanted` says no.
     #[expect(
         clippy::too_many_arguments,
         reason = "a model, its zone and two rooms to work in"
@@ -154,6 +154,7 @@ impl Outside {
         workshop: &mut Workshop,
         displacements: &[Vec3],
         from: Option<From<'_>>,
+        is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Trouble> {
         let pressure = from.map_or(Pressure::Own, Pressure::Predicted);
         if !plan.exterior.is_empty() {
@@ -166,8 +167,11 @@ impl Outside {
                 pressure,
             )?;
             plan.support(model, pattern, false, &mut workshop.blocks);
-            self.factor
-                .factor(&plan.tree, &workshop.blocks, &mut workshop.scratch)?;
+            let (blocks, scratch) = (&workshop.blocks, &mut workshop.scratch);
+            let factor = &mut self.factor;
+            if !factor.factor_while(&plan.tree, blocks, scratch, is_wanted)? {
+                return Err(Trouble::GivenUp);
+            }
         }
         // The stiffness is that of the present state, so no forces can have reversed.
         follower.forces.fill(Vec3::zeros());

@@ -17,6 +17,8 @@ pub(super) enum Trouble {
     Inverted(Vec3),
     /// A matrix could not be made positive definite.
     Singular,
+    /// What was to be made is no longer wanted.
+    GivenUp,
 }
 
 impl From<Inverted> for Trouble {

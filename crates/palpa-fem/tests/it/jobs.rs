@@ -5,7 +5,7 @@ use std::sync::Arc;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use palpa_fem::law::{Gent, Moduli, NeoHookean, Prony, PronyTerm, Volumetric};
 use palpa_fem::realtime::{
-    ExteriorMode, Live, LiveParams, LocalModel, Rebuilt, Roaming, StepOutcome,
+    ExteriorMode, Live, LiveParams, LocalModel, Rebuild, Rebuilt, Roaming, StepOutcome,
 };
 use palpa_fem::{Material, Materials, Model, ModelParams, PosedTool, Supports};
 use palpa_mesh::Vec3;
@@ -157,6 +157,77 @@ fn slow_jobs_make_their_zones_ahead_of_the_tool_or_steps_say_that_they_are_late(
             n_late < 30 && (late > SLOW || n_late == 0),
             "{late}: {n_late}"
         );
+    }
+}
+
+/// A factor that is under way is given up for a zone that is due, which then comes sooner. Whether its thread noticed or
+/// had done already makes no difference to any bit, so that a replay is the same.
+#[test]
+fn a_factor_gives_way_to_a_zone() {
+    const LONG: usize = 14;
+    /// How soon the thread of a job notices: it has done before, at once, or not at all.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Thread {
+        Quick,
+        Slow,
+        Deaf,
+    }
+    enum Under {
+        Way(Rebuild),
+        Done(Rebuilt),
+    }
+    let start = at(sphere(0.0), -10e-3, 0.0, -1e-3);
+    for (prony, exterior) in [None, Some(prony())]
+        .into_iter()
+        .flat_map(|prony| MODES.map(|mode| (prony.clone(), mode)))
+    {
+        let model = model_of(25, false, prony.as_ref());
+        let go = |thread: Thread| -> (Vec<[u64; 3]>, usize, u64) {
+            let params = LiveParams {
+                stale: 0.2e-3,
+                ..params(exterior)
+            };
+            let mut live = Live::new(Arc::clone(&model), &start, params).unwrap();
+            let mut out: Option<(usize, Under)> = None;
+            let (mut forces, mut n_given_up, mut zones) = (Vec::new(), 0, 0);
+            for (k, tools) in stroke().enumerate() {
+                match out.take_if(|(due, _)| *due <= k) {
+                    Some((_, Under::Way(job))) => live.install(job.run()),
+                    Some((_, Under::Done(done))) => live.install(done),
+                    None => {}
+                }
+                let report = live.step(&tools, DT);
+                let force = live.tool_force(0);
+                forces.push([force.x, force.y, force.z].map(f64::to_bits));
+                zones += report.zone;
+                if let (true, Some((due, _))) = (live.has_given_up_job(), &mut out)
+                    && *due > k + 1
+                {
+                    n_given_up += 1;
+                    if thread != Thread::Deaf {
+                        *due = k + 1;
+                    }
+                }
+                if let Some(job) = live.take_job() {
+                    let job = match thread {
+                        Thread::Quick => Under::Done(job.run()),
+                        Thread::Slow | Thread::Deaf => Under::Way(job),
+                    };
+                    out = Some((k + LONG, job));
+                }
+            }
+            (forces, n_given_up, zones)
+        };
+        let [quick, slow, deaf] = [Thread::Quick, Thread::Slow, Thread::Deaf].map(go);
+        println!(
+            "viscous: {}, {exterior:?}: {} given up",
+            prony.is_some(),
+            slow.1
+        );
+        assert!(slow.1 > 0);
+        assert!(quick == slow);
+        // Zones come sooner: the sum of their numbers over all steps is larger.
+        assert!(slow.2 > deaf.2, "{} {}", slow.2, deaf.2);
     }
 }
 

@@ -140,10 +140,26 @@ impl<T: Number> Exterior<T> {
         blocks: &[Block<T>],
         scratch: &mut FactorScratch<T>,
     ) -> Result<(), Singular> {
+        self.factor_while(tree, blocks, scratch, &|| true)?;
+        Ok(())
+    }
+
+    /// As [`Self::factor`], while `goes_on`, which is asked before each front and says no for good, says yes.
+    /// Returns whether it did; if not, the factor must not be used.
+    ///
+    /// # Errors
+    /// As [`Self::factor`].
+    pub fn factor_while(
+        &mut self,
+        tree: &Tree,
+        blocks: &[Block<T>],
+        scratch: &mut FactorScratch<T>,
+        goes_on: GoesOn<'_>,
+    ) -> Result<bool, Singular> {
         self.schur.fill(T::default());
         let n = tree.ring.len() * tree.width;
         put_pairs(tree, &tree.ring_pairs, blocks, &mut self.schur, n);
-        eliminate_half(
+        let is_whole = eliminate_half(
             tree,
             Half::Exterior,
             blocks,
@@ -151,7 +167,11 @@ impl<T: Number> Exterior<T> {
             None,
             false,
             scratch,
+            goes_on,
         )?;
+        if !is_whole {
+            return Ok(false);
+        }
         for front in &tree.fronts[tree.range(Half::Exterior)] {
             if front.parent.is_none() {
                 let size = front.border.len() * tree.width;
@@ -160,7 +180,7 @@ impl<T: Number> Exterior<T> {
                 add_update(tree.width, &front.to_parent, update, 0, &mut self.schur, n);
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Subtracts the exterior's answer to displacements of the ring from a right side there. Cost:
@@ -205,7 +225,9 @@ impl<T: Number> Zone<T> {
     ) -> Result<(), Singular> {
         let schur = exterior.map(|e| &e.schur[..]);
         let panels = &mut self.panels;
-        eliminate_half(tree, Half::Zone, blocks, panels, schur, false, scratch)
+        let half = Half::Zone;
+        eliminate_half(tree, half, blocks, panels, schur, false, scratch, &|| true)?;
+        Ok(())
     }
 
     /// As [`Self::factor`], but where the matrix is not positive definite, or only just, its diagonal is
@@ -224,7 +246,8 @@ impl<T: Number> Zone<T> {
     ) -> Result<usize, Singular> {
         let schur = exterior.map(|e| &e.schur[..]);
         let panels = &mut self.panels;
-        eliminate_half(tree, Half::Zone, blocks, panels, schur, true, scratch)?;
+        let half = Half::Zone;
+        eliminate_half(tree, half, blocks, panels, schur, true, scratch, &|| true)?;
         Ok(scratch.raised.n)
     }
 }
@@ -254,8 +277,15 @@ pub fn least_pivot<T: Number>(
     least
 }
 
+/// Whether to go on.
+type GoesOn<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Factors all fronts of a half: branches at the same time if the scratch memory allows it, then
-/// the trunk.
+/// the trunk. Returns whether it went on to the end.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a half of a matrix, and how it is factored"
+)]
 fn eliminate_half<T: Number>(
     tree: &Tree,
     half: Half,
@@ -264,7 +294,8 @@ fn eliminate_half<T: Number>(
     schur: Option<&[T]>,
     may_raise: bool,
     scratch: &mut FactorScratch<T>,
-) -> Result<(), Singular> {
+    goes_on: GoesOn<'_>,
+) -> Result<bool, Singular> {
     let branches = &tree.branches[half as usize];
     let FactorScratch {
         threads,
@@ -281,6 +312,7 @@ fn eliminate_half<T: Number>(
         (rooms.into_par_iter().zip(branches)).try_for_each(|(mut room, branch)| {
             branch
                 .clone()
+                .take_while(|_| goes_on())
                 .try_for_each(|f| eliminate(tree, f, blocks, schur, &mut room))
         })?;
     }
@@ -295,13 +327,16 @@ fn eliminate_half<T: Number>(
     };
     let mut left = branches.iter().peekable();
     for f in tree.range(half) {
+        if !goes_on() {
+            return Ok(false);
+        }
         left.next_if(|branch| branch.end <= f);
         let is_done = is_parallel && left.peek().is_some_and(|branch| branch.contains(&f));
         if !is_done {
             eliminate(tree, f, blocks, schur, &mut room)?;
         }
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Memory in which some fronts are factored.

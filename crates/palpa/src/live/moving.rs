@@ -85,6 +85,11 @@ impl LiveTissue {
         self.last.as_ref()
     }
 
+    /// Whether the job that was taken last is no longer wanted: its result changes nothing.
+    pub fn has_given_up_job(&self) -> bool {
+        self.body.has_given_up_job()
+    }
+
     /// Force of the tissue on a tool after the last step, in the device's frame, N.
     pub fn force(&self, tool: usize) -> Vec3 {
         self.scene_from_device

@@ -1,6 +1,7 @@
 //! Decides when a background job is due, and installs its result.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use palpa_mesh::Vec3;
 
@@ -31,6 +32,8 @@ const LAGS: [f64; 2] = [0.01, 0.05];
 #[derive(Debug)]
 pub(super) struct Jobs {
     job: Job,
+    /// Whether the job that is out is no longer wanted.
+    is_given_up: Arc<AtomicBool>,
     /// Number of jobs requested so far. Factors and zones take their numbers from it.
     pub(super) n_asked: u64,
     pub(super) n_zones: u64,
@@ -56,8 +59,8 @@ enum Job {
     Idle(Option<Box<Room>>),
     /// A job is requested, and no thread has taken it.
     Waiting(Rebuild),
-    /// A thread is working on it.
-    Out,
+    /// A thread is working on it: on a new zone, or on a new factor of the present exterior.
+    Out { is_zone: bool },
 }
 
 impl Jobs {
@@ -70,6 +73,7 @@ impl Jobs {
     ) -> Self {
         Self {
             job: Job::Idle(Some(room)),
+            is_given_up: Arc::default(),
             n_asked,
             n_zones,
             age: 0.0,
@@ -108,9 +112,16 @@ struct Due {
 }
 
 impl Live {
-    /// Requests a job if one is due and none is under way. Cost: a copy of the zone's displacements
+    /// Requests a job if one is due and none is under way. A factor that is under way is given up for a zone
+    /// that is due: it would keep the zone waiting, and the zone has a factor of its own. Cost: a copy of the zone's displacements
     /// and viscous memory; of the whole body's displacements if the exterior is followed.
     pub(super) fn ask(&mut self, dt: f64) {
+        if let Job::Out { is_zone: false } = self.jobs.job
+            && !self.has_given_up_job()
+            && self.next_zone().is_some()
+        {
+            self.jobs.is_given_up.store(true, Ordering::Relaxed);
+        }
         if !matches!(self.jobs.job, Job::Idle(_)) || self.plan.exterior.is_empty() {
             return;
         }
@@ -133,6 +144,7 @@ impl Live {
             is_followed,
             is_pressed: self.problem.pressing().next().is_some(),
             id: self.jobs.n_asked,
+            is_given_up: Arc::clone(&self.jobs.is_given_up),
         };
         if let Some(Due { zone, depth }) = due {
             self.jobs.n_asked += 1;
@@ -179,25 +191,27 @@ impl Live {
     /// The job that is due: a new zone if the tools leave the present one or press its ring, or a
     /// new factor if the exterior's is out of date.
     fn due(&self) -> Option<Due> {
-        let reaches_ring = self.pressing_firmly().any(|c| self.is_at_ring(c.vertex));
-        let radius = self.plan.radius;
-        let centres = self.next_centres();
-        let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
+        let zone = self.next_zone();
         let depth = self.depth();
         let is_stale = (depth - self.jobs.depth_at_factor).abs() > self.params.stale
             || self.exterior.lag() > self.jobs.longest_lag
             || self.exterior.residual() > self.params.tolerance * self.tools_force();
-        if !(is_leaving || is_stale || reaches_ring) {
-            return None;
-        }
-        let zone = (is_leaving || reaches_ring).then(|| {
+        (zone.is_some() || is_stale).then_some(Due { zone, depth })
+    }
+
+    /// Centres at rest and radii of a new zone, m, if the tools leave the present one or press its ring.
+    fn next_zone(&self) -> Option<(Centres, [f64; 2])> {
+        let reaches_ring = self.pressing_firmly().any(|c| self.is_at_ring(c.vertex));
+        let radius = self.plan.radius;
+        let centres = self.next_centres();
+        let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
+        (is_leaving || reaches_ring).then(|| {
             let reach = self.reach();
             let even = self.course.pace.velocity().norm() * self.jobs.latency;
             let on_its_way = reach + (AHEAD - 1.0) * even;
             let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
             (centres, [INNER * on_its_way, radius])
-        });
-        Some(Due { zone, depth })
+        })
     }
 
     /// Whether a vertex lies on the ring: the zone's outermost columns, which answer nearly linearly.
@@ -276,7 +290,7 @@ impl Live {
 
     /// Takes back a job that no thread has taken.
     pub(super) fn take_back_job(&mut self) {
-        match std::mem::replace(&mut self.jobs.job, Job::Out) {
+        match std::mem::replace(&mut self.jobs.job, Job::Idle(None)) {
             Job::Waiting(job) => {
                 self.jobs.job = Job::Idle(job.room);
                 self.exterior.set_lag(self.exterior.lag() + job.lag);
@@ -287,8 +301,11 @@ impl Live {
 
     /// A job for the background thread, if one is due. Give its result to [`Self::install`].
     pub fn take_job(&mut self) -> Option<Rebuild> {
-        match std::mem::replace(&mut self.jobs.job, Job::Out) {
+        match std::mem::replace(&mut self.jobs.job, Job::Idle(None)) {
             Job::Waiting(job) => {
+                let is_zone = job.target.is_some();
+                self.jobs.job = Job::Out { is_zone };
+                self.jobs.is_given_up.store(false, Ordering::Relaxed);
                 self.jobs.lag_out = job.lag;
                 Some(job)
             }
@@ -297,6 +314,12 @@ impl Live {
                 None
             }
         }
+    }
+
+    /// Whether the job that a thread is working on is given up: its result changes nothing, and comes as
+    /// soon as the thread notices.
+    pub fn has_given_up_job(&self) -> bool {
+        matches!(self.jobs.job, Job::Out { .. }) && self.jobs.is_given_up.load(Ordering::Relaxed)
     }
 
     /// Call it instead of [`Self::install`] if the job panicked. Its room is lost; the next job makes
@@ -316,7 +339,11 @@ impl Live {
             made,
         } = done;
         room.retired.kept = std::mem::replace(&mut self.jobs.kept, kept);
-        if let Some(made) = made {
+        if self.has_given_up_job() {
+            // Whether the thread has noticed is a matter of time, and must make no difference.
+            room.retired.outside = made.map(|made| made.outside);
+            self.jobs.ask_for_factor();
+        } else if let Some(made) = made {
             self.jobs.latency = self.jobs.age;
             self.put_in(made, &mut room);
         }

@@ -27,7 +27,7 @@
 //!                   ▲                            │ ▲─────────a tool comes near────────────┘
 //!                   └──job installed, step lost──┘
 //! ExteriorState  Followed, or Linear { .., is_lost } (lost from a start again to the next factor)
-//! Job            Idle ──ask──► Waiting ──take_job──► Out ──install──► Idle
+//! Job            Idle ──ask──► Waiting ──take_job──► Out ──install──► Idle; a factor may be given up
 //! Verdict        Good, Rough or Lost: how a step is judged, and so how fast the next may go
 //! ```
 
@@ -200,10 +200,11 @@ impl Live {
             &plan,
             &state.displacements,
             None,
+            &|| true,
         )
         .map_err(|trouble| match trouble {
             Trouble::Inverted(at) => FemError::NoRest { at: at.into() },
-            Trouble::Singular => FemError::NoRest {
+            Trouble::Singular | Trouble::GivenUp => FemError::NoRest {
                 at: centres.of(0).into(),
             },
         })?;

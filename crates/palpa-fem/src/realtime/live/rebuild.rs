@@ -1,6 +1,7 @@
 //! Jobs for the background thread: a new zone, or a new factor of the exterior.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use palpa_mesh::Vec3;
 use palpa_sparse::ColumnPattern;
@@ -39,6 +40,8 @@ pub struct Rebuild {
     pub(super) is_pressed: bool,
     /// Number of the factor.
     pub(super) id: u64,
+    /// Whether the result is no longer wanted. It may become so at any time.
+    pub(super) is_given_up: Arc<AtomicBool>,
 }
 
 /// A new zone.
@@ -147,6 +150,7 @@ impl Shop {
         plan: &Plan,
         displacements: &[Vec3],
         from: Option<From<'_>>,
+        is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Trouble> {
         let (follower, workshop) = (&mut self.follower, &mut self.workshop);
         outside.refactor(
@@ -158,6 +162,7 @@ impl Shop {
             workshop,
             displacements,
             from,
+            is_wanted,
         )
     }
 }
@@ -168,7 +173,7 @@ pub struct Rebuilt {
     pub(super) room: Box<Room>,
     /// As [`Rebuild::kept`], at the time of the request.
     pub(super) kept: Option<Arc<History>>,
-    /// The new parts; `None` if the factor failed, or if only a room was made.
+    /// The new parts; `None` if the factor failed or was given up, or if only a room was made.
     pub(super) made: Option<Made>,
 }
 
@@ -251,6 +256,7 @@ impl Rebuild {
             &plan,
             displacements,
             from,
+            &|| !self.is_given_up.load(Ordering::Relaxed),
         );
         let zone = (is_new && result.is_ok())
             .then(|| self.zone(memory, history.as_ref(), &plan, entering));

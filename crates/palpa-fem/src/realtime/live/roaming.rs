@@ -352,6 +352,11 @@ impl Roaming {
         report
     }
 
+    /// See [`Live::has_given_up_job`].
+    pub fn has_given_up_job(&self) -> bool {
+        self.is_job_out && self.live.has_given_up_job()
+    }
+
     fn is_beyond(&self) -> bool {
         let (Some(bodies), Some(pressed)) = (&self.bodies, self.live.pressed()) else {
             return false;

@@ -23,6 +23,8 @@ const PERIOD: f64 = 1e-3;
 /// engine.
 const SHORTEST: f64 = 1e-3;
 const LONGEST: f64 = 0.02;
+/// A job that is no longer wanted ends after this share of its time: no part of it takes longer.
+const GIVES_UP: f64 = 0.15;
 /// Time before the hand begins, s, in which the force ramps up.
 const BEGIN: f64 = 0.7;
 
@@ -173,7 +175,15 @@ struct Loop {
     last_start: f64,
     period: f64,
     step: u64,
-    job: Option<(f64, <LiveTissue as Tissue>::Done)>,
+    job: Option<Under>,
+}
+
+/// A job that is under way.
+struct Under {
+    /// Time at which it ends, and the whole time that it takes, s.
+    due: f64,
+    takes: f64,
+    done: <LiveTissue as Tissue>::Done,
 }
 
 impl Loop {
@@ -260,24 +270,33 @@ impl Loop {
             n_tools: 1,
         };
         let clock = thread_cpu();
-        if let Some((_, done)) = self.job.take_if(|(due, _)| *due <= start) {
+        if let Some(Under { done, .. }) = self.job.take_if(|job| job.due <= start) {
             self.tissue.install(done);
         }
         let result = self.tissue.step(&input, &mut self.working);
+        let has_given_up = self.tissue.has_given_up_job();
         let work = self.job.is_none().then(|| self.tissue.take_job()).flatten();
         let time = self.time_of_step(clock);
         stamp(&mut self.working, &input, &result);
         let end = start + time;
         self.ready_at = result.is_published().then_some(end);
         self.free_at = end.max(start + SHORTEST);
+        if let Some(job) = (self.job.as_mut()).filter(|_| has_given_up) {
+            let due = job.due.min(end + GIVES_UP * job.takes);
+            if now > BEGIN {
+                driven.background -= job.due - due;
+            }
+            job.due = due;
+        }
         if let Some(work) = work {
             let clock = thread_cpu();
             let done = LiveTissue::run(work);
-            let late = self.time_of_job(clock);
+            let takes = self.time_of_job(clock);
             if now > BEGIN {
-                driven.background += late;
+                driven.background += takes;
             }
-            self.job = Some((end + late, done));
+            let due = end + takes;
+            self.job = Some(Under { due, takes, done });
         }
         // A step in which nothing moves costs nothing, and counts for nothing.
         if self.working.n_contacts > 0 && result.iterations > 0 {
