@@ -89,6 +89,11 @@ impl Servo {
         let patch = patches.current();
         self.check_age(now, patch, &mut report);
         self.check_loads(&mut loads, &mut report);
+        for ((tool, load), contact) in self.tools.iter_mut().zip(&loads).zip(&patch.tools) {
+            if !contact.is_bonded {
+                tool.transfer.stop_pulling(&load.force);
+            }
+        }
         self.update_ramp(dt, patch, &mut report);
         self.render(&loads, dt, &mut report);
         if report.residual > 10.0 * self.params.tolerance {

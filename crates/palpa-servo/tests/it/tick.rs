@@ -57,6 +57,29 @@ fn a_new_patch_makes_no_bump_and_wins_in_two_periods() {
     );
 }
 
+/// A patch that comes late may correct the force by much. Where the hand lifts the tool faster than that
+/// fades, it is cut instead of pulling the tool back into the tissue.
+#[test]
+fn what_a_late_patch_corrects_never_pulls() {
+    let (mut servo, mut patch) = settled();
+    // Four times as stiff: the old force is three quarters too small.
+    for w in &mut patch.compliance {
+        *w *= 0.25;
+    }
+    patch.id = 5000;
+    patch.period = 50e-3;
+    servo.send(patch.clone());
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for k in 0..80 {
+        let report = servo.tick(Some(DEEP + Vec3::z() * (80e-6 * f64::from(k))));
+        let tool = &report.tools[0];
+        least = least.min((tool.tissue_force + tool.transfer).z);
+        most = most.max(-tool.transfer.z);
+    }
+    assert!(most > 0.5, "{most}");
+    assert!(least > -1e-5, "{least}");
+}
+
 #[test]
 fn a_stale_patch_ramps_to_zero_and_a_fresh_one_back() {
     let (mut servo, patch) = settled();
