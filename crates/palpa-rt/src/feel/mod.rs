@@ -46,8 +46,12 @@ pub struct FeelReport {
     pub limits: Vec<(Limits, u64)>,
     /// Largest share of the tissue's stiffness that the coupling took away.
     pub softening_max: f64,
-    /// Largest force of the damping that the energy observer injected, N.
+    /// Largest force of the damping that the energy observer injected, N, by the way of the device within
+    /// the last 10 ms.
     pub damping_force_max: f64,
+    /// Largest force that pulled the tool into the tissue, against the last force of the tissue, N: whether or not
+    /// that pressed still.
+    pub pull_max: f64,
     /// Number of ticks with each fault after the first tick at full force, whether or not the tool
     /// touched.
     pub faults: Vec<(Faults, u64)>,
@@ -76,9 +80,23 @@ impl FeelReport {
         let mut transfers = Vec::new();
         let mut last: Option<&TickEntry> = None;
         let mut is_armed = false;
-        for entry in ticks {
+        let mut outward = [0.0; 3];
+        for (i, entry) in ticks.iter().enumerate() {
             let device = &entry.devices[k];
             is_armed |= entry.tick.gain >= 1.0;
+            let pressed = norm(device.tissue_force);
+            if pressed > 0.0 {
+                outward = device.tissue_force.map(|f| f / pressed);
+            }
+            if device.is_there {
+                let along: f64 = device
+                    .force
+                    .iter()
+                    .zip(outward)
+                    .map(|(f, out)| f * out)
+                    .sum();
+                report.pull_max = report.pull_max.max(-along);
+            }
             if is_armed {
                 count(&mut faults, entry.tick.faults | device.faults);
             }
@@ -91,7 +109,7 @@ impl FeelReport {
                     device.limits | (entry.tick.limits & u32::from(whole)),
                 );
                 report.softening_max = report.softening_max.max(device.softening);
-                let damping = device.damping * norm(device.velocity);
+                let damping = device.damping * speed(&ticks[..=i], k);
                 report.damping_force_max = report.damping_force_max.max(damping);
                 if entry.tick.taken
                     && let Some(last) = last.filter(|last| is_felt(last, k))
@@ -132,6 +150,22 @@ impl FeelReport {
 fn is_felt(entry: &TickEntry, k: usize) -> bool {
     let device = &entry.devices[k];
     entry.tick.gain >= 1.0 && device.is_there && norm(device.tissue_force) > 0.0
+}
+
+/// Speed of device `k` at the last of these ticks, m/s: by its way within 10 ms. Few devices tell one.
+fn speed(ticks: &[TickEntry], k: usize) -> f64 {
+    const OVER: f64 = 10e-3;
+    let Some((now, before)) = ticks.split_last() else {
+        return 0.0;
+    };
+    let time = |entry: &TickEntry| now.tick.now - entry.tick.now;
+    let is_near = |entry: &&TickEntry| time(entry) <= OVER && entry.devices[k].is_there;
+    let Some(from) = before.iter().rev().take_while(is_near).last() else {
+        return 0.0;
+    };
+    let way: [f64; 3] =
+        std::array::from_fn(|i| now.devices[k].position[i] - from.devices[k].position[i]);
+    norm(way) / time(from).max(f64::MIN_POSITIVE)
 }
 
 fn count(counts: &mut [u64; 16], bits: u32) {

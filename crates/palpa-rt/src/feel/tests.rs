@@ -63,6 +63,21 @@ fn a_limit_cycle_of_the_device_is_judged_where_the_target_is_still() {
 }
 
 #[test]
+fn damping_counts_by_the_way_of_the_device_and_pulling_off_the_tissue_too() {
+    // Up at 50 mm/s, damped by 2 N s/m, while the tissue's force falls from 1 N to nothing within 0.1 s.
+    let mut lift = ticks(200, |t| (0.05 * t, (1.0 - 10.0 * t).max(0.0)));
+    for entry in &mut lift {
+        entry.devices[0].damping = 2.0;
+        entry.devices[0].force[2] -= 0.1;
+    }
+    let found = report(&lift, Vec::new());
+    assert!((found.damping_force_max - 0.1).abs() < 1e-3, "{found:?}");
+    assert!((found.pull_max - 0.1).abs() < 1e-9, "{found:?}");
+    let pressed = report(&ticks(200, |t| (-0.05 * t, 1.0)), Vec::new());
+    assert!(pressed.pull_max == 0.0 && pressed.damping_force_max == 0.0);
+}
+
+#[test]
 fn without_contact_a_pause_or_time_there_is_no_stillness() {
     let quiet = ticks(4000, |_| (0.0, 1.0));
     assert_eq!(report(&quiet, Vec::new()).still, None);

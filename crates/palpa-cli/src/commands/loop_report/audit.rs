@@ -21,6 +21,8 @@ use crate::table::Table;
 /// Where the way matters: most contacts whose way is gone again.
 const MOST_CONTACTS: usize = 3;
 const SEED: u64 = 14;
+/// A pose stands for the time until the next one, but for no more than this, s.
+const LONGEST_STEP: f64 = 0.1;
 
 /// The audit of a run.
 #[derive(Debug, Clone, Serialize)]
@@ -128,8 +130,9 @@ fn poses<'a>(log: &'a Log, until: f64) -> Vec<Pose<'a>> {
     log.steps.iter().filter_map(at_tick).collect()
 }
 
-/// `n` of the poses at which the tool presses firmly, at full force: one at random in each of `n`
-/// equal parts of them. Indices, ascending.
+/// At most `n` of the poses at which the tool presses firmly, at full force: one at random in each of `n`
+/// equal parts of the time of these, so that many short steps at rest do not stand for a stroke. Indices,
+/// ascending, each once.
 fn drawn(poses: &[Pose<'_>], n: usize) -> Vec<usize> {
     let size = |pose: &Pose<'_>| pose.felt().norm();
     let largest = poses.iter().map(size).fold(0.0, f64::max);
@@ -140,14 +143,25 @@ fn drawn(poses: &[Pose<'_>], n: usize) -> Vec<usize> {
         })
         .map(|(i, _)| i)
         .collect();
-    let mut random = fastrand::Rng::with_seed(SEED);
-    let n = n.min(firm.len());
-    (0..n)
-        .map(|part| {
-            let [from, to] = [part, part + 1].map(|part| part * firm.len() / n);
-            firm[random.usize(from..to)]
+    let time = |i: usize| poses[i].tick.tick.now;
+    let until: Vec<f64> = (firm.iter())
+        .scan(0.0, |sum, &i| {
+            let next = poses.get(i + 1).map_or(time(i), |next| next.tick.tick.now);
+            *sum += (next - time(i)).clamp(f64::MIN_POSITIVE, LONGEST_STEP);
+            Some(*sum)
         })
-        .collect()
+        .collect();
+    let whole = until.last().copied().unwrap_or(0.0);
+    let mut random = fastrand::Rng::with_seed(SEED);
+    let mut drawn: Vec<usize> = (0..n)
+        .filter_map(|part| {
+            let at = (part as f64 + random.f64()) / n as f64 * whole;
+            firm.get(until.partition_point(|until| *until <= at))
+                .copied()
+        })
+        .collect();
+    drawn.dedup();
+    drawn
 }
 
 /// Contacts: ranges of poses from the last one in the air to the last one that touches.
@@ -490,6 +504,19 @@ mod tests {
         assert_eq!(in_first.count(), 4);
         assert_eq!(drawn(&all, 8), chosen, "the seed is fixed");
         assert_eq!(drawn(&all[..40], 8), [] as [usize; 0]);
+        // Of the second contact there are few steps, each ten times as long.
+        let mut few = log;
+        few.steps
+            .retain(|step| step.tick < 300 || step.tick.is_multiple_of(20));
+        let all = poses(&few, 0.45);
+        let chosen = drawn(&all, 8);
+        let in_first = |i: &&usize| all[**i].tick.tick.tick <= 200;
+        let n_first = chosen.iter().filter(in_first).count();
+        assert!(
+            chosen.windows(2).all(|pair| pair[0] < pair[1]),
+            "{chosen:?}"
+        );
+        assert!(n_first <= 4 && chosen.len() >= n_first + 3, "{chosen:?}");
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! The figures of a run.
 
 use palpa_rt::{
-    Ending, Happening, Log, Quantiles, RecordKind, Report, StepRecord, StepStatus, TickEntry,
+    Ending, Happening, Histogram, Log, Quantiles, RecordKind, Report, StepRecord, StepStatus,
+    TickEntry,
 };
 use palpa_servo::{Faults, Limits};
 use serde::Serialize;
@@ -114,7 +115,7 @@ pub(super) struct TissueFigures {
     pub(super) steps: u64,
     pub(super) steps_per_s: f64,
     /// Rate of the steps with contact; `None` without such steps.
-    steps_per_s_in_contact: Option<f64>,
+    pub(super) steps_per_s_in_contact: Option<f64>,
     /// Largest speed of the tool at which the force keeps its accuracy: steps are short enough, and
     /// zones arrive in time.
     fastest_tool_mm_per_s: f64,
@@ -122,6 +123,7 @@ pub(super) struct TissueFigures {
     pub(super) fastest_by_steps_mm_per_s: f64,
     /// Speed of the hand.
     pub(super) motion_mm_per_s: f64,
+    /// Of the steps with contact in which something moved: others cost next to nothing.
     step_cpu_us: Times,
     step_wall_us: Times,
     pub(super) held_back: u64,
@@ -131,7 +133,7 @@ pub(super) struct TissueFigures {
     /// Number of steps with contact in which something moved.
     pub(super) touching: u64,
     /// Number of steps that did not reach the tool.
-    behind: u64,
+    pub(super) behind: u64,
     /// Share of the steps with contact that did not reach the tool.
     pub(super) behind_share: f64,
     /// Share of the ticks without a force because the tissue was late.
@@ -179,8 +181,8 @@ impl TissueFigures {
             fastest_tool_mm_per_s: 1e3 * by_zones.map_or(by_steps, |v| v.min(by_steps)),
             fastest_by_steps_mm_per_s: 1e3 * by_steps,
             motion_mm_per_s: 1e3 * setup.motion_speed,
-            step_cpu_us: report.step_cpu.into(),
-            step_wall_us: report.step_wall.into(),
+            step_cpu_us: times_in_contact(log, |step| step.cpu),
+            step_wall_us: times_in_contact(log, |step| step.wall),
             held_back: report.held_back,
             unfinished_share: share(unfinished.clone().filter(|s| has_worked(s)).count()),
             unfinished: unfinished.count() as u64,
@@ -262,8 +264,8 @@ impl Figures {
         for (name, t) in [
             ("tick, CPU µs", &self.tick_cpu_us),
             ("wake-up late, µs", &self.wake_up_lateness_us),
-            ("tissue step, CPU µs", &self.tissue.step_cpu_us),
-            ("tissue step, wall µs", &self.tissue.step_wall_us),
+            ("step in contact, CPU µs", &self.tissue.step_cpu_us),
+            ("step in contact, wall µs", &self.tissue.step_wall_us),
         ] {
             let cell = |x: f64| format!("{x:.1}");
             table.push([
@@ -277,15 +279,16 @@ impl Figures {
         context.say(table)?;
         let t = &self.tissue;
         context.say(format!(
-            "{:.1} s, {} ticks, {} missed; tissue {:.0} steps/s, {} in contact ({} steps, {} unfinished, {} behind, {} held back, \
-             {} zones, {} meshes), {} background jobs ({} panicked), {:.1} % of a core",
+            "{:.1} s, {} ticks, {} missed; {} steps, {:.0} a second; of these {} moved in contact, {} a second ({} unfinished, {} behind, {} \
+             held back); {} zones, {} meshes; {} background jobs ({} panicked), {:.1} % of a core",
             self.seconds,
             self.ticks,
             self.misses,
+            t.steps,
             t.steps_per_s,
+            t.touching,
             t.steps_per_s_in_contact
                 .map_or_else(|| "none".to_owned(), |rate| format!("{rate:.0}")),
-            t.steps,
             t.unfinished,
             t.behind,
             t.held_back,
@@ -367,6 +370,15 @@ fn rate_in_contact(steps: &[StepRecord]) -> Option<f64> {
     let pairs = steps.windows(2).filter(|pair| has_worked(&pair[0]));
     let time: f64 = pairs.clone().map(|pair| pair[1].now - pair[0].now).sum();
     (time > 0.0).then(|| pairs.count() as f64 / time)
+}
+
+/// Times of the steps with contact in which something moved.
+fn times_in_contact(log: &Log, time: impl Fn(&StepRecord) -> f64) -> Times {
+    let histogram = Histogram::new();
+    for step in log.steps.iter().filter(|step| has_worked(step)) {
+        histogram.add(time(step));
+    }
+    histogram.quantiles().into()
 }
 
 fn count(counts: &mut Vec<(String, u64)>, name: &str) {

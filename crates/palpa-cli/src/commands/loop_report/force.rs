@@ -60,6 +60,8 @@ pub(super) struct ForceFigures {
     pub(super) energy_budget_mj: f64,
     /// Largest force of the damping that the energy observer injected.
     pub(super) damping_force_max_n: f64,
+    /// Largest force that pulled the tool into the tissue.
+    pub(super) pull_max_n: f64,
     /// Largest share of the tissue's stiffness that the coupling took away.
     pub(super) softening_max: f64,
     /// Share of the ticks whose contact problem was not solved to its tolerance.
@@ -136,6 +138,7 @@ impl ForceFigures {
             energy_window_with_ramps_mj: feel.energy_window_with_ramps.map(milli),
             energy_budget_mj: last.map_or(0.0, |t| milli(t.tick.energy_budget)),
             damping_force_max_n: feel.damping_force_max,
+            pull_max_n: feel.pull_max,
             softening_max: feel.softening_max,
             unsolved_share: feel.share_at(Limits::SWEEPS),
             cut_share: CUTS.into_iter().map(|cut| feel.share_at(cut)).sum(),
@@ -150,9 +153,10 @@ impl ForceFigures {
         }
     }
 
-    /// Largest change of force that a patch may bring, N.
+    /// Largest change of force that a tick in which a patch arrives may have, N: other ticks may change it nearly as
+    /// fast, but a loop that trembles must not allow itself more.
     pub(super) fn most_arrival_n(&self) -> f64 {
-        2.0 * self.other_p999_n
+        (2.0 * self.other_p999_n).min(0.1 * self.max_force_n)
     }
 
     /// The figures that no guarantee judges.

@@ -94,6 +94,7 @@ pub(super) enum Guarantee {
     EnergySinceFault,
     EnergyWindow,
     ObserverDamping,
+    Pull,
     Unsolved,
     Cut,
     Softened,
@@ -122,6 +123,7 @@ impl Guarantee {
             Self::EnergySinceFault => "energy given out since the last fault",
             Self::EnergyWindow => "energy given out in a closed second",
             Self::ObserverDamping => "force of the energy observer's damping",
+            Self::Pull => "force that pulls into the tissue",
             Self::Unsolved => "ticks whose contact was not solved",
             Self::Cut => "ticks whose force a limit cut",
             Self::Softened => "tissue softened for the device",
@@ -265,10 +267,10 @@ fn judge_tissue(t: &TissueFigures, nodes: usize, judge: &mut Judge) {
         NO_STEP,
         || {
             format!(
-                "in {:.1} % of the steps with contact the tissue was behind the tool, because zones or meshes came too \
-                 late: the forces of these steps are wrong; close other programs, move more slowly, or make the mesh \
-                 coarser with [mesh] near_tool",
-                100.0 * t.behind_share
+                "in {:.1} % of the steps with contact, {} of {}, the tissue was behind the tool, because zones, meshes or \
+                 the steps themselves took too long: the forces of these steps are wrong; close other programs, move more \
+                 slowly, or make the mesh coarser with [mesh] near_tool",
+                100.0 * t.behind_share, t.behind, t.touching
             )
         },
     );
@@ -293,10 +295,11 @@ fn judge_tissue(t: &TissueFigures, nodes: usize, judge: &mut Judge) {
         Unit::Share,
         || {
             format!(
-                "{:.1} % of the ticks had no force, since no fresh patch came ({} steps failed, {:.0} steps/s on {nodes} nodes)",
+                "{:.1} % of the ticks had no force, since no fresh patch came ({} steps failed; with contact {:.0} steps/s on \
+                 {nodes} nodes)",
                 100.0 * t.stale_share,
                 t.held_back,
-                t.steps_per_s
+                t.steps_per_s_in_contact.unwrap_or_default()
             )
         },
     );
@@ -353,8 +356,11 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         NO_TOUCH,
         || {
             format!(
-                "force changes by {:.4} N where a patch arrives, more than twice the p99.9 of other ticks, {:.4}",
-                d.arrival_max_n, d.other_p999_n
+                "force changes by {:.4} N where a patch arrives, more than {:.4}: twice the p99.9 of other ticks, {:.4}, or a \
+                 tenth of the largest force",
+                d.arrival_max_n,
+                d.most_arrival_n(),
+                d.other_p999_n
             )
         },
     );
@@ -419,6 +425,13 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
             )
         },
     );
+    judge.at_most(Guarantee::Pull, d.pull_max_n, most, Unit::Newtons, || {
+        format!(
+            "the force pulled the tool into the tissue with up to {:.4} N, more than {most:.4}: skin only pushes; what pulls is \
+             damping of the loop or of its energy observer",
+            d.pull_max_n
+        )
+    });
     judge.if_any(
         Guarantee::Dip,
         d.dip_max,
