@@ -90,9 +90,7 @@ impl Servo {
         self.check_age(now, patch, &mut report);
         self.check_loads(&mut loads, &mut report);
         for ((tool, load), contact) in self.tools.iter_mut().zip(&loads).zip(&patch.tools) {
-            if !contact.is_bonded {
-                tool.transfer.stop_pulling(&load.force);
-            }
+            tool.stop_pulling(load, contact);
         }
         self.update_ramp(dt, patch, &mut report);
         self.render(&loads, dt, &mut report);

@@ -69,6 +69,11 @@ pub(super) fn limited(
     (command, limits)
 }
 
+/// The part of a force that pulls against the direction in which skin pushes; zero if it pushes.
+pub(super) fn pull_of(force: &Vec3, outward: &Vec3) -> Vec3 {
+    outward * force.dot(outward).min(0.0)
+}
+
 /// The vector, shortened to `length` if it is longer; zero if it is not finite.
 pub(super) fn shortened(v: &Vec3, length: f64) -> Vec3 {
     let norm = v.norm();

@@ -1,7 +1,7 @@
 //! One tool: from the tissue's force on it to the command of its device.
 
 use super::coupling::Coupling;
-use super::limits::{NO_DEVICE, limited};
+use super::limits::{NO_DEVICE, limited, pull_of};
 use super::ramp::Ramp;
 use super::transfer::Transfer;
 use crate::energy::{Energy, TickEnergy};
@@ -21,6 +21,9 @@ pub(super) struct Tool {
     /// The tissue's force and moment in the last good tick, with the transfer.
     held: ForceCommand,
     pub(super) transfer: Transfer,
+    /// Direction of the tissue's force in the last tick with one, which the skin only pushes in; zero if the
+    /// skin is bonded to the tool.
+    outward: Vec3,
     /// Energy stored in the local model at the end of the last tick, J.
     stored: f64,
     /// Share of the local model's force in the last command; none while the last good force is
@@ -39,6 +42,7 @@ impl Tool {
         command: ForceCommand::ZERO,
         held: ForceCommand::ZERO,
         transfer: Transfer::NONE,
+        outward: Vec3::new(0.0, 0.0, 0.0),
         stored: 0.0,
         share: 0.0,
         is_held: true,
@@ -94,7 +98,18 @@ impl Tool {
         jump
     }
 
-    /// Turns the tissue's force into the command, through ramp, damping and limits.
+    /// Cuts what the last patches corrected where the skin would pull.
+    pub(super) fn stop_pulling(&mut self, load: &ToolLoad, contact: &ToolContact) {
+        self.outward = if contact.is_bonded {
+            Vec3::zeros()
+        } else {
+            load.force.try_normalize(0.0).unwrap_or(self.outward)
+        };
+        self.transfer.stop_pulling(&load.force, &self.outward);
+    }
+
+    /// Turns the tissue's force into the command, through ramp, damping and limits. Damping takes away no more
+    /// than the whole push: a force of none gives out no energy either.
     pub(super) fn render(
         &mut self,
         load: &ToolLoad,
@@ -116,8 +131,9 @@ impl Tool {
         let base = if touches { params.damping } else { 0.0 };
         let whole_damping = (damping + base).clamp(0.0, spec.max_damping);
         let gain = ramp.smoothed();
+        let damped = self.held.force - velocity * whole_damping;
         let wanted = ForceCommand {
-            force: (self.held.force - velocity * whole_damping) * gain,
+            force: (damped - pull_of(&damped, &self.outward)) * gain,
             torque: self.held.torque * gain,
         };
         let (command, limits) = limited(&wanted, &self.command, &spec, dt);

@@ -1,7 +1,7 @@
 //! The transfer: a new patch gives another force at the same pose, and the difference fades out
 //! instead of jumping.
 
-use super::limits::{shortened, without_dust};
+use super::limits::{pull_of, shortened, without_dust};
 use crate::solver::ToolLoad;
 use crate::{DeviceSpec, ForceCommand, Vec3};
 
@@ -12,15 +12,12 @@ pub(super) struct Transfer {
     pub(super) force: ForceCommand,
     /// Time left to fade, s.
     left: f64,
-    /// Direction of the tissue's force in the last tick with one; zero before the first.
-    outward: Vec3,
 }
 
 impl Transfer {
     pub(super) const NONE: Self = Self {
         force: ForceCommand::ZERO,
         left: 0.0,
-        outward: Vec3::new(0.0, 0.0, 0.0),
     };
 
     /// Adds the difference between the old and the new patch; it fades within `time`, s. The sum is
@@ -60,12 +57,8 @@ impl Transfer {
 
     /// Cuts the difference where its sum with the tissue's force would pull the tool into the tissue, as it would
     /// in a lift, when that force falls faster than the difference fades.
-    pub(super) fn stop_pulling(&mut self, tissue: &Vec3) {
-        self.outward = tissue.try_normalize(0.0).unwrap_or(self.outward);
-        let pushes = (tissue + self.force.force).dot(&self.outward);
-        if pushes < 0.0 {
-            self.force.force -= self.outward * pushes;
-        }
+    pub(super) fn stop_pulling(&mut self, tissue: &Vec3, outward: &Vec3) {
+        self.force.force -= pull_of(&(tissue + self.force.force), outward);
     }
 
     /// Forgets the difference.
