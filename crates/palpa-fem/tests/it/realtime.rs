@@ -290,7 +290,9 @@ fn a_fine_mesh_moves_with_the_tool() {
         let (mut under, mut zone, mut before, mut meshes) = (None, None, 0.0_f64, 1);
         let (mut worst, mut jump) = (0.0_f64, 0.0_f64);
         for (k, tools) in (0_u32..).zip(down.chain(along)) {
-            if let Some((_, done)) = under.take_if(|(due, _)| *due <= k) {
+            let is_due = |due: u32, is_given_up: bool| due <= k || is_given_up;
+            let is_given_up = roaming.has_given_up_job();
+            if let Some((_, done)) = under.take_if(|(due, _)| is_due(*due, is_given_up)) {
                 roaming.install(done);
             }
             let report = roaming.step(&tools, 0.005);
@@ -298,7 +300,8 @@ fn a_fine_mesh_moves_with_the_tool() {
             if let Some(job) = roaming.take_job() {
                 under = Some((k + LATE, job.run()));
             }
-            if let Some((_, done)) = zone.take_if(|(due, _)| *due <= k) {
+            let is_given_up = whole.has_given_up_job();
+            if let Some((_, done)) = zone.take_if(|(due, _)| is_due(*due, is_given_up)) {
                 whole.install(done);
             }
             whole.step(&tools, 0.005);

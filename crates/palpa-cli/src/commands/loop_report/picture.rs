@@ -70,13 +70,19 @@ fn steps(filled: &[(f64, f64, u64)]) -> Vec<[f64; 2]> {
 /// Plots force and height against time. Shaded where the tissue was behind the tool or gave no
 /// force. Error bars stand where they were computed.
 pub(super) fn forces(log: &Log, bars: &[BarFigures], subtitle: &str) -> Picture {
+    let missing = missing(log);
+    let legend = if missing.is_empty() {
+        ""
+    } else {
+        "; grey: the tissue was behind the tool, or there was no force"
+    };
     let force = Chart::new(Axis::linear("time [s]"), Axis::linear("force [N]"))
         .title("Force on the hand")
-        .subtitle(subtitle)
+        .subtitle(format!("{subtitle}{legend}"))
         .line("along the press", curve(log, |d| d.force[2]))
         .line("across", curve(log, |d| d.force[0].hypot(d.force[1])));
     let force = with_bars(force, bars, |bar| bar.time_s);
-    let force = missing(log).into_iter().fold(force, |chart, [from, to]| {
+    let force = missing.into_iter().fold(force, |chart, [from, to]| {
         chart.band(Band::x(from, to, "", FAINT))
     });
     let place = Chart::new(

@@ -113,10 +113,12 @@ struct Due {
 
 impl Live {
     /// Requests a job if one is due and none is under way. A factor that is under way is given up for a zone
-    /// that is due: it would keep the zone waiting, and the zone has a factor of its own. Cost: a copy of the zone's displacements
+    /// that is due: it would keep the zone waiting, and the zone has a factor of its own. A followed exterior
+    /// needs each factor soon, to come near equilibrium. Cost: a copy of the zone's displacements
     /// and viscous memory; of the whole body's displacements if the exterior is followed.
     pub(super) fn ask(&mut self, dt: f64) {
         if let Job::Out { is_zone: false } = self.jobs.job
+            && self.params.exterior == ExteriorMode::Linear
             && !self.has_given_up_job()
             && self.next_zone().is_some()
         {
