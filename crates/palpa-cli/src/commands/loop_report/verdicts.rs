@@ -390,6 +390,20 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
             )
         });
     }
+    judge_energy(d, most, judge);
+    judge.if_any(
+        Guarantee::Dip,
+        d.dip_max,
+        MOST_DIP,
+        Unit::Share,
+        "the force was never large enough",
+        || dip_words(d),
+    );
+}
+
+/// Judges the energy that the loop gives to the hand, and forces that are not the tissue's: none may be more than
+/// `most`, N.
+fn judge_energy(d: &ForceFigures, most: f64, judge: &mut Judge) {
     let (made, budget) = (d.energy_deficit_mj, d.energy_budget_mj);
     judge.at_most(
         Guarantee::EnergySinceFault,
@@ -432,14 +446,6 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
             d.pull_max_n
         )
     });
-    judge.if_any(
-        Guarantee::Dip,
-        d.dip_max,
-        MOST_DIP,
-        Unit::Share,
-        "the force was never large enough",
-        || dip_words(d),
-    );
 }
 
 fn dip_words(d: &ForceFigures) -> String {
