@@ -330,7 +330,8 @@ fn what_takes_too_long_leaves_ticks_out_and_never_bunches_them() {
         &report,
         &[is_late, |e| has(e, Faults::MISSED_DEADLINE), IS_WELL],
     );
-    // Ticks that were missed shortly before are told of together with these, which is later.
+    // The loop says at most ten times a second that it missed ticks. If it missed some just before, it tells of
+    // these only after the law has.
     check_said(
         &report,
         &[is_late, |e| matches!(e, Happening::DeadlineMissed { .. })],

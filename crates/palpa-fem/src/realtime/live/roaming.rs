@@ -354,7 +354,7 @@ impl Roaming {
 
     /// See [`Live::has_given_up_job`].
     pub fn has_given_up_job(&self) -> bool {
-        self.is_job_out && self.live.has_given_up_job()
+        self.live.has_given_up_job()
     }
 
     fn is_beyond(&self) -> bool {
