@@ -11,6 +11,9 @@ pub enum Priority {
     Normal,
     /// Ordinary, with a niceness: 1 to 19 is after other threads, -1 to -20 before them.
     Nice(i8),
+    /// After all others: it runs while a core has nothing else to do, and makes way at once. Nice 19 does not:
+    /// a thread that wakes up beside it may have to wait.
+    Idle,
 }
 
 /// Scheduling that a thread requests.
@@ -73,6 +76,7 @@ impl fmt::Display for Granted {
             Priority::RealTime(p) => write!(f, "{}: real-time priority {p} ", self.thread)?,
             Priority::Normal => write!(f, "{}: ordinary priority ", self.thread)?,
             Priority::Nice(n) => write!(f, "{}: nice {n} ", self.thread)?,
+            Priority::Idle => write!(f, "{}: idle-time priority ", self.thread)?,
         }
         write!(f, "{}", outcome(&self.priority))?;
         if let Some(core) = self.wish.core {
@@ -92,8 +96,9 @@ mod system {
     };
     use std::num::NonZeroU64;
     use thread_priority::{
-        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
-        set_thread_priority_and_policy, thread_native_id,
+        NormalThreadSchedulePolicy, RealtimeThreadSchedulePolicy, ThreadPriority,
+        ThreadPriorityValue, ThreadSchedulePolicy, set_thread_priority_and_policy,
+        thread_native_id,
     };
 
     pub(super) fn schedule(priority: Priority) -> Result<(), String> {
@@ -112,6 +117,12 @@ mod system {
                 .map_err(|e| e.to_string())
             }
             Priority::Normal => Ok(()),
+            Priority::Idle => set_thread_priority_and_policy(
+                thread_native_id(),
+                ThreadPriority::Min,
+                ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle),
+            )
+            .map_err(|e| e.to_string()),
             // On Linux niceness belongs to a thread, despite the name of the call.
             Priority::Nice(n) => {
                 setpriority_process(Some(gettid()), i32::from(n)).map_err(|e| e.to_string())
@@ -155,6 +166,7 @@ mod system {
             }
             Priority::Normal => return Ok(()),
             Priority::Nice(n) if n > 0 => ThreadPriority::Min,
+            Priority::Idle => ThreadPriority::Min,
             Priority::Nice(_) => return Ok(()),
         };
         wish.set_for_current().map_err(|e| format!("{e:?}"))

@@ -337,7 +337,8 @@ pub(crate) struct MeshTable {
     /// Error bar that `palpa press` may leave: half its width at the deepest, as a share of the
     /// force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so
     /// `near_tool` cannot be given too. Default: sizes as given here. In real time nothing is measured
-    /// before: all default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3.
+    /// before: default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3; near the tool they
+    /// are only 4 % smaller for 2 %, since steps on finer meshes come late.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) accuracy: Option<Share>,
     /// Longest time for the choice of a mesh by `accuracy`, 1 s to 86400 s. Default: no limit.

@@ -1,14 +1,15 @@
 //! Error bars of the force under the hand: when they are computed, and which one a page sees.
 //!
 //! ```text
-//!  the tool presses ──► it stays, or has pressed for a while ──► palpa-probe ──► known bars
-//!                                                                                   │ near the tool, on the same mesh
-//!                                                                                   └──► figures for pages
+//!  the tool presses ──► it stays ──► palpa-probe ──► known bars
+//!                                                       │ near the tool, on the same mesh
+//!                                                       └──► figures for pages
 //! ```
 
 use palpa::accuracy::Source;
 use palpa::live::{LiveBar, Moment, NoBar, Prober, Seen};
 use palpa_mesh::Vec3;
+use palpa_rt::Granted;
 use palpa_viewer::control::{BarProblem, ErrorBar};
 
 use crate::stage::Live;
@@ -16,8 +17,6 @@ use crate::stage::Live;
 /// A tool that moves less than the first value, m, for the second, s, stays.
 const STAYS: f64 = 0.4e-3;
 const STAY: f64 = 0.4;
-/// A tool that presses but does not stay is probed where it is after this time, s.
-const LONG: f64 = 2.0;
 /// Rest between the end of one computation and the beginning of the next, s.
 const REST: f64 = 0.5;
 /// A bar holds where the tool is this near to its place, as a share of the contact radius, and as
@@ -61,15 +60,14 @@ impl Press {
     }
 }
 
-/// Decides when and where a bar is computed, and keeps the results.
+/// Decides when and where a bar is computed, and keeps the results. Beside a hand that moves none is:
+/// the steps need the cores then.
 #[derive(Debug, Default)]
 struct Policy {
     /// Where the tool came to rest, if it presses.
     stays_at: Option<Press>,
     /// Time for which it has been there, s.
     stays: f64,
-    /// Time for which it has pressed since the last computation began, s.
-    presses: f64,
     /// Time until the next computation may begin, s.
     rest: f64,
     /// The press that is being computed.
@@ -83,30 +81,31 @@ impl Policy {
     fn advance(&mut self, press: Option<Press>, dt: f64) -> Option<Press> {
         self.rest -= dt;
         let Some(press) = press else {
-            (self.stays_at, self.presses) = (None, 0.0);
+            self.stays_at = None;
             return None;
         };
         self.known.retain(|(known, _)| known.mesh.0 == press.mesh.0);
-        self.presses += dt;
         let is_there = |at: &Press| at.mesh == press.mesh && (at.tip - press.tip).norm() < STAYS;
         if self.stays_at.as_ref().is_some_and(is_there) {
             self.stays += dt;
         } else {
             (self.stays_at, self.stays) = (Some(press), 0.0);
         }
-        let is_due = self.stays >= STAY || self.presses >= LONG;
+        let is_due = self.stays >= STAY;
         let is_known = (self.known.iter()).any(|(known, _)| press.distance(known) < ANEW);
         if !is_due || is_known || self.under_way.is_some() || self.rest > 0.0 {
             return None;
         }
         self.under_way = Some(press);
-        self.presses = 0.0;
         Some(press)
     }
 
-    /// Whether the computation under way is for another engine than this one.
-    fn is_stale(&self, engine: u64) -> bool {
-        self.under_way.is_some_and(|press| press.mesh.0 != engine)
+    /// Whether the computation under way is for another engine than this one, or for a place that a
+    /// pressing tool has left.
+    fn is_stale(&self, engine: u64, press: Option<&Press>) -> bool {
+        self.under_way.is_some_and(|at| {
+            at.mesh.0 != engine || press.is_some_and(|press| press.distance(&at) >= 1.0)
+        })
     }
 
     /// Takes the result of the computation under way.
@@ -200,7 +199,8 @@ impl Bars {
         }
         let seen = live.and_then(|live| Some((live, seen(live)?)));
         self.press = seen.as_ref().map(|(_, (press, _))| *press);
-        if live.is_none_or(|live| self.policy.is_stale(live.engine)) {
+        let press = self.press.as_ref();
+        if live.is_none_or(|live| self.policy.is_stale(live.engine, press)) {
             self.prober.give_up();
         }
         let due = self.policy.advance(self.press, dt);
@@ -209,6 +209,11 @@ impl Bars {
         {
             self.prober.begin(prepared, moment);
         }
+    }
+
+    /// The scheduling that the system granted to the thread of the probes.
+    pub(crate) fn granted(&self) -> &Granted {
+        self.prober.granted()
     }
 
     /// The bar where the tool presses now.
@@ -332,16 +337,22 @@ mod tests {
     }
 
     #[test]
-    fn a_tool_that_moves_is_probed_on_its_way_with_rests_between() {
+    fn beside_a_tool_that_moves_nothing_is_computed() {
         let mut policy = Policy::default();
         // 20 mm/s.
         let at = |time: f64| Some(press(0.02 * time, 5e-3));
-        let time = begins(&mut policy, at).unwrap();
-        assert!((time - LONG).abs() < 2.5 * DT, "{time}");
-        policy.finish(Ok(bar()));
-        let far = |time: f64| at(time + 5.0);
-        let time = begins(&mut policy, far).unwrap();
-        assert!(time > REST && (time - LONG).abs() < 2.5 * DT, "{time}");
+        assert_eq!(begins(&mut policy, at), None);
+        // It stays, and moves on before the bar is known.
+        let stays = press(0.0, 5e-3);
+        begins(&mut policy, |_| Some(stays)).unwrap();
+        for (x, is_stale) in [(0.0, false), (3e-3, false), (4.1e-3, true)] {
+            assert_eq!(policy.is_stale(1, Some(&press(x, 5e-3))), is_stale, "{x}");
+        }
+        assert!(!policy.is_stale(1, None), "a lifted tool may come back");
+        policy.finish(Err(NoBar::Interrupted));
+        // There is a rest before the next.
+        let time = begins(&mut policy, |_| Some(stays)).unwrap();
+        assert!((time - REST).abs() < 2.5 * DT, "{time}");
     }
 
     #[test]
@@ -353,9 +364,9 @@ mod tests {
             ..old
         };
         begins(&mut policy, |_| Some(old)).unwrap();
-        assert!(!policy.is_stale(1) && policy.is_stale(2));
+        assert!(!policy.is_stale(1, None) && policy.is_stale(2, None));
         policy.finish(Err(NoBar::Interrupted));
-        assert!(!policy.is_stale(2));
+        assert!(!policy.is_stale(2, None));
         assert_eq!(policy.of(Some(&old)), ErrorBar::Unknown);
         begins(&mut policy, |_| Some(old)).unwrap();
         policy.finish(Ok(bar()));

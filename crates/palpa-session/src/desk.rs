@@ -20,7 +20,7 @@ use crate::builder::{Builder, Wanted};
 use crate::drill::Drills;
 use crate::game::Game;
 use crate::hand::{goal_of, in_range};
-use crate::publish::{Fields, Screen, Status, Told};
+use crate::publish::{Fields, Screen, Status, Told, granted};
 use crate::remote::{Material, Order};
 use crate::replay::{Tape, new_log};
 use crate::session::SessionParams;
@@ -446,6 +446,7 @@ impl Desk {
         };
         let (mut figures, notices) = live.figures(n_nodes, self.screen.n_frames());
         figures.error_bar = self.bars.present();
+        (figures.granted).push(granted(self.bars.granted()));
         self.status.tell_figures(figures, notices);
     }
 

@@ -16,6 +16,7 @@ use palpa_mesh::Vec3;
 use palpa_mesh::read::ReadNote;
 use palpa_mesh::refine::ImprintError;
 use palpa_scene::Tool;
+use palpa_scene::units::Share;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -183,6 +184,16 @@ pub enum Note {
         edge: f64,
         /// Radius of the tool's rounded edge, m.
         edge_radius: f64,
+    },
+    /// Sizes near the tool are larger than the accuracy of the scene asks for, so that steps keep up with
+    /// a hand.
+    AccuracyTooFine {
+        /// Error of the force that the scene asks for, as a share of it.
+        accuracy: f64,
+        /// By how much smaller than the default ones sizes would be for it, as a share.
+        asked: f64,
+        /// By how much smaller they are.
+        made: f64,
     },
     /// Free cut faces release the tension of a layer.
     TensionLost {
@@ -471,6 +482,17 @@ impl fmt::Display for Note {
                  edge rounder, or refine the mesh with [mesh] near_tool",
                 mm(edge),
                 mm(edge_radius)
+            ),
+            Self::AccuracyTooFine {
+                accuracy,
+                asked,
+                made,
+            } => write!(
+                f,
+                "in real time, edges and levels near the tool are {:.0} % smaller for an accuracy of {} than by                  default, not {:.0} %: finer ones make steps late, which costs more force than they gain. Expect more                  error than asked for; `palpa press` keeps the accuracy, and [mesh] near_tool gives finer edges",
+                100.0 * made,
+                Share::from_si(*accuracy),
+                100.0 * asked,
             ),
             Self::TensionLost { layer } => write!(
                 f,

@@ -1320,6 +1320,9 @@ export interface components {
              * @description 1 to 19 is after other threads, -1 to -20 before them.
              */
             niceness: number;
+        } | {
+            /** @constant */
+            kind: "idle";
         };
         /**
          * @description Why there is no body, or not the wanted one. `Display` has the English words, for the command

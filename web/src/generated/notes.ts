@@ -290,6 +290,24 @@ export interface components {
             /** @constant */
             kind: "coarse_at_edge";
         } | {
+            /**
+             * Format: double
+             * @description Error of the force that the scene asks for, as a share of it.
+             */
+            accuracy: number;
+            /**
+             * Format: double
+             * @description By how much smaller than the default ones sizes would be for it, as a share.
+             */
+            asked: number;
+            /** @constant */
+            kind: "accuracy_too_fine";
+            /**
+             * Format: double
+             * @description By how much smaller they are.
+             */
+            made: number;
+        } | {
             /** @constant */
             kind: "tension_lost";
             /** @description Name of the layer's tissue. */

@@ -343,7 +343,7 @@ export interface components {
         /** @description Mesh size near the tool and lumps. */
         MeshTable: {
             /**
-             * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here. In real time nothing is measured before: all default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3.
+             * @description Error bar that `palpa press` may leave: half its width at the deepest, as a share of the force there, 0.2 % to 50 %. Sizes near the tool are then chosen by measured errors, so `near_tool` cannot be given too. Default: sizes as given here. In real time nothing is measured before: default sizes are those for 3 %, times (accuracy / 3 %) to the power 2/3; near the tool they are only 4 % smaller for 2 %, since steps on finer meshes come late.
              * @example 3 %
              */
             accuracy?: string;

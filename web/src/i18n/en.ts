@@ -93,7 +93,7 @@ export const en = {
   'readout.bar_failed': 'no mesh error at {depth}: {why}',
   'readout.bar_title':
     'The force may differ by ±{half} % from that of an infinitely fine mesh of the same body. It was computed by pressing the live mesh statically at a depth of {depth}, and again with finer parts: prisms near the tool change the force by {near} %, triangles around them by {skin} %, deep intervals by {deep} %; few vertices in contact add {contact} %. The lag of the moving mesh, friction on the way, and errors of stiffness or shape are not included.',
-  'readout.bar_unknown_title': 'The error bar is computed in the background when the tool stays at a place, or presses for two seconds.',
+  'readout.bar_unknown_title': 'The error bar is computed in the background when the tool stays at a place.',
   'readout.bar_too_large': 'the mesh of {n} nodes is too large to be probed beside the loop',
   'readout.bar_not_touching': 'the tool would not touch the skin',
   'readout.bar_no_equilibrium': 'no static equilibrium was found',

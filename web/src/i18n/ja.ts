@@ -95,7 +95,7 @@ export const ja: Dictionary = {
   'readout.bar_failed': '深さ {depth} のメッシュ誤差なし：{why}',
   'readout.bar_title':
     '同じ体を無限に細かいメッシュで計算した力との差は ±{half} % 以内と見積もられます。現在のメッシュを深さ {depth} まで静的に押し、一部を細かくして押し直して求めました。力の変化は、道具の近くのプリズムで {near} %、その周りの三角形で {skin} %、深い区間で {deep} % です。接触する頂点が少ないことによる分は {contact} % です。動くメッシュの遅れ、途中の摩擦、硬さや形の誤差は含みません。',
-  'readout.bar_unknown_title': '道具が同じ場所にとどまるか、2秒間押し続けると、誤差をバックグラウンドで計算します。',
+  'readout.bar_unknown_title': '道具が同じ場所にとどまると、誤差をバックグラウンドで計算します。',
   'readout.bar_too_large': '節点数 {n} のメッシュは大きすぎて、ループと並行して計算できません',
   'readout.bar_not_touching': '道具が皮膚に触れません',
   'readout.bar_no_equilibrium': '静的なつり合いが見つかりませんでした',

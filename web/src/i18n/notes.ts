@@ -9,6 +9,7 @@ import { said, type Of, type Words } from './kinds';
 import type { Dictionary, Language } from '.';
 
 const percent = (share: number) => `${Math.round(100 * share)} %`;
+const exact = (share: number) => `${Number((100 * share).toPrecision(3))} %`;
 const place = (at: readonly number[]) => `(${at.map((x) => (x * 1e3).toFixed(1)).join(', ')}) mm`;
 const mm = inMillimetres;
 
@@ -87,6 +88,7 @@ const en: Words<Note> = {
   single_triangles: ({ n, n_all }) => `${n} of ${n_all} skin triangles have no partner. The prisms under them are too stiff where tissue keeps its volume.`,
   coarse_under_tool: ({ edge, radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of its radius of ${mm(radius)}: the force depends on the mesh. Refine it with [mesh] near_tool.`,
   coarse_at_edge: ({ edge, edge_radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of the radius of its edge, ${mm(edge_radius)}: the force depends on the steps. Make the edge rounder or the mesh finer.`,
+  accuracy_too_fine: ({ accuracy, asked, made }) => `In real time, edges and levels near the tool are ${percent(made)} smaller for an accuracy of ${exact(accuracy)} than by default, not ${percent(asked)}: finer ones make steps late, which costs more force than they gain. Expect more error than asked for.`,
   tension_lost: ({ layer }) => `The cut faces are free and let go of most of the tension of “${layer}”. Set cut_faces = "fixed" or "symmetric" to keep it.`,
   few_under_disc: ({ n_vertices, radius, edge }) => `Only ${n_vertices} skin vertices lie under the tool of radius ${mm(radius)}, with edges of ${mm(edge)} there: the force depends on the mesh.`,
   tension_left_out: () => 'Bars have no tension at rest; “prestress” was left out.',
@@ -149,6 +151,7 @@ const ja: Words<Note> = {
   single_triangles: ({ n, n_all }) => `皮膚の三角形 ${n_all} 個のうち ${n} 個に組になる相手がありません。体積を保つ組織では、その下が硬くなりすぎます。`,
   coarse_under_tool: ({ edge, radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の半径 ${mm(radius)} の 3 分の 1 を超えています。力がメッシュに依存します。[mesh] near_tool で細かくしてください。`,
   coarse_at_edge: ({ edge, edge_radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の縁の半径 ${mm(edge_radius)} の 3 分の 1 を超えています。力がステップに依存します。縁を丸くするか、メッシュを細かくしてください。`,
+  accuracy_too_fine: ({ accuracy, asked, made }) => `リアルタイムでは、精度 ${exact(accuracy)} の指定に対して、圧子付近の辺と段の大きさを既定より ${percent(asked)} ではなく ${percent(made)} だけ小さくしました。それ以上細かくすると計算が手の動きに遅れ、かえって力の誤差が増えるためです。誤差は指定より大きくなります。`,
   tension_lost: ({ layer }) => `切断面が自由なため、「${layer}」の張力の大部分が失われます。保つには cut_faces を "fixed" か "symmetric" にしてください。`,
   few_under_disc: ({ n_vertices, radius, edge }) => `半径 ${mm(radius)} の圧子の下にある皮膚の頂点は ${n_vertices} 個だけです（辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
   tension_left_out: () => '棒には初期張力がないため、prestress は使われません。',

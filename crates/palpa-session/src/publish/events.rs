@@ -76,6 +76,7 @@ pub(crate) fn granted(granted: &Granted) -> GrantedInfo {
             Priority::RealTime(priority) => PriorityInfo::RealTime { priority },
             Priority::Normal => PriorityInfo::Normal,
             Priority::Nice(niceness) => PriorityInfo::Nice { niceness },
+            Priority::Idle => PriorityInfo::Idle,
         },
         priority_refused: granted.priority.clone().err(),
         core: granted.wish.core.map(|core| core as u32),

@@ -15,6 +15,7 @@ mod notes;
 mod screen;
 mod status;
 
+pub(crate) use events::granted;
 pub(crate) use fields::Fields;
 pub(crate) use figures::Figures;
 pub(crate) use notes::shown;

@@ -212,6 +212,8 @@ pub enum PriorityInfo {
         /// 1 to 19 is after other threads, -1 to -20 before them.
         niceness: i8,
     },
+    /// After all others, in idle time.
+    Idle,
 }
 
 /// An entry of the engine's log.

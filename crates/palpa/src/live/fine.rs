@@ -6,10 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use palpa_fem::realtime::FineBodies;
 use palpa_fem::{FemError, Model};
-use palpa_mesh::Vec3;
+use palpa_mesh::{SurfaceIndex, Vec3};
 use palpa_scene::Scene;
 
-use crate::build::nearest;
 use crate::continuum;
 use crate::prepare::{Prepared, element_params};
 use crate::press::mesh::CoarseBody;
@@ -17,14 +16,19 @@ use crate::press::mesh::CoarseBody;
 /// The fine part of the mesh is larger than what the tool presses by this margin, m: the tool may go
 /// about half of it until the mesh ahead of it must be ready. Beside the fine part, where there is no contact,
 /// edges grow as in a mesh that does not move.
-const MARGIN: f64 = 12e-3;
+const MARGIN: f64 = 12.5e-3;
+/// Number of parts of an edge of the grown body, between which there are places: with vertices only, a
+/// tool would be up to half an edge beside the middle of the fine part.
+const PARTS: f64 = 3.0;
 /// Largest number of meshes that are kept for reuse.
 const MOST_KEPT: usize = 24;
 
-/// Meshes of the scene's body, each fine around one vertex of the body as it was grown.
+/// Meshes of the scene's body, each fine around one place of the body as it was grown.
 pub struct FineScene {
     prepared: Arc<Prepared>,
     coarse: CoarseBody,
+    /// Of the coarse body's skin.
+    index: SurfaceIndex,
     radius: f64,
     /// Meshes kept for reuse, with the place around which each is fine; the latest is last. It is
     /// not locked while a mesh is made, so a panic there leaves it whole.
@@ -46,13 +50,15 @@ impl FineScene {
     /// When the scene does not fit the body.
     pub fn new(prepared: Arc<Prepared>) -> anyhow::Result<Self> {
         let scene = &prepared.scene;
+        let coarse = CoarseBody::build(
+            scene,
+            &prepared.grown,
+            prepared.lumps(),
+            prepared.mesh.sizes,
+        )?;
         Ok(Self {
-            coarse: CoarseBody::build(
-                scene,
-                &prepared.grown,
-                prepared.lumps(),
-                prepared.mesh.sizes,
-            )?,
+            index: SurfaceIndex::build(&coarse.body.skin),
+            coarse,
             radius: pressed_radius(scene) + MARGIN,
             kept: Mutex::default(),
             prepared,
@@ -83,6 +89,17 @@ impl FineScene {
     }
 }
 
+/// Barycentric weights near the given ones that are multiples of a part.
+fn in_parts(weights: [f64; 3]) -> [f64; 3] {
+    let exact = weights.map(|w| PARTS * w);
+    let mut parts = exact.map(f64::round);
+    let excess = parts.iter().sum::<f64>() - PARTS;
+    let gives = |k: &usize| excess * (parts[*k] - exact[*k]);
+    let most = (0..3).max_by(|a, b| gives(a).total_cmp(&gives(b)));
+    parts[most.unwrap_or(0)] -= excess;
+    parts.map(|part| part / PARTS)
+}
+
 /// Radius of the skin that the tool presses at the depth of the scene's motion, m.
 pub(super) fn pressed_radius(scene: &Scene) -> f64 {
     let radius = scene.tool.contact_radius();
@@ -94,8 +111,12 @@ pub(super) fn pressed_radius(scene: &Scene) -> f64 {
 
 impl FineBodies for FineScene {
     fn place(&self, point: Vec3) -> Vec3 {
-        let skin = &self.coarse.body.skin;
-        skin.points[nearest(skin, point)]
+        let Some(closest) = self.index.closest(point) else {
+            return point;
+        };
+        let corners = (self.coarse.body.skin).corners(closest.triangle as usize);
+        let weights = in_parts(closest.weights);
+        corners.iter().zip(weights).map(|(at, w)| at * w).sum()
     }
 
     fn radius(&self) -> f64 {
@@ -113,5 +134,28 @@ impl FineBodies for FineScene {
         }
         kept.push_back((place, Arc::clone(&model)));
         Ok(model)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_thirds_of_edges_near_the_point() {
+        for (given, expected) in [
+            ([1.0, 0.0, 0.0], [3, 0, 0]),
+            ([0.34, 0.33, 0.33], [1, 1, 1]),
+            ([0.5, 0.5, 0.0], [1, 2, 0]),
+            ([0.8, 0.1, 0.1], [3, 0, 0]),
+            // Rounded one by one, these have a sum of 2 and of 4 thirds.
+            ([0.48, 0.37, 0.15], [2, 1, 0]),
+            ([0.52, 0.17, 0.31], [1, 1, 1]),
+        ] {
+            let found = in_parts(given);
+            let thirds = found.map(|w| (PARTS * w).round() as i32);
+            assert_eq!(thirds, expected, "{given:?}");
+            assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
     }
 }

@@ -162,8 +162,8 @@ impl LiveScene {
         };
         let model = match &meshes {
             Some(meshes) => {
-                let at = posed.pose * nalgebra::Point3::from(start);
-                meshes.model(meshes.place(at.coords))?
+                let at = posed.pose.translation.vector;
+                meshes.model(meshes.place(at))?
             }
             None => prepared.model()?,
         };
@@ -179,6 +179,7 @@ impl LiveScene {
         let mut notes = prepared.notes.clone();
         note_mesh(&model, mesh, scene, &mut notes);
         note_tension(&mesh.body, scene, &mut notes);
+        note_accuracy(scene, &mut notes);
         check_way(scene, &prepared, &mut notes)?;
         Ok(Self {
             start,
@@ -203,7 +204,8 @@ impl LiveScene {
     /// # Errors
     /// When the body cannot be factored.
     pub fn tissue(&self) -> anyhow::Result<LiveTissue> {
-        self.tissue_at(self.start)
+        // The scene's hand moves about the origin.
+        self.tissue_round(Vec3::zeros(), self.start)
     }
 
     /// The tissue at rest, with the device at `start` (in its own frame, m) instead of the start of
@@ -212,10 +214,15 @@ impl LiveScene {
     /// # Errors
     /// When the body cannot be factored.
     pub fn tissue_at(&self, start: Vec3) -> anyhow::Result<LiveTissue> {
+        self.tissue_round(start, start)
+    }
+
+    /// As [`Self::tissue_at`], with the fine part of a mesh that moves around `middle` first.
+    fn tissue_round(&self, middle: Vec3, start: Vec3) -> anyhow::Result<LiveTissue> {
         let tools = [self.posed(start)];
         let body = match &self.meshes {
             Some(meshes) => {
-                let at = tools[0].pose.translation.vector;
+                let at = self.posed(middle).pose.translation.vector;
                 Roaming::new(Arc::<FineScene>::clone(meshes), &tools, self.params, at)?
             }
             None => Roaming::fixed(Live::new(Arc::clone(&self.model), &tools, self.params)?),
@@ -258,13 +265,8 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
     mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     let accuracy = mesh.accuracy.unwrap_or(ACCURACY);
-    let looser = accuracy / ACCURACY;
-    let scale = looser.powf(1.0 / ORDER);
+    let (scale, near) = (scale_for(accuracy), scale_near_tool(accuracy));
     let is_given = mesh.near_tool.is_some();
-    let gentle = |accuracy: f64| (accuracy / ACCURACY).powf(GENTLE_EXPONENT);
-    let near = gentle(accuracy)
-        .min(gentle(FINE) * (accuracy / FINE).powf(1.0 / ORDER))
-        .max(scale);
     let height = mesh.near_tool_at(&scene.tool, near * LEVEL_SHARE);
     mesh.near_tool = mesh.near_tool_at(&scene.tool, near * EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
@@ -291,6 +293,34 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
         sizes
     });
     (scene, sizes)
+}
+
+/// Sizes for an accuracy, as a share of those for the default one.
+fn scale_for(accuracy: f64) -> f64 {
+    (accuracy / ACCURACY).powf(1.0 / ORDER)
+}
+
+/// The same for edges and heights near the tool.
+fn scale_near_tool(accuracy: f64) -> f64 {
+    let gentle = |accuracy: f64| (accuracy / ACCURACY).powf(GENTLE_EXPONENT);
+    gentle(accuracy)
+        .min(gentle(FINE) * (accuracy / FINE).powf(1.0 / ORDER))
+        .max(scale_for(accuracy))
+}
+
+/// Adds a note where sizes near the tool are larger than an accuracy asks for.
+fn note_accuracy(scene: &Scene, notes: &mut Vec<Note>) {
+    let mesh = &scene.mesh;
+    if let Some(accuracy) = mesh.accuracy.filter(|_| mesh.near_tool.is_none()) {
+        let (asked, made) = (scale_for(accuracy), scale_near_tool(accuracy));
+        if made > asked {
+            notes.push(Note::AccuracyTooFine {
+                accuracy,
+                asked: 1.0 - asked,
+                made: 1.0 - made,
+            });
+        }
+    }
 }
 
 /// Chooses the share of the strain that pairs average, where the scene gives none.

@@ -12,20 +12,16 @@ use super::error_bar::{LiveBar, Moment, NoBar, probe};
 use crate::Prepared;
 
 const NAME: &str = "palpa-probe";
-/// The lowest priority that the system has: every other thread goes first.
+/// Every other thread goes first.
 const AFTER_ALL: Wish = Wish {
-    priority: Priority::Nice(19),
-    core: None,
-};
-const AS_OTHERS: Wish = Wish {
-    priority: Priority::Normal,
+    priority: Priority::Idle,
     core: None,
 };
 
 /// A thread that computes error bars of the live mesh, one at a time.
 ///
 /// Static steps run in rayon's pools. This one has a single thread, so that the probes never use
-/// more than one core, and none that the loop needs. When dropped, it gives up what it does.
+/// more than one core, and only while it has nothing else to do. When dropped, it gives up what it does.
 #[derive(Debug)]
 pub struct Prober {
     pool: rayon::ThreadPool,
@@ -37,31 +33,18 @@ pub struct Prober {
 }
 
 impl Prober {
-    /// Starts a thread of the lowest priority, to use beside the loop.
+    /// Starts the thread.
     ///
     /// # Errors
     /// When the system gives no thread.
     pub fn start() -> anyhow::Result<Self> {
-        Self::with(AFTER_ALL)
-    }
-
-    /// Starts a thread of ordinary priority, to use without the loop. Beside other programs that use all cores,
-    /// one of the lowest priority would take fifty times as long.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
-    pub fn start_as_others() -> anyhow::Result<Self> {
-        Self::with(AS_OTHERS)
-    }
-
-    fn with(wish: Wish) -> anyhow::Result<Self> {
         let (tell, told) = sync_channel(1);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .thread_name(|_| NAME.to_owned())
             .start_handler(move |_| {
                 // Only the thread itself can request this. The receiver waits for it.
-                let _ = tell.send(wish.ask(NAME));
+                let _ = tell.send(AFTER_ALL.ask(NAME));
             })
             .build()
             .context("no thread for error bars")?;
@@ -167,9 +150,10 @@ mod tests {
     }
 
     #[test]
-    fn without_the_loop_it_has_ordinary_priority() {
-        let prober = Prober::start_as_others().unwrap();
-        assert!(prober.granted().to_string().contains("ordinary"));
+    fn it_runs_in_idle_time() {
+        let prober = Prober::start().unwrap();
+        let granted = prober.granted();
+        assert_eq!((granted.wish, &granted.priority), (AFTER_ALL, &Ok(())));
     }
 
     #[test]

@@ -63,11 +63,27 @@ fn the_live_mesh_is_as_fine_as_the_scene_asks() {
             scene.set("mesh", "accuracy", accuracy)
         };
         let live = LiveScene::build(&parse(&scene)).unwrap();
-        (live.mesh_size, live.model.n_nodes())
+        let is_too_fine = |note: &&Note| matches!(note, Note::AccuracyTooFine { .. });
+        let note = live.notes.iter().find(is_too_fine);
+        // Where sizes near the tool are not those that the accuracy asks for, a note says so.
+        assert_eq!(
+            note.is_some(),
+            ["1 %", "2 %"].contains(&accuracy),
+            "{note:?}"
+        );
+        (
+            live.mesh_size,
+            live.model.n_nodes(),
+            note.map(ToString::to_string),
+        )
     };
     let usual = mesh("");
     assert_eq!(usual, mesh("3 %"));
     let (fine, coarse) = (mesh("1 %"), mesh("9 %"));
+    let (_, _, note) = mesh("2 %");
+    let note = note.unwrap();
+    let words = "are 4 % smaller for an accuracy of 2 % than by default, not 24 %";
+    assert!(note.contains(words), "{note}");
     assert!(fine.0 < 0.7 * usual.0, "{fine:?} {usual:?}");
     assert!(fine.1 > 2 * usual.1, "{fine:?} {usual:?}");
     assert!(coarse.0 > 1.4 * usual.0, "{coarse:?} {usual:?}");

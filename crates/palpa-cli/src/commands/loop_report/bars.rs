@@ -1,12 +1,13 @@
-//! Error bars of the force at places along the way of the hand, from probes beside the loop.
+//! Error bars of the force at places along the way of the hand.
 //!
 //! ```text
-//!  looks at the tissue, 20 a second ─► the deepest of each part of the way ─► palpa-probe ─► figures
+//!  during the run: looks at the tissue, 20 a second ─► the deepest of each part of the way
+//!  after it:       each of them probed ─► figures
 //! ```
 //! The way has five parts: along the motion across the skin, or, if it stays at one place, by depth.
 
 use palpa::accuracy::{FEW_VERTICES, Source};
-use palpa::live::{LiveBar, LiveScene, Look, Moment, NoBar, Prober, Seen, across};
+use palpa::live::{LiveBar, LiveScene, Look, Moment, NoBar, Seen, across, probe};
 use palpa_rt::{Engine, Reader};
 use palpa_scene::Scene;
 use palpa_servo::Vec3;
@@ -17,8 +18,6 @@ use crate::table::Table;
 
 /// Number of parts of the way, and so of error bars at most.
 const N_PARTS: usize = 5;
-/// A look replaces the one before in its part if the tool is deeper by this factor.
-const DEEPER: f64 = 1.05;
 /// Time between two looks, s.
 pub(super) const LOOK_PERIOD: f64 = 0.05;
 
@@ -96,125 +95,61 @@ impl Parts {
     }
 }
 
-/// The deepest look in a part of the way.
+/// The deepest look in each part of the way, with what is to be probed there.
 #[derive(Debug)]
-struct Spot<M> {
-    sight: Sight,
-    /// What is to be probed; `None` once it is.
-    moment: Option<M>,
-    found: Option<Result<LiveBar, NoBar>>,
-}
-
-/// The deepest look in each part of the way.
-#[derive(Debug)]
-struct Spots<M> {
-    parts: [Option<Spot<M>>; N_PARTS],
-    /// Part and time of the look that is being probed.
-    probing: Option<(usize, f64)>,
-}
+struct Spots<M>([Option<(Sight, M)>; N_PARTS]);
 
 impl<M> Spots<M> {
     fn new() -> Self {
-        Self {
-            parts: std::array::from_fn(|_| None),
-            probing: None,
-        }
+        Self(std::array::from_fn(|_| None))
     }
 
     /// Keeps a look if it is the deepest in its part.
     fn offer(&mut self, part: usize, sight: Sight, moment: impl FnOnce() -> M) {
-        let spot = &mut self.parts[part];
-        if (spot.as_ref()).is_none_or(|spot| sight.depth > DEEPER * spot.sight.depth) {
-            *spot = Some(Spot {
-                sight,
-                moment: Some(moment()),
-                found: None,
-            });
+        let spot = &mut self.0[part];
+        if (spot.as_ref()).is_none_or(|(deepest, _)| sight.depth > deepest.depth) {
+            *spot = Some((sight, moment()));
         }
     }
 
-    /// Takes the next look to be probed, not of the part `but`: there, a deeper one may come.
-    fn take(&mut self, but: Option<usize>) -> Option<M> {
-        if self.probing.is_some() {
-            return None;
-        }
-        let (part, spot) = (self.parts.iter_mut().enumerate())
-            .filter(|(part, _)| Some(*part) != but)
-            .filter_map(|(part, spot)| Some((part, spot.as_mut()?)))
-            .find(|(_, spot)| spot.moment.is_some())?;
-        self.probing = Some((part, spot.sight.time));
-        spot.moment.take()
-    }
-
-    /// Enters the result of the look that was taken last. If a deeper one came meanwhile, the result
-    /// is dropped.
-    fn enter(&mut self, result: Result<LiveBar, NoBar>) {
-        let Some((part, time)) = self.probing.take() else {
-            return;
-        };
-        let same = |spot: &&mut Spot<M>| spot.sight.time.total_cmp(&time).is_eq();
-        if let Some(spot) = self.parts[part].as_mut().filter(same) {
-            spot.found = Some(result);
-        }
-    }
-
-    /// The results in the order of time. What was not probed counts as interrupted.
-    fn figures(self) -> Vec<BarFigures> {
-        let mut all: Vec<BarFigures> = (self.parts.into_iter().flatten())
-            .map(|spot| {
-                let found = spot.found.unwrap_or(Err(NoBar::Interrupted));
-                BarFigures::new(&spot.sight, found)
-            })
-            .collect();
-        all.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    /// The looks in the order of time.
+    fn in_time(self) -> Vec<(Sight, M)> {
+        let mut all: Vec<_> = self.0.into_iter().flatten().collect();
+        all.sort_by(|(a, _), (b, _)| a.time.total_cmp(&b.time));
         all
     }
 }
 
-/// Chooses places along the way while the engine runs, and has them probed.
+/// Chooses places along the way while the engine runs, and probes them when it has ended: probes beside
+/// the loop would take cores and caches from the very run that is judged.
 #[derive(Debug)]
 pub(super) struct Bars<'a> {
     live: &'a LiveScene,
-    prober: Prober,
-    /// What it probes, or has probed last.
-    under_way: Option<Moment>,
     parts: Parts,
     spots: Spots<Moment>,
 }
 
 impl<'a> Bars<'a> {
-    /// Starts the thread of the probes.
-    ///
-    /// # Errors
-    /// When the system gives no thread.
-    pub(super) fn start(scene: &Scene, live: &'a LiveScene) -> anyhow::Result<Self> {
+    pub(super) fn new(scene: &Scene, live: &'a LiveScene) -> Self {
         let motion = &scene.motion;
         let across = (motion.kind.goes_across() && motion.length > 0.0)
             .then(|| (across(motion, &live.scene_from_device), motion.length));
-        Ok(Self {
+        Self {
             live,
-            prober: Prober::start()?,
-            under_way: None,
             parts: Parts {
                 across,
                 above: motion.above,
                 depth: motion.depth,
             },
             spots: Spots::new(),
-        })
+        }
     }
 
-    /// What the system granted to the thread of the probes.
-    pub(super) fn granted(&self) -> String {
-        self.prober.granted().to_string()
-    }
-
-    /// Looks at the tissue, and starts a probe if none is under way.
-    pub(super) fn advance(&mut self, engine: &mut Engine, looks: &mut Reader<Look>) {
+    /// Looks at the tissue.
+    pub(super) fn look(&mut self, engine: &mut Engine, looks: &mut Reader<Look>) {
         looks.take();
         let now = engine.snapshot();
         let look = looks.current();
-        let mut present = None;
         if let (Some(tool), Some(Seen::Tissue(glance))) = (look.tool, &look.body)
             && now.tick.tick.n_active > 0
             // After a fault the tool sinks in, since the force is held back.
@@ -223,73 +158,33 @@ impl<'a> Bars<'a> {
             let tip = tool.pose.translation.vector;
             let frame = &self.live.scene_from_device;
             let position = frame.inverse_transform_point(&tip.into()).coords;
-            let part = self.parts.part(position);
             let sight = Sight {
                 time: now.tick.tick.now,
                 tip,
                 depth: self.parts.depth(position),
                 felt: now.tick.devices[0].force[2],
             };
-            self.spots.offer(part, sight, || Moment {
+            (self.spots).offer(self.parts.part(position), sight, || Moment {
                 model: std::sync::Arc::clone(glance.model()),
                 tool,
             });
-            present = Some(part);
-        }
-        if let Some(result) = self.prober.take() {
-            self.spots.enter(result);
-        }
-        self.begin(present);
-    }
-
-    fn begin(&mut self, but: Option<usize>) {
-        if !self.prober.is_busy()
-            && let Some(moment) = self.spots.take(but)
-        {
-            self.under_way = Some(moment.clone());
-            self.prober.begin(&self.live.prepared, moment);
         }
     }
 
-    /// Goes on at ordinary priority, which the loop needs no more: other programs may keep all cores busy. What
-    /// is under way begins again.
-    fn hurry(&mut self) {
-        let Ok(prober) = Prober::start_as_others() else {
-            return;
-        };
-        // When dropped, the old one gives up what it does.
-        let was_busy = std::mem::replace(&mut self.prober, prober).is_busy();
-        if let Some(moment) = self.under_way.take().filter(|_| was_busy) {
-            self.prober.begin(&self.live.prepared, moment);
-        }
-    }
-
-    /// Probes the rest, after the engine has ended; an interrupt gives it up.
-    pub(super) fn finish(mut self, context: &Context) -> Vec<BarFigures> {
-        let bar = context.progress(N_PARTS, "error bars");
-        if let Some(result) = self.prober.take() {
-            self.spots.enter(result);
-        }
-        self.hurry();
-        loop {
-            if !context.is_interrupted() {
-                self.begin(None);
-            }
-            if !self.prober.is_busy() {
-                break;
-            }
-            if context.is_interrupted() {
-                self.prober.give_up();
-            }
-            if let Some(result) = self.prober.take() {
-                self.spots.enter(result);
+    /// Probes the places; an interrupt gives up the rest.
+    pub(super) fn probe(self, context: &Context) -> Vec<BarFigures> {
+        let spots = self.spots.in_time();
+        let bar = context.progress(spots.len(), "error bars");
+        let figures = (spots.iter())
+            .map(|(sight, moment)| {
+                let goes_on = || !context.is_interrupted();
+                let found = probe(&self.live.prepared, moment, goes_on);
                 bar.inc(1);
-            } else {
-                std::thread::sleep(std::time::Duration::from_millis(10));
-            }
-        }
+                BarFigures::new(sight, found)
+            })
+            .collect();
         bar.finish_and_clear();
-        self.spots.figures()
+        figures
     }
 }
 
@@ -397,37 +292,21 @@ mod tests {
     }
 
     #[test]
-    fn each_part_keeps_its_deepest_look_and_probes_it_once() {
+    fn each_part_keeps_its_deepest_look() {
         let mut spots = Spots::new();
-        spots.offer(1, sight(1.0, 2e-3), || "a");
-        spots.offer(1, sight(2.0, 3e-3), || "b");
-        spots.offer(1, sight(3.0, 3.01e-3), || "c");
-        spots.offer(3, sight(4.0, 1e-3), || "d");
-        // The tool is still in part 1.
-        assert_eq!(spots.take(Some(1)), Some("d"));
-        assert_eq!(spots.take(None), None, "one at a time");
-        spots.enter(Err(NoBar::NoEquilibrium));
-        assert_eq!(spots.take(None), Some("b"));
-        // While "b" is probed, the tool goes deeper: its result is not that of this part.
-        spots.offer(1, sight(5.0, 4e-3), || "e");
-        spots.enter(Err(NoBar::NotTouching));
-        assert_eq!(spots.take(None), Some("e"));
-        spots.enter(Err(NoBar::Panicked));
-        assert_eq!(spots.take(None), None);
-        let figures = spots.figures();
-        let found: Vec<(f64, &str)> = (figures.iter())
-            .map(|bar| (bar.time_s, bar.problem.as_deref().unwrap()))
-            .collect();
-        let [none, bug] = [NoBar::NoEquilibrium, NoBar::Panicked].map(|why| why.to_string());
-        assert_eq!(found, [(4.0, none.as_str()), (5.0, bug.as_str())]);
+        spots.offer(3, sight(1.0, 2e-3), || "a");
+        spots.offer(3, sight(2.0, 3e-3), || "b");
+        spots.offer(3, sight(3.0, 2.9e-3), || panic!("less deep"));
+        spots.offer(1, sight(4.0, 1e-3), || "c");
+        spots.offer(0, sight(0.5, 1e-3), || "d");
+        let found: Vec<&str> = spots.in_time().into_iter().map(|(_, what)| what).collect();
+        assert_eq!(found, ["d", "b", "c"]);
     }
 
     #[test]
-    fn a_look_that_was_not_probed_says_so() {
-        let mut spots = Spots::new();
-        spots.offer(0, sight(1.0, 2e-3), || ());
-        let figures = spots.figures();
-        assert_eq!(figures[0].problem.as_deref(), Some("interrupted"));
-        assert_eq!(figures[0].error_bar_n, None);
+    fn a_place_without_a_bar_says_why() {
+        let bar = BarFigures::new(&sight(1.0, 2e-3), Err(NoBar::NoEquilibrium));
+        assert_eq!(bar.problem, Some(NoBar::NoEquilibrium.to_string()));
+        assert_eq!(bar.error_bar_n, None);
     }
 }

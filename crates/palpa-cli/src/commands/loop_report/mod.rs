@@ -36,8 +36,7 @@ const MOST_SECONDS: f64 = 3600.0;
 /// A simulated hand holds the haptic device of the scene and moves it as the scene's motion says.
 /// The tissue is computed with finite elements, the force at 1 kHz. Without a SCENE, the hand
 /// strokes a forearm with a lump. Each guarantee is judged; one that the run gave nothing to judge by
-/// is not kept. Meanwhile a thread of the lowest priority computes error bars of
-/// the force at up to five places along the way. Writes the log (log.mcap, for `palpa replay`), the figures
+/// is not kept. Afterwards, error bars of the force are computed at up to five places along the way. Writes the log (log.mcap, for `palpa replay`), the figures
 /// (loop.json), histograms of the times of ticks, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -161,7 +160,7 @@ struct Run {
     threads: Vec<String>,
 }
 
-/// Runs for the requested time or until Ctrl-C. Error bars that are missing then are computed afterwards.
+/// Runs for the requested time or until Ctrl-C, and then computes the error bars.
 fn run_engine(
     args: &Args,
     context: &Context,
@@ -186,11 +185,7 @@ fn run_engine(
     };
     context.begin_recording();
     let bar = context.progress(args.seconds.ceil() as usize, "real time");
-    let mut bars = if args.no_error_bars {
-        None
-    } else {
-        Some(Bars::start(scene, live)?)
-    };
+    let mut bars = (!args.no_error_bars).then(|| Bars::new(scene, live));
     let (watch, mut looks) = Watch::new(LOOK_PERIOD);
     let tissue = match &bars {
         Some(_) => tissue.watched(watch),
@@ -200,20 +195,19 @@ fn run_engine(
     while engine.now() < args.seconds && !context.is_interrupted() {
         std::thread::sleep(Duration::from_millis(20));
         if let Some(bars) = &mut bars {
-            bars.advance(&mut engine, &mut looks);
+            bars.look(&mut engine, &mut looks);
         }
         bar.set_position(engine.now() as u64);
     }
     bar.finish_and_clear();
     let until = engine.now().min(args.seconds);
     let report = engine.stop();
-    let mut threads: Vec<String> = report.granted.iter().map(ToString::to_string).collect();
-    threads.extend(bars.as_ref().map(Bars::granted));
+    let threads = report.granted.iter().map(ToString::to_string).collect();
     Ok(Run {
         report,
         until,
         still,
-        bars: bars.map(|bars| bars.finish(context)),
+        bars: bars.map(|bars| bars.probe(context)),
         audit: None,
         threads,
     })

@@ -23,7 +23,7 @@ const REST_STEPS: usize = 8;
 const REST_CHANGE: f64 = 1e-8;
 /// Distance of the tools from the centre of the fine part at which the mesh moves, and distance by
 /// which the next centre lies ahead of them; both as a share of the radius of the fine part.
-const LEAVE: f64 = 0.25;
+const LEAVE: f64 = 0.5;
 const LEAD: f64 = 0.5;
 /// Speed of the tools below which they head nowhere, m/s.
 const SLOWEST: f64 = 1e-3;
@@ -154,14 +154,12 @@ impl Move {
             // exterior.
             live.jobs.ask_for_factor();
             let report = live.step(&self.tools, 0.0);
-            if let Some(job) = live.take_job() {
-                live.install(job.run());
-            }
             let is_good = report.outcome == StepOutcome::Arrived
                 && report.residual <= params.tolerance
                 && report.iterations == 1;
             // At least one step must have an exterior of this state.
             if round > 0 && is_good {
+                live.take_back_job();
                 return Some(Box::new(Moved {
                     place: self.place,
                     live,
@@ -169,6 +167,9 @@ impl Move {
                     then: self.come,
                     lag: self.lag,
                 }));
+            }
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
             }
         }
         None
