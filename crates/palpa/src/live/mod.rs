@@ -134,6 +134,7 @@ impl LiveScene {
                 "[mesh] moves = true needs refine = true: with refine = false there is no fine mesh to move"
             );
         }
+        let asked = &scene.mesh;
         let (scene, sizes) = coarser(scene);
         let scene = &scene;
         let way = if moves { Vec::new() } else { way(scene) };
@@ -179,7 +180,7 @@ impl LiveScene {
         let mut notes = prepared.notes.clone();
         note_mesh(&model, mesh, scene, &mut notes);
         note_tension(&mesh.body, scene, &mut notes);
-        note_accuracy(scene, &mut notes);
+        note_accuracy(asked, &mut notes);
         check_way(scene, &prepared, &mut notes)?;
         Ok(Self {
             start,
@@ -309,8 +310,7 @@ fn scale_near_tool(accuracy: f64) -> f64 {
 }
 
 /// Adds a note where sizes near the tool are larger than an accuracy asks for.
-fn note_accuracy(scene: &Scene, notes: &mut Vec<Note>) {
-    let mesh = &scene.mesh;
+fn note_accuracy(mesh: &Mesh, notes: &mut Vec<Note>) {
     if let Some(accuracy) = mesh.accuracy.filter(|_| mesh.near_tool.is_none()) {
         let (asked, made) = (scale_for(accuracy), scale_near_tool(accuracy));
         if made > asked {
