@@ -215,8 +215,8 @@ pub(super) fn judge(figures: &Figures) -> Vec<Verdict> {
         let missing = "no pose was solved again";
         judge.if_any(Guarantee::Audit, found, MOST_ERROR, Unit::Share, missing, || {
             format!(
-                "one force in twenty is {:.1} % or more off that of finer meshes; {:.0} % are allowed: make the mesh finer with \
-                 [mesh] near_tool, or move more slowly",
+                "one force in twenty is {:.1} % or more off that of finer meshes; {:.0} % are allowed: move more slowly, \
+                 and leave [mesh] near_tool out, so that the loop chooses all sizes",
                 100.0 * found.unwrap_or_default(),
                 100.0 * MOST_ERROR
             )
