@@ -22,9 +22,10 @@ const MOST_SETTLING: usize = 8;
 const REST_STEPS: usize = 8;
 const REST_CHANGE: f64 = 1e-8;
 /// Distance of the tools from the centre of the fine part at which the mesh moves, and distance by
-/// which the next centre lies ahead of them; both as a share of the radius of the fine part.
+/// which the next centre lies ahead of them, less than the first, so that a mesh that has just come does not
+/// move again; both as a share of the radius of the fine part.
 const LEAVE: f64 = 0.45;
-const LEAD: f64 = 0.5;
+const LEAD: f64 = 0.35;
 /// Speed of the tools below which they head nowhere, m/s.
 const SLOWEST: f64 = 1e-3;
 
