@@ -491,7 +491,7 @@ impl fmt::Display for Note {
                 f,
                 "in real time, edges and levels near the tool are {:.0} % smaller for an accuracy of {} than by \
                  default, not {:.0} %: finer ones make steps late, which costs more force than they gain. Expect more \
-                 error than asked for; `palpa press` keeps the accuracy, and [mesh] near_tool gives finer edges",
+                 error than asked for; `palpa press` keeps the accuracy",
                 100.0 * made,
                 Share::from_si(*accuracy),
                 100.0 * asked,
