@@ -55,6 +55,8 @@ use crate::skin::Skin;
 const ZONE_RADII: f64 = 0.73;
 const PRESSED_RADII: f64 = 1.25;
 const LEAST_ZONE: f64 = 11e-3;
+/// Width of a zone's ring, in edges under the tool.
+const RING: f64 = 2.2;
 /// Change of the indentation after which the exterior is brought up to date, m. After a whole millimetre, the
 /// force on the way down is up to 2 % off on thin fat instead of 0.7 %.
 const STALE: f64 = 0.4e-3;
@@ -251,23 +253,21 @@ impl LiveScene {
 /// level less in soft fat, or one for the muscle, the force is 2 to 3 % more. Prisms that a lump cuts have
 /// its share of the stiffness, so they need not be smaller than the lump. If the scene asks for an accuracy,
 /// all these sizes are smaller or larger. A skin from a file is coarsened where it is finer than that; one
-/// made by formula has the spacing that the scene asks for. If the scene gives the length of the edges, its
-/// mesh is as in a press with the same growth. Returns the sizes near the tool with it: intervals deeper
-/// than one and a half contact radii may be a little higher than in a press.
+/// made by formula has the spacing that the scene asks for. If the scene gives the length of the edges under
+/// the tool, the levels there are as high as that too, and all else stays as by default. Returns the sizes
+/// near the tool with it: intervals deeper than one and a half contact radii may be a little higher than in
+/// a press.
 fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const EDGE_GROWTH: f64 = 1.2;
     const LUMP_SHARE: f64 = 1.5;
     const DEEP: f64 = 1.2;
     let mut scene = scene.clone();
-    if scene.mesh.near_tool.is_none() {
-        choose_alpha(&mut scene);
-    }
+    choose_alpha(&mut scene);
     let mesh = &mut scene.mesh;
     let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
     mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     let accuracy = mesh.accuracy.unwrap_or(ACCURACY);
     let (scale, near) = (scale_for(accuracy), scale_near_tool(accuracy));
-    let is_given = mesh.near_tool.is_some();
     let height = mesh.near_tool_at(&scene.tool, near * LEVEL_SHARE);
     mesh.near_tool = mesh.near_tool_at(&scene.tool, near * EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
@@ -286,8 +286,8 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     mesh.max_vertices = mesh.max_vertices.min(MOST_NODES / n_levels + 1);
     let sizes = Sizes::of(&scene).map(|mut sizes| {
         sizes.levels.h = height.unwrap_or(sizes.levels.h);
-        sizes.divides_in_two = !is_given;
-        sizes.in_squeezed = if is_given { 1 } else { IN_SQUEEZED };
+        sizes.divides_in_two = true;
+        sizes.in_squeezed = IN_SQUEEZED;
         if !is_graded {
             sizes.levels.far = DEEP;
         }
@@ -340,11 +340,14 @@ fn choose_alpha(scene: &mut Scene) {
     scene.model.below = below;
 }
 
-/// Radius of a zone that contains the contact at the hand's depth, m.
+/// Radius of a zone that contains the contact at the hand's depth, m. A flat face presses with its edge at
+/// once, which must then lie within the ring.
 fn zone_radius(scene: &Scene) -> f64 {
-    let radius = scene.tool.contact_radius();
+    let (radius, pressed) = (scene.tool.contact_radius(), fine::pressed_radius(scene));
+    let edge = scene.mesh.near_tool.filter(|_| scene.tool.is_flat());
     (ZONE_RADII * (radius + scene.motion.depth))
-        .max(PRESSED_RADII * fine::pressed_radius(scene))
+        .max(PRESSED_RADII * pressed)
+        .max(edge.map_or(0.0, |edge| pressed + RING * edge))
         .max(LEAST_ZONE)
 }
 

@@ -38,13 +38,21 @@ impl Prober {
     /// # Errors
     /// When the system gives no thread.
     pub fn start() -> anyhow::Result<Self> {
+        Self::start_as(AFTER_ALL)
+    }
+
+    /// As [`Self::start`], with other scheduling: a program that waits for a bar may want it on a busy machine too.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn start_as(wish: Wish) -> anyhow::Result<Self> {
         let (tell, told) = sync_channel(1);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .thread_name(|_| NAME.to_owned())
             .start_handler(move |_| {
                 // Only the thread itself can request this. The receiver waits for it.
-                let _ = tell.send(AFTER_ALL.ask(NAME));
+                let _ = tell.send(wish.ask(NAME));
             })
             .build()
             .context("no thread for error bars")?;
@@ -125,9 +133,18 @@ impl Drop for Prober {
 mod tests {
     use super::*;
 
+    /// One that gets its share of the time however busy the machine is.
+    fn prober() -> Prober {
+        let wish = Wish {
+            priority: Priority::Normal,
+            core: None,
+        };
+        Prober::start_as(wish).unwrap()
+    }
+
     #[test]
     fn one_job_at_a_time_that_can_be_given_up() {
-        let mut prober = Prober::start().unwrap();
+        let mut prober = prober();
         assert!(!prober.is_busy() && prober.take().is_none() && prober.wait().is_none());
         let until_given_up = |goes_on: &dyn Fn() -> bool| {
             while goes_on() {
@@ -158,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_result_and_the_thread_goes_on() {
-        let mut prober = Prober::start().unwrap();
+        let mut prober = prober();
         assert!(prober.begin_job(|_| panic!("on purpose")));
         assert_eq!(prober.wait(), Some(Err(NoBar::Panicked)));
         assert!(prober.begin_job(|_| Err(NoBar::NotTouching)));
@@ -167,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_thread_has_a_name_and_static_steps_stay_on_it() {
-        let mut prober = Prober::start().unwrap();
+        let mut prober = prober();
         assert_eq!(prober.granted().thread, NAME);
         assert!(prober.begin_job(|_| {
             let name = || std::thread::current().name().map(str::to_owned);

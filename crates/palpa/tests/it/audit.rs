@@ -50,6 +50,42 @@ fn a_reference_is_finer_than_the_mesh_of_the_loop_and_near_to_a_still_finer_one(
     assert!((own / fine - 1.0).abs() < 0.2, "{own} {fine}");
 }
 
+/// A scene may ask for edges of its own under the tool. All else stays as the loop chooses it: edges a little
+/// longer or shorter than by default change the force a little, and not for the worse.
+#[test]
+fn edges_that_a_scene_gives_change_the_force_a_little() {
+    let scene = || {
+        SceneText::block([60.0, 60.0, 20.0], 10.0)
+            .layer(Layer::elastic("skin", "100 kPa").thick(1.5))
+            .layer(Layer::elastic("fat", "5 kPa").thick(6.0))
+            .layer(Layer::elastic("muscle", "30 kPa"))
+            .sphere(8.0)
+            .press(3.0)
+            .motion("press", 3.0)
+    };
+    let error = |scene: &SceneText| {
+        let live = live(scene);
+        let tool = stop(&live, 0.0, 3e-3, 0.0).tool;
+        let at = tool.pose.translation.vector;
+        let own = Reference::on(&live.prepared).unwrap().press(&tool).force;
+        let fine = Reference::round(&live.prepared, at, 1.4 * REFERENCE_SHARE).unwrap();
+        let fine = fine.press(&tool).force;
+        let error = own.unwrap().z / fine.unwrap().z - 1.0;
+        println!(
+            "{:.2} mm, {} nodes: {error:+.4}",
+            1e3 * live.mesh_size,
+            live.model.n_nodes()
+        );
+        error
+    };
+    let usual = error(&scene());
+    assert!(usual.abs() < 0.03, "{usual}");
+    for given in [3.5, 2.5] {
+        let given = error(&scene().near_tool(given));
+        assert!(given.abs() < 0.03, "{given}");
+    }
+}
+
 #[test]
 fn without_friction_the_way_does_not_matter_and_with_friction_it_does() {
     for friction in [0.0, 0.3] {

@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
-use palpa::Prepared;
 use palpa::accuracy::Descent;
 use palpa::fem::realtime::FineBodies;
 use palpa::live::{FineScene, LiveScene, Moment, NoBar, Prober, probe};
 use palpa::mesh::Vec3;
 use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
+use palpa_rt::{Priority, Wish};
 use palpa_testkit::{Layer, Scene as SceneText};
 
 /// A soft layer under a stiff one, pressed by a ball.
@@ -42,8 +42,7 @@ fn the_bar_of_the_live_mesh_is_that_of_a_press_there_on_the_same_mesh() {
     let scene = parse(&block().growth(0.5));
     let live = LiveScene::build(&scene).unwrap();
     let bar = probe(&live.prepared, &moment(&live, 3e-3, 0.0), || true).unwrap();
-    // The loop's mesh with the same size near the tool is that of a press.
-    let press = Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap();
+    let press = Indentation::build(Arc::clone(&live.prepared)).unwrap();
     assert_eq!(bar.n_nodes, press.model.n_nodes());
     let probed = Descent::from_rest(&press, || true)
         .unwrap()
@@ -137,7 +136,12 @@ fn the_thread_gives_the_same_bar() {
     let live = LiveScene::build(&parse(&block())).unwrap();
     let moment = moment(&live, 2e-3, 0.0);
     let here = probe(&live.prepared, &moment, || true).unwrap();
-    let mut prober = Prober::start().unwrap();
+    // With its share of the time however busy the machine is.
+    let mut prober = Prober::start_as(Wish {
+        priority: Priority::Normal,
+        core: None,
+    })
+    .unwrap();
     assert!(prober.begin(&live.prepared, moment.clone()));
     assert!(!prober.begin(&live.prepared, moment));
     assert_eq!(prober.wait(), Some(Ok(here)));

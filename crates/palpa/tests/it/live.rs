@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use palpa::Note;
 use palpa::live::{LiveScene, SpringScene};
 use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
-use palpa::{Note, Prepared};
 use palpa_rt::{Tissue, TissueInput, empty_patch};
 use palpa_servo::{MAX_TOOLS, Pose};
 use palpa_testkit::{Layer, Scene as SceneText, Value};
@@ -106,12 +106,13 @@ fn tense() -> SceneText {
 #[test]
 fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
     let scene = parse(&tense());
-    let indentation = Indentation::build(Arc::new(Prepared::build(&scene).unwrap())).unwrap();
+    let live = LiveScene::build(&scene).unwrap();
+    // On one mesh.
+    let indentation = Indentation::build(Arc::clone(&live.prepared)).unwrap();
     let mut run = indentation.start(0);
     let last = std::iter::from_fn(|| run.advance()).last().unwrap();
     let expected = last.force_n;
 
-    let live = LiveScene::build(&scene).unwrap();
     let mut tissue = live.tissue().unwrap();
     let mut patch = empty_patch();
     let mut step = |number: u64, depth: f64| {
