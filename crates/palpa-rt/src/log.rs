@@ -13,7 +13,7 @@ use crate::{
     smoothness::{ForceReport, ForceStats},
 };
 use mcap::{
-    McapError, parse_record,
+    MAGIC, McapError, parse_record,
     records::Record as Mcap,
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
@@ -22,7 +22,7 @@ use std::{
     collections::BTreeMap,
     fmt,
     fs::File,
-    io::Read,
+    io::{Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -284,7 +284,13 @@ impl Rows {
                     self.ending = Ending::Whole;
                     return Ok(None);
                 }
-                Some(Err(McapError::UnexpectedEof)) => return self.end_early(),
+                Some(Err(error @ McapError::UnexpectedEof)) => {
+                    // A log that was closed is not cut off: a length in it is wrong.
+                    if self.is_closed() {
+                        self.ending = Ending::Damaged(error.to_string());
+                    }
+                    return self.end_early();
+                }
                 Some(Err(error)) => {
                     if self.start.topics.is_empty() {
                         return Err(self.broken(error.to_string()));
@@ -303,8 +309,16 @@ impl Rows {
                     continue;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    let record = parse_record(opcode, data).map_err(|e| e.to_string());
-                    self.start.row(record)
+                    match parse_record(opcode, data) {
+                        Ok(record) => self.start.row(record),
+                        Err(error) if self.start.topics.is_empty() => {
+                            Err(Refusal::Broken(error.to_string()))
+                        }
+                        Err(error) => {
+                            self.ending = Ending::Damaged(error.to_string());
+                            return Ok(None);
+                        }
+                    }
                 }
             };
             match row {
@@ -313,6 +327,18 @@ impl Rows {
                 Err(refusal) => return Err(self.refused(refusal)),
             }
         }
+    }
+
+    /// Whether the file ends as one that was closed.
+    fn is_closed(&self) -> bool {
+        let mut last = [0; MAGIC.len()];
+        let mut file = &self.file;
+        let read = file.metadata().and_then(|about| {
+            let from = about.len().saturating_sub(MAGIC.len() as u64);
+            file.seek(SeekFrom::Start(from))?;
+            file.read_exact(&mut last)
+        });
+        read.is_ok_and(|()| last == *MAGIC)
     }
 
     fn end_early(&self) -> Result<Option<Row>, LogError> {
@@ -345,8 +371,8 @@ impl Iterator for Rows {
 }
 
 impl Start {
-    fn row(&mut self, record: Result<Mcap<'_>, String>) -> Result<Option<Row>, Refusal> {
-        match record.map_err(Refusal::Broken)? {
+    fn row(&mut self, record: Mcap<'_>) -> Result<Option<Row>, Refusal> {
+        match record {
             Mcap::Schema { header, data } => {
                 self.schemas
                     .insert(header.id, (header.name, data.into_owned()));

@@ -6,7 +6,7 @@
 //! `palpa-fem/src/shape`, whose head lists the other places. [`ContactShape`] is also the shape
 //! that the page gets, as JSON.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, FRAC_PI_3};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, FRAC_PI_3, SQRT_2};
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -261,6 +261,18 @@ impl ContactShape {
             } => (FRAC_2_PI * radius * (0.5 * opening_angle).tan())
                 .max(hertz(tip_radius))
                 .min(radius),
+        }
+    }
+
+    /// Radius of the contact of the tool pressed to this depth, m, and no more than [`Self::contact_radius`], which
+    /// is that of a round tool half its radius deep.
+    pub fn contact_radius_at(&self, depth: f64) -> f64 {
+        let radius = self.contact_radius();
+        match self {
+            Self::Sphere { .. } | Self::Capsule { .. } | Self::Fingertip { .. } => {
+                radius.min((SQRT_2 * radius * depth).sqrt())
+            }
+            Self::FlatPunch { .. } | Self::Box { .. } | Self::Cone { .. } => radius,
         }
     }
 

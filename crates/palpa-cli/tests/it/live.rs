@@ -152,6 +152,12 @@ fn scenes_that_cannot_be_felt_in_time_are_refused_or_reported() {
         code == 2 && stderr.contains("nodes, more than the 80000"),
         "{code} {stderr}"
     );
+    // The loop has a continuum only.
+    let (code, _, stderr) = run(gel().set("model", "kind", "reference"));
+    assert!(
+        code == 2 && stderr.contains("[model] kind is \"reference\""),
+        "{code} {stderr}"
+    );
     // So slow that it never touches.
     let (code, stdout, _) = run(gel().set("motion", "speed", "0.2 mm/s"));
     assert_eq!(code, 1, "{stdout}");
@@ -167,6 +173,9 @@ fn a_scene_is_printed_to_be_changed() {
         scene.contains("[motion]") && scene.contains("[device]"),
         "{scene}"
     );
+    let printed = bench.report(&["loop-report", "--print-scene", "--json"]);
+    let text = printed["scene"].as_str().unwrap();
+    assert_eq!(text.trim_end(), scene.trim_end());
     bench.file("printed.toml", scene);
     assert_eq!(bench.run(&["check", "printed.toml"]).0, 0);
 }

@@ -26,7 +26,7 @@ fn shipped(name: &str) -> ShippedCase {
 #[test]
 fn strokes_over_thin_fat_keep_their_force() {
     let case = shipped("shipped-forearm");
-    let spots = draw_spots(&case, N_PLACES).unwrap();
+    let spots = draw_spots(&case, N_PLACES, || true).unwrap();
     assert_eq!(spots.len(), N_PLACES);
     let (mut n_steps, mut n_failed, mut n_ticks, mut n_let_go) = (0, 0, 0, 0);
     for (spot, live) in &spots {
@@ -51,7 +51,10 @@ const MOST_CHANGE: f64 = 0.05;
 /// steps take no time.
 fn largest_jolt(name: &str, place: usize) -> f64 {
     let case = shipped(name);
-    let (spot, live) = draw_spots(&case, place + 1).unwrap().pop().unwrap();
+    let (spot, live) = draw_spots(&case, place + 1, || true)
+        .unwrap()
+        .pop()
+        .unwrap();
     let driven = drive(&spot.scene(&case.scene), &live, StepTime::Zero).unwrap();
     let across = driven.felt.iter().filter(|felt| felt.part == Part::Stroke);
     let pressed = across.filter(|felt| felt.depth > 2e-3);

@@ -113,6 +113,32 @@ fn a_damaged_log_says_so_and_reads_up_to_there() {
     assert_eq!(tables.ending, part.ending);
 }
 
+/// A wrong length, or a record that is none, in a log that was closed.
+#[test]
+fn a_log_with_one_wrong_byte_is_damaged_and_not_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |engine, _| {
+        until_grown(engine, &path, 6);
+    });
+    let bytes = fs::read(&path).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let start = summary.chunk_indexes[2].chunk_start_offset as usize;
+    let end = start + summary.chunk_indexes[2].chunk_length as usize;
+    // Records begin with a byte for their kind and eight for their length. After a chunk comes its index.
+    for (at, change) in [(start + 1 + 3, 1), (end + 1, 3)] {
+        let mut changed = bytes.clone();
+        changed[at] ^= change;
+        fs::write(&path, &changed).unwrap();
+        let part = Log::open(&path).unwrap();
+        let ending = &part.ending;
+        assert!(matches!(ending, Ending::Damaged(_)), "{at}: {ending:?}");
+        let n = part.ticks.len();
+        assert!(n > 0 && n < log.ticks.len(), "{n}");
+        assert_eq!(part.ticks[..], log.ticks[..n]);
+    }
+}
+
 #[test]
 fn what_was_flushed_is_there_while_the_engine_runs() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@ use crate::{ContactPatch, Faults, Limits, MAX_CONTACTS, MAX_TOOLS, TickReport, V
 
 /// Largest plausible values of a patch, m, m/N and N; a patch with larger values is not usable.
 const MAX_LENGTH: f64 = 1e3;
-const MAX_COMPLIANCE: f64 = 1e2;
+const MAX_COMPLIANCE: f64 = 1e5;
 const MAX_LOAD: f64 = 1e4;
 
 /// The patch that forces come from.

@@ -62,6 +62,9 @@ const WAY_STEP: f64 = 4e-3;
 /// begins higher than any press is deep; in the air a step costs nothing.
 const HEIGHTS: [f64; 7] = [50e-3, 7.5e-3, 6e-3, 4.5e-3, 3e-3, 1.5e-3, 0.0];
 
+/// Longest edges of a reference under the tool, as a share of those of the loop.
+const FINER_THAN_LOOP: f64 = 0.6;
+
 /// Meshes of a body round some places, and what is needed to press them.
 #[derive(Debug)]
 pub struct Reference {
@@ -172,9 +175,14 @@ impl Reference {
         // Contact is small where the tool is not deep.
         let circle = |depth: f64| scene.tool.contact().map_or(0.0, |t| t.shape.reach(depth).1);
         let (here, full) = (circle(scene.press.depth), circle(FULL_DEPTH));
+        let most = FINER_THAN_LOOP * of.mesh.mesh_size * share / REFERENCE_SHARE;
         let share = share * if here < full { here / full } else { 1.0 };
-        let sized =
-            |share: f64, growth: f64| Sizes::even(&scene, scene.tool.edge_length(share), growth);
+        // Under a very large tool, a share of its contact may be more than the loop's edges are long.
+        let usual = scene.tool.edge_length(share);
+        let fit = (most / usual).min(1.0);
+        let sized = |share: f64, growth: f64| {
+            Sizes::even(&scene, fit * scene.tool.edge_length(share), growth)
+        };
         let sizes = Sizes {
             levels: sized(HEIGHT * share, LEVEL_GROWTH).levels,
             in_squeezed: 2,
@@ -393,7 +401,7 @@ pub struct Quality {
 
 impl Quality {
     /// Presses one pose on a reference and on a still finer mesh; `None` if either has no
-    /// equilibrium or too many nodes, or `goes_on`, which is asked before each press, returns false.
+    /// equilibrium or too many nodes, if the second is not finer, or `goes_on`, which is asked before each press, returns false.
     pub fn find(
         of: &Prepared,
         tool: &PosedTool,
@@ -405,8 +413,8 @@ impl Quality {
             let force = goes_on().then(|| mesh.press(tool).force)??;
             Some((mesh.n_nodes(), force))
         };
-        let ((_, usual), (finer_nodes, finer)) = (press(1.0)?, press(FINER)?);
-        Some(Self {
+        let ((nodes, usual), (finer_nodes, finer)) = (press(1.0)?, press(FINER)?);
+        (finer_nodes > nodes).then(|| Self {
             finer_nodes,
             change: (finer - usual).norm() / finer.norm(),
         })

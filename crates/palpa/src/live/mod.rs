@@ -55,6 +55,8 @@ use crate::skin::Skin;
 const ZONE_RADII: f64 = 0.73;
 const PRESSED_RADII: f64 = 1.25;
 const LEAST_ZONE: f64 = 11e-3;
+/// Least radius of a contact that chooses the edges of a larger tool, m: that of a ball of 10 mm.
+const LEAST_CONTACT: f64 = 7.1e-3;
 /// Width of a zone's ring, in edges under the tool.
 const RING: f64 = 2.2;
 /// Change of the indentation after which the exterior is brought up to date, m. After a whole millimetre, the
@@ -263,13 +265,15 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     const DEEP: f64 = 1.2;
     let mut scene = scene.clone();
     choose_alpha(&mut scene);
+    let contact = contact_radius(&scene);
     let mesh = &mut scene.mesh;
     let is_from_file = matches!(scene.body.skin, GivenSkin::File(_));
     mesh.coarsen.get_or_insert(is_from_file && mesh.refine);
     let accuracy = mesh.accuracy.unwrap_or(ACCURACY);
     let (scale, near) = (scale_for(accuracy), scale_near_tool(accuracy));
-    let height = mesh.near_tool_at(&scene.tool, near * LEVEL_SHARE);
-    mesh.near_tool = mesh.near_tool_at(&scene.tool, near * EDGE_SHARE);
+    let shallow = contact / scene.tool.contact_radius();
+    let height = mesh.near_tool_at(&scene.tool, shallow * near * LEVEL_SHARE);
+    mesh.near_tool = mesh.near_tool_at(&scene.tool, shallow * near * EDGE_SHARE);
     let is_graded = mesh.growth.is_some() || mesh.level_growth.is_some();
     if mesh.growth.is_none() {
         mesh.growth = Some(EDGE_GROWTH);
@@ -286,6 +290,7 @@ fn coarser(scene: &Scene) -> (Scene, Option<Sizes>) {
     mesh.max_vertices = mesh.max_vertices.min(MOST_NODES / n_levels + 1);
     let sizes = Sizes::of(&scene).map(|mut sizes| {
         sizes.levels.h = height.unwrap_or(sizes.levels.h);
+        sizes.levels.border *= shallow;
         sizes.divides_in_two = true;
         sizes.in_squeezed = IN_SQUEEZED;
         if !is_graded {
@@ -340,10 +345,20 @@ fn choose_alpha(scene: &mut Scene) {
     scene.model.below = below;
 }
 
+/// Radius of the contact at the hand's depth, m, but no less than one that hands can be followed with: edges are a
+/// share of it.
+fn contact_radius(scene: &Scene) -> f64 {
+    let radius = scene.tool.contact_radius();
+    scene.tool.contact().map_or(radius, |tool| {
+        let here = tool.shape.contact_radius_at(scene.motion.depth);
+        here.max(LEAST_CONTACT).min(radius)
+    })
+}
+
 /// Radius of a zone that contains the contact at the hand's depth, m. A flat face presses with its edge at
 /// once, which must then lie within the ring.
 fn zone_radius(scene: &Scene) -> f64 {
-    let (radius, pressed) = (scene.tool.contact_radius(), fine::pressed_radius(scene));
+    let (radius, pressed) = (contact_radius(scene), fine::pressed_radius(scene));
     let edge = scene.mesh.near_tool.filter(|_| scene.tool.is_flat());
     (ZONE_RADII * (radius + scene.motion.depth))
         .max(PRESSED_RADII * pressed)

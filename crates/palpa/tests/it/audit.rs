@@ -86,6 +86,27 @@ fn edges_that_a_scene_gives_change_the_force_a_little() {
     }
 }
 
+/// A ball of 30 mm that is pressed 2.5 mm deep has a contact as small as one of 10 mm, and needs its edges.
+#[test]
+fn a_large_ball_has_a_mesh_for_the_depth_of_the_hand() {
+    let scene = SceneText::block([80.0, 80.0, 30.0], 10.0)
+        .layer(Layer::elastic("gel", "10 kPa"))
+        .sphere(30.0)
+        .press(2.5)
+        .motion("press", 2.5);
+    let live = live(&scene);
+    let tool = stop(&live, 0.0, 2.5e-3, 0.0).tool;
+    let at = tool.pose.translation.vector;
+    let own = Reference::on(&live.prepared).unwrap().press(&tool).on_loop;
+    let fine = Reference::round(&live.prepared, at, REFERENCE_SHARE).unwrap();
+    assert!(fine.mesh_size() < 0.75 * live.mesh_size);
+    assert!(fine.n_nodes() > 2 * live.model.n_nodes());
+    let fine = fine.press(&tool).force.unwrap().z;
+    let error = own.unwrap().z / fine - 1.0;
+    println!("{} nodes: {error:+.4}", live.model.n_nodes());
+    assert!(error.abs() < 0.03, "{error}");
+}
+
 #[test]
 fn without_friction_the_way_does_not_matter_and_with_friction_it_does() {
     for friction in [0.0, 0.3] {

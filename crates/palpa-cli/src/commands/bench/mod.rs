@@ -46,8 +46,8 @@ const METHOD: &str = "shipped scenes: the scene with its default mesh, as the lo
     reason = "each is an option of the command line"
 )]
 pub struct Args {
-    /// Run only this case; may be repeated [default: those that are not variants of a shipped scene,
-    /// but for the block's]
+    /// Run only this case; may be repeated [default: all but the variants of the shipped forearm, lump
+    /// and calf]
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
     /// Use small uniform bodies only; takes seconds
@@ -114,8 +114,10 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         n_places: args.places.into(),
         n_poses: args.poses.into(),
     };
-    report.is_complete = shipped::measure_all(&chosen.shipped, &params, context, &mut report)?
-        && uniform::measure(&chosen.uniform, context, &mut report)?;
+    report.is_complete =
+        shipped::measure_all(&chosen.shipped, &params, context, &mut report, |report| {
+            keep(report, context.out_dir()?)
+        })? && uniform::measure(&chosen.uniform, context, &mut report)?;
     finish(&mut report, context)?;
     Ok(if report.is_complete {
         Outcome::Done
@@ -137,14 +139,19 @@ fn finish(report: &mut BenchReport, context: &Context) -> anyhow::Result<()> {
         uniform::say(context, report)?;
     }
     let out = context.out_dir()?;
-    out.write_json("bench.json", &report)?;
-    write_rows(&report.shipped, "bench_shipped.csv", out)?;
-    write_rows(&report.poses, "bench_poses.csv", out)?;
-    write_rows(&report.rows, "bench.csv", out)?;
+    keep(report, out)?;
     if !report.rows.is_empty() {
         picture::draw(report, is_of_growth).save(out, "bench")?;
     }
     context.json(&report)
+}
+
+/// Writes what was measured.
+fn keep(report: &BenchReport, out: &OutDir) -> anyhow::Result<()> {
+    out.write_json("bench.json", report)?;
+    write_rows(&report.shipped, "bench_shipped.csv", out)?;
+    write_rows(&report.poses, "bench_poses.csv", out)?;
+    write_rows(&report.rows, "bench.csv", out)
 }
 
 /// Writes rows as a table, if there are any.

@@ -6,12 +6,13 @@ use palpa_lab::bench::shipped::{MeasureParams, ShippedCase, ShippedRow, measure}
 use crate::cli::Context;
 use crate::table::Table;
 
-/// Measures the cases. Returns false if interrupted.
+/// Measures the cases, and keeps the report after each. Returns false if interrupted.
 pub(super) fn measure_all(
     cases: &[ShippedCase],
     params: &MeasureParams,
     context: &Context,
     report: &mut BenchReport,
+    keep: impl Fn(&BenchReport) -> anyhow::Result<()>,
 ) -> anyhow::Result<bool> {
     let progress = context.progress(cases.len(), "measuring");
     for case in cases {
@@ -24,6 +25,7 @@ pub(super) fn measure_all(
             Ok(found) => {
                 report.shipped.push(found.row);
                 report.poses.extend(found.poses);
+                keep(report)?;
             }
             Err(_) if context.is_interrupted() => break,
             Err(error) => return Err(error.context(format!("case \"{}\"", case.name))),

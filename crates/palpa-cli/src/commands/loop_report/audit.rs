@@ -38,7 +38,7 @@ pub(super) struct Audit {
     /// `None` if the mesh moves, or the way matters.
     mesh_error_p95: Option<f64>,
     /// Number of poses without a static equilibrium.
-    n_failed: usize,
+    pub(super) n_failed: usize,
     /// Whether the way to each pose was gone again; if not, each was pressed straight from above.
     goes_the_way: bool,
     /// What the audit does not cover.
@@ -380,8 +380,8 @@ impl Audit {
         if self.n < asked {
             let missing = asked - self.n;
             self.not_audited.push(format!(
-                "{missing} of the {asked} poses that were asked for: {} have no static equilibrium, the others were not there \
-                 or not reached",
+                "{missing} of the {asked} poses that were asked for: {} have no static equilibrium; for the others the run had \
+                 too few moments with enough force, or the audit was interrupted",
                 self.n_failed
             ));
         }

@@ -130,7 +130,7 @@ pub(super) struct TissueFigures {
     unfinished: u64,
     /// Share of the steps with contact that did not reach their tolerance.
     pub(super) unfinished_share: f64,
-    /// Number of steps with contact in which something moved.
+    /// Number of steps with contact in which something moved, or that did not reach the tool.
     pub(super) touching: u64,
     /// Number of steps that did not reach the tool.
     pub(super) behind: u64,
@@ -161,7 +161,10 @@ impl TissueFigures {
             let steps = log.steps.iter();
             steps.filter(move |s| s.status == wanted as u8)
         };
-        let touching = log.steps.iter().filter(|s| has_worked(s)).count();
+        // A step that did not reach the tool may have found nothing to do.
+        let is_behind = |s: &StepRecord| s.status == StepStatus::Behind as u8;
+        let touching = (log.steps.iter()).filter(|s| has_worked(s) || is_behind(s));
+        let touching = touching.count();
         let share = |n: usize| n as f64 / touching.max(1) as f64;
         let behind = status(StepStatus::Behind).count();
         let unfinished = status(StepStatus::Unfinished);

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Run;
 use super::figures::ticks_until;
+use super::verdicts::MOST_ARRIVAL;
 
 /// Limits by which a device cuts the force.
 const CUTS: [Limits; 3] = [Limits::FORCE, Limits::SLEW, Limits::TRANSFER];
@@ -154,9 +155,10 @@ impl ForceFigures {
     }
 
     /// Largest change of force that a tick in which a patch arrives may have, N: other ticks may change it nearly as
-    /// fast, but a loop that trembles must not allow itself more.
+    /// fast, but a loop that trembles must not allow itself more. Never less than a patch alone may change it by.
     pub(super) fn most_arrival_n(&self) -> f64 {
-        (2.0 * self.other_p999_n).min(0.1 * self.max_force_n)
+        let least = (2.0 * self.other_p999_n).min(0.1 * self.max_force_n);
+        least.max(MOST_ARRIVAL)
     }
 
     /// The figures that no guarantee judges.

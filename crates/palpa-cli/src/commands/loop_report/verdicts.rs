@@ -12,7 +12,7 @@ use crate::table::Table;
 /// Largest thread-CPU time of a tick at its p99.9, µs.
 const MOST_TICK: f64 = 200.0;
 /// Largest change of force that a patch itself may bring, N: less than a hand feels as a knock.
-const MOST_ARRIVAL: f64 = 0.02;
+pub(super) const MOST_ARRIVAL: f64 = 0.02;
 /// Largest RMS of the force while the target of the hand is still, N, between 20 and 400 Hz and
 /// between 2 and 20 Hz.
 const MOST_RMS: f64 = 0.02;
@@ -211,12 +211,17 @@ pub(super) fn judge(figures: &Figures) -> Vec<Verdict> {
     judge_loop(figures, &mut judge);
     judge_tissue(&figures.tissue, figures.nodes, &mut judge);
     if let Some(audit) = &figures.audit {
-        let found = audit.error_p95;
-        let missing = "no pose was solved again";
+        let found = audit.error_p95.filter(|_| audit.n >= audit.n_failed);
+        let missing = if audit.n == 0 {
+            "no pose was solved again"
+        } else {
+            "most of the poses have no static equilibrium"
+        };
         judge.if_any(Guarantee::Audit, found, MOST_ERROR, Unit::Share, missing, || {
             format!(
-                "one force in twenty is {:.1} % or more off that of finer meshes; {:.0} % are allowed: move more slowly, \
-                 and leave [mesh] near_tool out, so that the loop chooses all sizes",
+                "one force in twenty is {:.1} % or more off that of finer meshes; {:.0} % are allowed: move more slowly; if \
+                 it is the mesh, give no near_tool or accuracy in [mesh], so that the loop chooses all sizes, or, if it did, a \
+                 smaller near_tool",
                 100.0 * found.unwrap_or_default(),
                 100.0 * MOST_ERROR
             )
@@ -330,7 +335,15 @@ fn judge_tissue(t: &TissueFigures, nodes: usize, judge: &mut Judge) {
 fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
     const NO_TOUCH: &str = "nothing was felt: the tool did not touch the skin during the run; check [motion] in the scene, \
                             or run longer with --seconds";
-    const NO_PAUSE: &str = "the target of the hand never stood still for a second, without a fault, while the tool pressed";
+    const NO_PATCH: &str = "no patch of the tissue came while the tool pressed at full force: its steps took too long or \
+                            failed; press less deep, or make the mesh coarser";
+    const NO_PAUSE: &str = "the target of the hand never stood still for a second, without a fault, while the tool pressed; \
+                            run longer with --seconds: the hand rests in the last seconds of a run that has the time";
+    let nothing = if d.max_force_n > 0.0 {
+        NO_PATCH
+    } else {
+        NO_TOUCH
+    };
     let arrival = |force: f64| (d.arrivals > 0).then_some(force);
     // The change caused by the device itself is excluded: steps of 45 µm from tick to tick change
     // the force by 0.02 N everywhere.
@@ -339,7 +352,7 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         arrival(d.arrival_alone_max_n),
         MOST_ARRIVAL,
         Unit::Newtons,
-        NO_TOUCH,
+        nothing,
         || {
             format!(
                 "when a patch arrives, the force changes by {:.4} N beyond the change that the device's displacement \
@@ -353,11 +366,11 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         arrival(d.arrival_max_n),
         d.most_arrival_n(),
         Unit::Newtons,
-        NO_TOUCH,
+        nothing,
         || {
             format!(
-                "force changes by {:.4} N where a patch arrives, more than {:.4}: twice the p99.9 of other ticks, {:.4}, or a \
-                 tenth of the largest force",
+                "force changes by {:.4} N where a patch arrives, more than {:.4}: the smaller of twice the p99.9 of other \
+                 ticks ({:.4}) and a tenth of the largest force, but at least {MOST_ARRIVAL}",
                 d.arrival_max_n,
                 d.most_arrival_n(),
                 d.other_p999_n
@@ -370,7 +383,7 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         arrival(d.transfer_p99_n),
         most,
         Unit::Newtons,
-        NO_TOUCH,
+        nothing,
         || {
             format!(
                 "one patch in a hundred corrects the force by {:.4} N or more at the same pose, more than {most:.4}: the \
@@ -396,7 +409,7 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         d.dip_max,
         MOST_DIP,
         Unit::Share,
-        "the force was never large enough",
+        "the force was never 0.2 N or more: press deeper",
         || dip_words(d),
     );
 }

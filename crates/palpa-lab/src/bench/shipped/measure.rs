@@ -67,13 +67,16 @@ pub fn measure(
     let (mut times, mut ways, mut n_nodes) = (Vec::new(), Vec::new(), 0);
     let (mut duration, mut background) = (0.0, 0.0);
     let mut moving: Vec<Moving> = Vec::new();
-    let spots = draw_spots(case, params.n_places)?;
+    let spots = draw_spots(case, params.n_places, &goes_on)?;
     for (spot, live) in &spots {
         if !goes_on() {
             break;
         }
         let scene = spot.scene(&case.scene);
         let driven = drive(&scene, live, StepTime::Own)?;
+        if !goes_on() {
+            break;
+        }
         let ideal = drive(&scene, live, StepTime::Zero)?;
         note(&mut row, spot, &driven);
         let ticks = drawn(&ideal.felt, TICKS, ways.len());

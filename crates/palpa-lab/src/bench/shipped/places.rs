@@ -39,17 +39,21 @@ impl Spot {
 }
 
 /// Draws `n` places at which the scene can be felt, and sets up each. Fewer if there is not enough
-/// room.
+/// room, or `goes_on`, which is asked before each, returns false.
 ///
 /// # Errors
 /// If the body cannot be grown.
-pub fn draw_spots(case: &ShippedCase, n: usize) -> anyhow::Result<Vec<(Spot, LiveScene)>> {
+pub fn draw_spots(
+    case: &ShippedCase,
+    n: usize,
+    goes_on: impl Fn() -> bool,
+) -> anyhow::Result<Vec<(Spot, LiveScene)>> {
     let built = palpa::build::build(&case.scene)?;
     let mut rng = Rng::with_seed(SEED);
     let skin = Drawing::new(case, &built);
     let mut found = Vec::new();
     for _ in 0..MOST_TRIES * n {
-        if found.len() == n {
+        if found.len() == n || !goes_on() {
             break;
         }
         let Some(spot) = skin.draw(&mut rng) else {

@@ -6,6 +6,7 @@ use palpa_servo::{DeviceSpec, Faults, Limits};
 
 use super::*;
 use crate::commands::loop_report::Run;
+use crate::commands::loop_report::audit::Audit;
 use crate::commands::loop_report::figures::Setup;
 
 /// Length of the synthetic run, s; the target of the hand is still from the second value on.
@@ -233,6 +234,13 @@ fn steps_that_do_not_converge_or_reach_the_tool_are_not_good() {
     assert_eq!(with(StepStatus::Unfinished, 50), [Guarantee::Unfinished]);
     assert_eq!(with(StepStatus::Unfinished, 200), []);
     assert_eq!(with(StepStatus::Behind, 50), [Guarantee::Behind]);
+    // Steps that found nothing before they were behind are of those with contact.
+    let (run, mut log) = quiet();
+    for step in &mut log.steps {
+        (step.status, step.n_contacts) = (StepStatus::Behind as u8, 0);
+    }
+    let share = figures(&run, &log).tissue.behind_share;
+    assert!((share - 1.0).abs() < 1e-12, "{share}");
     let failed = broken(|run, _| run.report.held_back = 100);
     assert_eq!(failed, [Guarantee::FailedSteps]);
     // A long hold, whose steps have nothing to do, hides none of them.
@@ -295,6 +303,35 @@ fn patches_that_change_the_force_are_not_good() {
         jump.starts_with(&[Guarantee::PatchJump, Guarantee::UnusualArrival]),
         "{jump:?}"
     );
+}
+
+#[test]
+fn an_audit_that_found_few_static_forces_is_not_good() {
+    let with = |n: usize, n_failed: usize, error: f64| {
+        broken(|run, _| {
+            let mut audit = Audit::default();
+            (audit.n, audit.n_failed, audit.error_p95) = (n, n_failed, Some(error));
+            run.audit = Some(audit);
+        })
+    };
+    assert_eq!(with(9, 3, 0.02), []);
+    assert_eq!(with(9, 3, 0.04), [Guarantee::Audit]);
+    assert_eq!(with(3, 9, 0.02), [Guarantee::Audit]);
+}
+
+#[test]
+fn a_small_force_may_change_by_what_no_hand_feels() {
+    // A change of 0.015 N where a patch arrives, in a force of at most 0.1 N.
+    let found = broken(|_, log| {
+        let at = (log.ticks.iter()).position(|entry| entry.tick.now > 3.0 && entry.tick.taken);
+        let at = log.ticks[at.unwrap()].tick.now;
+        device(log, 0.0, |now, device| {
+            let more = if now < at { 0.0 } else { 0.015 };
+            device.force[2] = 0.04 * device.force[2] + more;
+            device.tissue_force[2] = device.force[2];
+        });
+    });
+    assert!(!found.contains(&Guarantee::UnusualArrival), "{found:?}");
 }
 
 #[test]
