@@ -35,7 +35,7 @@ struct Stroke {
 fn layers() -> Scene {
     Scene::skin_fat_muscle(3, 4)
         .press(6.0)
-        .near_tool(4.5)
+        .near_tool(3.5)
         .growth(1.0)
         .set("mesh", "near_lumps", "100 mm")
         .motion("stroke", 6.0)
