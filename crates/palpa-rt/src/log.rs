@@ -284,20 +284,14 @@ impl Rows {
                     self.ending = Ending::Whole;
                     return Ok(None);
                 }
-                Some(Err(error @ McapError::UnexpectedEof)) => {
-                    // A log that was closed is not cut off: a length in it is wrong.
-                    if self.is_closed() {
-                        self.ending = Ending::Damaged(error.to_string());
-                    }
-                    return self.end_early();
-                }
                 Some(Err(error)) => {
-                    if self.start.topics.is_empty() {
-                        return Err(self.broken(error.to_string()));
-                    }
-                    // The rows before the damage are good.
-                    self.ending = Ending::Damaged(error.to_string());
-                    return Ok(None);
+                    let is_early = matches!(error, McapError::UnexpectedEof);
+                    // A log that was closed is not cut off: a length in it is wrong.
+                    return if is_early && (self.start.topics.is_empty() || !self.is_closed()) {
+                        self.end_early()
+                    } else {
+                        self.end_damaged(&error)
+                    };
                 }
                 Some(Ok(LinearReadEvent::ReadRequest(n))) => {
                     let read = self.file.read(self.reader.insert(n));
@@ -311,13 +305,7 @@ impl Rows {
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
                     match parse_record(opcode, data) {
                         Ok(record) => self.start.row(record),
-                        Err(error) if self.start.topics.is_empty() => {
-                            Err(Refusal::Broken(error.to_string()))
-                        }
-                        Err(error) => {
-                            self.ending = Ending::Damaged(error.to_string());
-                            return Ok(None);
-                        }
+                        Err(error) => return self.end_damaged(&error),
                     }
                 }
             };
@@ -327,6 +315,15 @@ impl Rows {
                 Err(refusal) => return Err(self.refused(refusal)),
             }
         }
+    }
+
+    /// The rows before the damage are good.
+    fn end_damaged(&mut self, error: &McapError) -> Result<Option<Row>, LogError> {
+        if self.start.topics.is_empty() {
+            return Err(self.broken(error.to_string()));
+        }
+        self.ending = Ending::Damaged(error.to_string());
+        Ok(None)
     }
 
     /// Whether the file ends as one that was closed.

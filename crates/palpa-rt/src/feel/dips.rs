@@ -9,8 +9,6 @@
 use crate::{servo_loop::TickEntry, smoothness::norm};
 use palpa_servo::Limits;
 
-/// Smallest force of the tissue at which a dip counts, N: less is not felt.
-const LEAST_FORCE: f64 = 0.2;
 /// A gap between two ticks is late from this many periods on.
 const LATE: f64 = 1.5;
 /// Longest gap that the loop should survive without a dip, s.
@@ -35,6 +33,11 @@ pub struct Dips {
     pub worst_after_short: f64,
     /// Number of ticks with enough force for a dip to count.
     pub n_judged: u64,
+}
+
+impl Dips {
+    /// Smallest force of the tissue at which a dip counts, N: less is not felt.
+    pub const LEAST_FORCE: f64 = 0.2;
 }
 
 /// The dips at device `k`.
@@ -87,7 +90,7 @@ fn dip(entry: &TickEntry, k: usize) -> Option<f64> {
     }
     let wanted: [f64; 3] = std::array::from_fn(|i| device.tissue_force[i] + device.transfer[i]);
     let size = norm(wanted);
-    if size.is_nan() || size < LEAST_FORCE {
+    if size.is_nan() || size < Dips::LEAST_FORCE {
         return None;
     }
     let along: f64 = (0..3).map(|i| device.force[i] * wanted[i]).sum();

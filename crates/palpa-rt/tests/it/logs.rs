@@ -7,7 +7,12 @@ use crate::{
 };
 use mcap::records::MessageHeader;
 use palpa_rt::{Ending, Engine, Log, Machine, ReplayParams, Table, Verdict, export, replay};
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+use tempfile::TempDir;
 
 /// Runs until the log has grown so often on disk, as the recorder hands chunks to the system.
 fn until_grown(engine: &mut Engine, path: &Path, times: usize) {
@@ -17,6 +22,16 @@ fn until_grown(engine: &mut Engine, path: &Path, times: usize) {
         until("the log grew", || size() > before);
     }
     go_on(engine, 1, 1, 0);
+}
+
+/// A log of several chunks, in a folder that is removed with the first of these.
+fn of_some_chunks() -> (TempDir, PathBuf, Log) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (_, log) = run(&path, Bed::new(), |engine, _| {
+        until_grown(engine, &path, 6);
+    });
+    (folder, path, log)
 }
 
 /// For each chunk of a whole log: the byte at which it ends, and the ticks up to there.
@@ -36,11 +51,7 @@ fn chunks(log: &[u8]) -> Vec<(usize, usize)> {
 
 #[test]
 fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    let (_, log) = run(&path, Bed::new(), |engine, _| {
-        until_grown(engine, &path, 6);
-    });
+    let (folder, path, log) = of_some_chunks();
     let bytes = fs::read(&path).unwrap();
     let chunks = chunks(&bytes);
     let in_chunks = chunks.last().map(|(_, ticks)| *ticks);
@@ -87,11 +98,7 @@ fn a_log_that_was_cut_off_reads_up_to_its_last_chunk() {
 
 #[test]
 fn a_damaged_log_says_so_and_reads_up_to_there() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    let (_, log) = run(&path, Bed::new(), |engine, _| {
-        until_grown(engine, &path, 6);
-    });
+    let (folder, path, log) = of_some_chunks();
     let mut bytes = fs::read(&path).unwrap();
     // In the middle of a chunk that has others before and after it.
     let chunks = chunks(&bytes);
@@ -116,11 +123,7 @@ fn a_damaged_log_says_so_and_reads_up_to_there() {
 /// A wrong length, or a record that is none, in a log that was closed.
 #[test]
 fn a_log_with_one_wrong_byte_is_damaged_and_not_cut_off() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    let (_, log) = run(&path, Bed::new(), |engine, _| {
-        until_grown(engine, &path, 6);
-    });
+    let (_folder, path, log) = of_some_chunks();
     let bytes = fs::read(&path).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let start = summary.chunk_indexes[2].chunk_start_offset as usize;

@@ -401,7 +401,8 @@ pub struct Quality {
 
 impl Quality {
     /// Presses one pose on a reference and on a still finer mesh; `None` if either has no
-    /// equilibrium or too many nodes, if the second is not finer, or `goes_on`, which is asked before each press, returns false.
+    /// equilibrium or too many nodes, if the second is not finer, or `goes_on`, which is asked before each
+    /// press, returns false.
     pub fn find(
         of: &Prepared,
         tool: &PosedTool,

@@ -135,11 +135,7 @@ mod tests {
 
     /// One that gets its share of the time however busy the machine is.
     fn prober() -> Prober {
-        let wish = Wish {
-            priority: Priority::Normal,
-            core: None,
-        };
-        Prober::start_as(wish).unwrap()
+        Prober::start_as(Wish::NORMAL).unwrap()
     }
 
     #[test]

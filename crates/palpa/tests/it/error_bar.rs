@@ -10,7 +10,7 @@ use palpa::live::{FineScene, LiveScene, Moment, NoBar, Prober, probe};
 use palpa::mesh::Vec3;
 use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
-use palpa_rt::{Priority, Wish};
+use palpa_rt::Wish;
 use palpa_testkit::{Layer, Scene as SceneText};
 
 /// A soft layer under a stiff one, pressed by a ball.
@@ -137,11 +137,7 @@ fn the_thread_gives_the_same_bar() {
     let moment = moment(&live, 2e-3, 0.0);
     let here = probe(&live.prepared, &moment, || true).unwrap();
     // With its share of the time however busy the machine is.
-    let mut prober = Prober::start_as(Wish {
-        priority: Priority::Normal,
-        core: None,
-    })
-    .unwrap();
+    let mut prober = Prober::start_as(Wish::NORMAL).unwrap();
     assert!(prober.begin(&live.prepared, moment.clone()));
     assert!(!prober.begin(&live.prepared, moment));
     assert_eq!(prober.wait(), Some(Ok(here)));

@@ -3,6 +3,7 @@
 //! A guarantee without anything to judge it by, such as stillness in a run without a pause, is not
 //! kept: the report then cannot say that the loop is good.
 
+use palpa_rt::Dips;
 use serde::{Serialize, Serializer};
 
 use super::figures::{Figures, TissueFigures};
@@ -409,7 +410,10 @@ fn judge_feel(d: &ForceFigures, judge: &mut Judge) {
         d.dip_max,
         MOST_DIP,
         Unit::Share,
-        "the force was never 0.2 N or more: press deeper",
+        &format!(
+            "the force was never {} N or more: press deeper",
+            Dips::LEAST_FORCE
+        ),
         || dip_words(d),
     );
 }
