@@ -19,7 +19,7 @@ const HINT = `no browser was found. Install Chromium (on Debian: apt-get install
 /** Debian's packages: the browser, and letters for the page in Japanese. */
 const PACKAGES = ['chromium', 'fonts-ipafont-gothic'];
 
-/** Quiet, and drawing in software: the tests run where there is no graphics card. */
+/** Quiet. */
 const ARGS = [
   '--no-sandbox',
   '--disable-quic',
@@ -28,7 +28,9 @@ const ARGS = [
   '--disable-component-update',
   '--disable-sync',
 ];
-const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+/** Where there is no graphics card the processor draws WebGL, and the browser puts pages together without it, as it
+ * does for users. */
+const SOFTWARE_GL = ['--enable-unsafe-swiftshader'];
 export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
 
 /** @param {string} path */
@@ -57,33 +59,41 @@ function findBrowser() {
   return NAMES.map(inPath).find((path) => path !== undefined);
 }
 
+/** Before a command: takes from root what users have not, the right to a higher priority. */
+export function asUser() {
+  const setpriv = process.getuid?.() === 0 ? inPath('setpriv') : undefined;
+  return setpriv ? [setpriv, '--bounding-set', '-sys_nice'] : [];
+}
+
 /**
  * A program that runs the browser behind everything else. Drawing in software takes all cores, and
  * as root Chromium would even put itself before the engine's tissue, which then answers too late to
  * be felt. Where the kernel shares the cores out by terminal sessions first (autogroups), it is the
  * session that has to be behind; the browser has one of its own.
  * @param {string} browser
+ * @param {boolean} isBehind whether it is; if not, it has the priority that it has for a user
  */
-function behind(browser) {
-  const nice = inPath('nice');
-  const setpriv = process.getuid?.() === 0 ? inPath('setpriv') : undefined;
-  const before = [...(setpriv ? [setpriv, '--bounding-set', '-sys_nice'] : []), ...(nice ? [nice, '-n', '10'] : [])];
+function wrapped(browser, isBehind) {
+  const nice = isBehind ? inPath('nice') : undefined;
+  const before = [...asUser(), ...(nice ? [nice, '-n', '10'] : [])];
+  const group = isBehind ? '(echo 19 > /proc/self/autogroup) 2>/dev/null\n' : '';
   const folder = mkdtempSync(join(tmpdir(), 'palpa-browser-'));
   process.once('exit', () => rmSync(folder, { recursive: true, force: true }));
   const path = join(folder, 'browser');
   const words = [...before, browser].map((word) => `'${word.replaceAll("'", String.raw`'\''`)}'`);
-  writeFileSync(path, `#!/bin/sh\n(echo 19 > /proc/self/autogroup) 2>/dev/null\nexec ${words.join(' ')} "$@"\n`, { mode: 0o755 });
+  writeFileSync(path, `#!/bin/sh\n${group}exec ${words.join(' ')} "$@"\n`, { mode: 0o755 });
   return path;
 }
 
 /**
  * @param {string[]} graphics
+ * @param {{ isBehind?: boolean }} options
  * @returns {Promise<import('playwright-core').Browser>}
  */
-export function launch(graphics = SOFTWARE_GL) {
+export function launch(graphics = SOFTWARE_GL, { isBehind = true } = {}) {
   const found = findBrowser();
   if (found === undefined) throw new Error(HINT);
-  return chromium.launch({ executablePath: behind(found), args: [...ARGS, ...graphics] });
+  return chromium.launch({ executablePath: wrapped(found, isBehind), args: [...ARGS, ...graphics] });
 }
 
 function install() {

@@ -105,9 +105,8 @@ export class PalpaPage {
   /** Force, depth and tick as shown, all of one frame. @returns {Promise<Readout>} */
   readout() {
     return this.page.evaluate(() => {
-      const force = /** @type {HTMLElement} */ (document.querySelector('[data-testid=force-number]'));
-      const depth = /** @type {HTMLElement} */ (document.querySelector('[data-testid=depth-number]'));
-      return { newtons: Number(force.dataset.newtons), tick: Number(force.dataset.tick), metres: Number(depth.dataset.metres) };
+      const number = /** @type {HTMLElement & { shown?: Readout }} */ (document.querySelector('[data-testid=force-number]'));
+      return number.shown ?? { newtons: 0, tick: 0, metres: NaN };
     });
   }
 

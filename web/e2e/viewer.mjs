@@ -7,6 +7,7 @@ import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { asUser } from './browser.mjs';
 
 const ROOT = fileURLToPath(new URL('../../', import.meta.url));
 export const TARGET = process.env.CARGO_TARGET_DIR ?? join(ROOT, 'target');
@@ -64,12 +65,16 @@ export class Viewer {
     this.port = 0;
   }
 
-  /** @param {{ scene?: string, port?: number, token?: string }} options */
-  static async start({ scene, port = 0, token } = {}) {
+  /**
+   * `isUser` starts it as somebody who is not root, without the right to a higher priority.
+   * @param {{ scene?: string, port?: number, token?: string, isUser?: boolean }} options
+   */
+  static async start({ scene, port = 0, token, isUser = false } = {}) {
     const out = mkdtempSync(join(tmpdir(), 'palpa-e2e-'));
     const args = ['view', '--no-open', '--port', String(port), '--json', '--allow-faults', '--out', out];
     if (token !== undefined) args.push('--token', token);
-    const child = spawn(binary(), scene === undefined ? args : [...args, scene], { stdio: ['ignore', 'pipe', 'pipe'] });
+    const [program, ...words] = [...(isUser ? asUser() : []), binary(), ...args, ...(scene === undefined ? [] : [scene])];
+    const child = spawn(program, words, { stdio: ['ignore', 'pipe', 'pipe'] });
     const viewer = new Viewer(child, out);
     child.stderr?.on('data', (data) => (viewer.stderr += data));
     let stdout = '';

@@ -10,6 +10,9 @@ import { App } from './ui/App';
 import { beginFeedback } from './ui/feedback';
 import { neededField, theme } from './ui/settings';
 import { computed } from '@preact/signals';
+import { drawPlainly } from './machine';
+
+drawPlainly();
 
 effect(() => {
   document.documentElement.dataset.theme = theme.value;

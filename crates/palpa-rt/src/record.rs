@@ -198,6 +198,8 @@ record! {
         stale_periods: f64,
         /// Smallest age at which a patch can count as stale, s.
         stale_after: f64,
+        /// Time in which the force falls to zero if a stale patch is the only fault, s.
+        fade: f64,
         /// Time between two ticks beyond which the force ramps to zero, s.
         late_after: f64,
         /// Time of equal readings beyond which a device counts as stalled, s.
@@ -232,6 +234,7 @@ impl From<&ServoParams> for ServoRecord {
             max_transfer,
             stale_periods,
             stale_after,
+            fade,
             late_after,
             stall_after,
             max_speed,
@@ -251,6 +254,7 @@ impl From<&ServoParams> for ServoRecord {
             max_transfer,
             stale_periods,
             stale_after,
+            fade,
             late_after,
             stall_after,
             max_speed,
@@ -275,6 +279,7 @@ impl From<&ServoRecord> for ServoParams {
             max_transfer: r.max_transfer,
             stale_periods: r.stale_periods,
             stale_after: r.stale_after,
+            fade: r.fade,
             late_after: r.late_after,
             stall_after: r.stall_after,
             max_speed: r.max_speed,

@@ -20,8 +20,12 @@ pub struct ServoParams {
     /// Age at which a patch is stale, in patch periods; never less than
     /// [`ServoParams::stale_after`].
     pub stale_periods: f64,
-    /// Smallest age at which a patch can count as stale, s.
+    /// Smallest age at which a patch can count as stale, s. Until then the force goes on by the local model, which
+    /// is passive.
     pub stale_after: f64,
+    /// Time in which the force falls to zero if a stale patch is the only fault, s. It goes on by the local model
+    /// meanwhile.
+    pub fade: f64,
     /// Time between two ticks beyond which the force ramps to zero, s. After a shorter time the
     /// force goes on by the local model, within the slew of two periods.
     pub late_after: f64,
@@ -56,7 +60,8 @@ impl Default for ServoParams {
             transfer_periods: 2.0,
             max_transfer: 0.25,
             stale_periods: 4.0,
-            stale_after: 0.05,
+            stale_after: 0.1,
+            fade: 0.4,
             late_after: 0.03,
             stall_after: 0.02,
             max_speed: 5.0,

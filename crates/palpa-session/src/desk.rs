@@ -85,6 +85,9 @@ impl Desk {
 
     /// Carries out an order.
     pub(crate) fn obey(&mut self, order: Order) {
+        if !matches!(order, Order::Request(Request::Hand(_), _)) {
+            self.screen.wake();
+        }
         match order {
             Order::Request(request, answer) => self.answer(request, answer),
             Order::Clients(clients) => {
@@ -407,12 +410,14 @@ impl Desk {
     /// Makes a frame of the body, and shows it or the frame of a replay.
     fn show(&mut self, dt: f64) {
         let mut is_made = false;
-        if let Some(live) = self.stage.live() {
-            let (place, force) = self.screen.put_tick(live);
+        let pressed = self.stage.live().map(|live| self.screen.put_tick(live));
+        let recorded = self.tape.shown().map(|(frame, _)| frame);
+        let is_due = self.screen.is_due(recorded, dt);
+        if let (Some(live), Some((place, force))) = (self.stage.live(), pressed) {
             if let Some(game) = &mut self.game {
                 game.feel(place, force, dt);
             }
-            let is_wanted = self.screen.is_watched() || self.tape.is_under_way();
+            let is_wanted = self.tape.is_under_way() || self.screen.is_watched() && is_due;
             let shows_lumps = Veil::of(self.game.as_ref()).shows_lumps();
             if live.entry.tick.tick > 0
                 && is_wanted
@@ -424,9 +429,9 @@ impl Desk {
             }
         }
         match self.tape.shown() {
-            Some((frame, mesh)) => self.screen.show_recorded(frame, mesh),
-            None if is_made => self.screen.show_body(),
-            None => {}
+            Some((frame, mesh)) if is_due => self.screen.show_recorded(frame, mesh),
+            None if is_made && is_due => self.screen.show_body(),
+            _ => {}
         }
     }
 

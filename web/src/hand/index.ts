@@ -7,7 +7,7 @@ import { Gamepads } from './gamepad';
 import { PointerHand } from './pointer';
 import { Sender } from './sender';
 import { SteppingHand } from './stepping';
-import type { HandSettings, Held, Target } from './target';
+import type { HandSettings, Held, Place, Target } from './target';
 
 /** Greatest height above the skin, as a depth, m. */
 const HIGHEST = -0.03;
@@ -68,6 +68,12 @@ export class HandControl implements Held {
     this.stepping.lastPlace = { point, normal };
     this.onTarget(this.target);
     this.sender.goTo(this.target);
+  }
+
+  /** Brings the tool over a place, so that a press there begins at once. */
+  hover(place: Place): void {
+    if (this.target || !this.settings.enabled || !this.settings.hovers) return;
+    this.sender.hover(place);
   }
 
   lift(): void {

@@ -7,6 +7,9 @@ import type { Held } from './target';
 const WHEEL_STEP = 0.0005;
 /** A click that marks moves no farther than this, px. */
 const CLICK_REACH = 6;
+/** The tool comes over the place where the pointer has rested for this time, ms: the mesh is refined there, which
+ * takes too long to follow a pointer on its way to elsewhere. */
+const DWELL = 60;
 
 interface Drag {
   id: number;
@@ -20,11 +23,13 @@ interface Drag {
 
 export class PointerHand {
   private drag: Drag | null = null;
+  private dwell = 0;
   private click: { id: number; x: number; y: number } | null = null;
 
   constructor(private readonly hand: Held, signal: AbortSignal) {
     const { canvas } = hand.view;
     canvas.addEventListener('pointermove', (e) => this.move(e), { signal });
+    canvas.addEventListener('pointerleave', () => window.clearTimeout(this.dwell), { signal });
     for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) canvas.addEventListener(type, (e) => this.up(e), { signal });
   }
 
@@ -35,6 +40,7 @@ export class PointerHand {
   /** A pointer goes down; true if the hand takes it. */
   press(event: PointerEvent): boolean {
     const { view, settings: { mode, enabled, pressDepth } } = this.hand;
+    window.clearTimeout(this.dwell);
     if (event.button !== 0 || event.ctrlKey || mode === 'orbit') return false;
     const { pointerId: id, clientX: x, clientY: y } = event;
     const at = view.pickRest(x, y);
@@ -107,9 +113,12 @@ export class PointerHand {
 
   /** Shows by the cursor what a button would do. */
   private hover(event: PointerEvent): void {
+    window.clearTimeout(this.dwell);
     if (event.buttons !== 0) return;
     const { view, settings: { mode, enabled } } = this.hand;
-    const isOn = mode !== 'orbit' && (enabled || mode === 'mark') && view.pickRest(event.clientX, event.clientY) !== null;
+    const at = mode !== 'orbit' && (enabled || mode === 'mark') ? view.pickRest(event.clientX, event.clientY) : null;
+    const isOn = at !== null;
+    if (isOn && mode === 'press' && event.pointerType !== 'touch') this.dwell = window.setTimeout(() => this.hand.hover(at), DWELL);
     const cursor = isOn ? 'crosshair' : 'grab';
     if (view.canvas.style.cursor !== cursor) view.canvas.style.cursor = cursor;
   }

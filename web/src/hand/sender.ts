@@ -1,7 +1,7 @@
 // Sends the target to the engine: at most 60 times a second, and again while the tool is held.
 
 import type { Request } from '../connection';
-import type { Target } from './target';
+import { HOVER, type Place, type Target } from './target';
 
 /** Shortest time between two messages, and longest while the tool is held, ms. The engine lifts
  * after a second of silence. */
@@ -20,6 +20,11 @@ export class Sender {
     this.target = target;
     this.isDirty = true;
     this.pump();
+  }
+
+  /** Sends a place to hover over, once: without another message the engine lifts the tool a little. */
+  hover({ point, normal }: Place): void {
+    this.send({ type: 'hand', point: [...point], normal: [...normal], depth: HOVER });
   }
 
   lift(): void {

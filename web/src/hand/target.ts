@@ -19,6 +19,8 @@ export interface HandSettings {
   mode: 'press' | 'orbit' | 'mark';
   /** Whether this page controls. */
   enabled: boolean;
+  /** Whether the tool follows the pointer over the skin. */
+  hovers: boolean;
 }
 
 /** Depth of a tool that is held over the skin without pressing, m. */
@@ -31,6 +33,7 @@ export interface Held {
   /** Null while the hand holds nothing. */
   readonly target: Target | null;
   goTo(target: Target): void;
+  hover(place: Place): void;
   lift(): void;
   /** The nearest depth that is allowed, m. */
   limited(depth: number): number;

@@ -9,6 +9,8 @@ export type Changes = Record<'frame' | 'style' | 'camera' | 'shadow', boolean>;
 export interface Drawing {
   /** Moves what moves by itself, before the detail is chosen; `now` in ms. */
   step(now: number): void;
+  /** Whether the tool presses. */
+  isHeld(): boolean;
   draw(detail: Detail): void;
   /** The picture has been handed to the GPU. */
   done(): void;
@@ -27,7 +29,7 @@ export class DrawLoop {
     this.changed[what] = true;
     if (what !== 'shadow') {
       this.isRefining = false;
-      this.quality.wait();
+      this.quality.putOff();
     }
     this.ask();
   }
@@ -50,19 +52,21 @@ export class DrawLoop {
   private ask(): void {
     if (this.isAsked || this.isStopped) return;
     this.isAsked = true;
-    requestAnimationFrame((now) => this.tick(now));
+    const pause = this.quality.wait(performance.now());
+    if (pause > 4) window.setTimeout(() => requestAnimationFrame((now) => this.tick(now)), pause - 4);
+    else requestAnimationFrame((now) => this.tick(now));
   }
 
   private tick(now: number): void {
     this.isAsked = false;
     if (this.isStopped || document.hidden) return;
-    if (!this.quality.isReady(now)) {
+    if (!this.quality.isReady || this.quality.wait(now) > 0) {
       this.ask();
       return;
     }
     this.drawing.step(now);
-    this.drawing.draw(this.quality.begin(this.isRefining));
-    this.quality.end(now);
+    this.drawing.draw(this.quality.begin(this.isRefining, this.drawing.isHeld(), now));
+    this.quality.end(performance.now());
     this.isRefining = false;
     this.drawing.done();
   }

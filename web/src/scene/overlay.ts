@@ -29,6 +29,8 @@ export class Gizmo {
   readonly element = document.createElement('div');
   private readonly arms: { group: SVGGElement; line: SVGLineElement; end: SVGGElement; axis: number; sign: number }[] = [];
   private readonly root: SVGSVGElement;
+  /** The axes as drawn. */
+  private view = '';
 
   constructor(onAxis: (axis: number, sign: number) => void) {
     this.element.className = 'scene-gizmo';
@@ -49,6 +51,9 @@ export class Gizmo {
   }
 
   update({ right, up, forward }: ScreenAxes): void {
+    const view = [right, up].map((v) => v.toArray().map((x) => x.toFixed(3)).join()).join();
+    if (view === this.view) return;
+    this.view = view;
     const order: [number, SVGGElement][] = [];
     for (const { group, line, end, axis, sign } of this.arms) {
       const x = 32 * sign * right.getComponent(axis), y = -32 * sign * up.getComponent(axis);
@@ -83,9 +88,10 @@ export class ScaleBar {
     const decade = 10 ** Math.floor(Math.log10(most));
     const step = most >= 5 * decade ? 5 : most >= 2 * decade ? 2 : 1;
     const mm = step * decade;
-    this.length = mm / 1000 / metresPerPixel;
+    const length = mm / 1000 / metresPerPixel;
+    if (Math.abs(length - this.length) > 0.05) this.bar.style.width = `${length.toFixed(1)}px`;
+    this.length = length;
     const label = `${Number(mm.toPrecision(2))} mm`;
-    this.bar.style.width = `${this.length.toFixed(1)}px`;
     if (label !== this.label) this.text.textContent = this.label = label;
   }
 }

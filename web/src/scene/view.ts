@@ -3,6 +3,7 @@
 import { PCFShadowMap, Raycaster, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { State } from '../generated/api';
 import type { FrameSnapshot, MeshSnapshot } from '../generated/wire';
+import { isSoftwareWebGL } from '../machine';
 import { Body } from './body';
 import { Colouring } from './colouring';
 import { CutawayView } from './cutawayview';
@@ -18,7 +19,7 @@ import { Gizmo, ScaleBar } from './overlay';
 import { BONE, CORE, LUMP, mapOf, mapTextures, type Theme } from './palette';
 import { nearestOnSkin, pickNearest, pickSkin } from './picking';
 import { pictureOf } from './picture';
-import { Quality, isSoftwareWebGL, type Detail } from './quality';
+import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES } from './rig';
 import { Stage } from './stage';
 import { Surfaces, type Materials } from './surfaces';
@@ -31,11 +32,16 @@ const MESH_WAIT = 400;
  * are of the same body. */
 const SAME_BODY = 0.06;
 
+/** Faults of a tick that come from a busy processor, as bits: a stale patch, a late tick. */
+const LATE = (1 << 1) | (1 << 3);
+
 export class BodyView {
   onLegend: (legend: Legend | null) => void = () => {};
   onSection: (area: SectionArea | null) => void = () => {};
   onCutaway: (position: number) => void = () => {};
   onFirstBody: () => void = () => {};
+  /** Pictures follow each other more slowly, so that the engine keeps up; or no longer. */
+  onYield: (yields: boolean) => void = () => {};
   readonly canvas = document.createElement('canvas');
 
   private readonly root = document.createElement('div');
@@ -51,7 +57,7 @@ export class BodyView {
   private readonly marks = new MarksView();
   private readonly colouring = new Colouring();
   private readonly maps = mapTextures();
-  private readonly shared: SharedUniforms = { map: { value: null }, range: { value: new Vector2(0, 1) }, isLog: { value: 0 } };
+  private readonly shared: SharedUniforms = { map: { value: null }, range: { value: new Vector2(0, 1) }, isLog: { value: 0 }, grain: { value: 1 } };
   private readonly cutaway: CutawayView;
   private readonly materials: Materials = new Map();
   private readonly lumps: LumpsView;
@@ -68,6 +74,7 @@ export class BodyView {
   private meshTimer = 0;
   private frame: FrameSnapshot | null = null;
   private isFirst = true;
+  private isHeld = false;
   private size = new Vector2(1, 1);
   private legendKey = '';
 
@@ -77,8 +84,7 @@ export class BodyView {
     canvas.id = 'body-canvas';
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');
-    const isSoftware = isSoftwareWebGL();
-    const gl = isSoftware === null ? null : canvas.getContext('webgl2', { antialias: !isSoftware, alpha: true, powerPreference: 'high-performance' });
+    const gl = isSoftwareWebGL === null ? null : canvas.getContext('webgl2', { antialias: !isSoftwareWebGL, alpha: true, powerPreference: 'high-performance' });
     if (!gl) throw new NoWebGL2();
     this.renderer = new WebGLRenderer({ canvas, context: gl, alpha: true });
     this.renderer.setClearAlpha(0);
@@ -86,9 +92,11 @@ export class BodyView {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
-    this.quality = new Quality(gl, Boolean(isSoftware), () => this.loop.refine());
+    this.quality = new Quality(gl, isSoftwareWebGL === true, () => this.loop.refine());
+    this.quality.onYield = (yields) => this.onYield(yields);
     this.loop = new DrawLoop(this.quality, {
       step: (now) => this.rig.step(now),
+      isHeld: () => this.isHeld,
       draw: (detail) => this.draw(detail),
       done: () => this.done(),
     });
@@ -142,6 +150,8 @@ export class BodyView {
   setFrame(frame: FrameSnapshot): void {
     if (this.waitingMesh?.mesh === frame.mesh) this.takeMesh(this.waitingMesh);
     if (!this.body || frame.mesh !== this.body.id) return;
+    this.isHeld = frame.n_active > 0;
+    if (this.isHeld && frame.is_replay === 0 && (frame.faults & LATE) !== 0) this.quality.yield(performance.now());
     // A still picture is drawn in full once, and left alone.
     if (this.frame && looksSame(this.frame, frame)) return;
     this.frame = frame;
@@ -173,7 +183,7 @@ export class BodyView {
 
   /** The view as a PNG, with the scale bar. */
   image(): Promise<Blob> {
-    this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true });
+    this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true, grain: true });
     const made = pictureOf(this.canvas, this.size, this.theme, this.scaleBar);
     this.loop.invalidate('camera');
     return made;
@@ -212,6 +222,11 @@ export class BodyView {
   get home(): { point: Vec3; normal: Vec3 } | null {
     const home = this.state?.home;
     return home ? { point: home.point as Vec3, normal: home.normal as Vec3 } : null;
+  }
+
+  /** Pictures no longer leave the engine more time when it is late. */
+  neverYield(): void {
+    this.quality.neverYield();
   }
 
   set claims(claims: Claims | null) {
@@ -317,7 +332,7 @@ export class BodyView {
     }
   }
 
-  private draw({ ratio, shadows }: Detail): void {
+  private draw({ ratio, shadows, grain }: Detail): void {
     const { renderer, body, surfaces, stage, options } = this;
     if (body && surfaces) this.bringUpToDate(body, surfaces);
     this.loop.taken();
@@ -327,6 +342,7 @@ export class BodyView {
       renderer.shadowMap.needsUpdate = true;
     }
     stage.hasGround = options.shadows;
+    this.shared.grain.value = grain ? 1 : 0;
     if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio);
     const size = renderer.getSize(new Vector2());
     if (!size.equals(this.size)) renderer.setSize(this.size.x, this.size.y, false);

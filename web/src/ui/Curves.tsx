@@ -5,12 +5,11 @@ import 'uplot/dist/uPlot.min.css';
 import { useEffect, useRef } from 'preact/hooks';
 import { language, t } from '../i18n';
 import { history, state } from '../store';
+import { CURVE_PERIOD } from '../machine';
 import { axes, roundUp } from './axes';
 import { WINDOW } from './history';
 import { theme } from './settings';
 
-/** Between two drawings of a curve, ms; more often looks no smoother. */
-const PERIOD = 50;
 const FONT = '11px system-ui, sans-serif';
 /** The newest part of the force–depth curve, s. Older parts are paler. */
 const FRESH = 2;
@@ -44,7 +43,7 @@ function Curve({ kind }: { kind: Kind }) {
     let drawnAt = 0;
     const draw = (now: number): void => {
       frame = requestAnimationFrame(draw);
-      if (history.version === drawnVersion || now - drawnAt < PERIOD) return;
+      if (history.version === drawnVersion || now - drawnAt < CURVE_PERIOD) return;
       drawnVersion = history.version;
       drawnAt = now;
       if (kind === 'force-depth') axes.settle(history.forces, history.depths);

@@ -6,6 +6,7 @@ import { t } from '../i18n';
 import { figures, isReplaying, latestFrame, onFrame, state, status } from '../store';
 import type { BarProblem } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
+import { NUMBER_PERIOD } from '../machine';
 import { axes } from './axes';
 import { Button } from './controls';
 import { Curves } from './Curves';
@@ -18,8 +19,13 @@ import { isDeepest } from './settings';
 /** Share of the force that reaches the hand, %. */
 const gain = signal(100);
 
-/** Between two changes of the numbers, ms; faster ones cannot be read. */
-const PERIOD = 80;
+/** Writes a text or an attribute only when it differs: each write makes the browser draw. */
+function write(element: HTMLElement, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+function writeAttribute(element: HTMLElement, name: string, value: string): void {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
 
 export function Readout() {
   return (
@@ -116,25 +122,23 @@ function ForceNumber() {
       timer = 0;
       if (newest === null) return;
       const force = magnitude(newest.force);
-      const element = number.current!;
-      element.textContent = written(force);
-      element.dataset.newtons = String(force);
-      element.dataset.tick = String(newest.tick);
-      depth.current!.textContent = inMillimetres(newest.depth);
-      depth.current!.dataset.metres = String(newest.depth);
-      gauge.current!.setAttribute('aria-valuenow', force.toFixed(2));
-      gauge.current!.setAttribute('aria-valuemax', String(axes.force));
-      scale.current!.textContent = `${formatNumber(axes.force)} N`;
+      axes.take(force, newest.depth);
+      write(number.current!, written(force));
+      // For programs that read the page: not part of the document, so that setting it draws nothing.
+      Object.assign(number.current!, { shown: { newtons: force, tick: newest.tick, metres: newest.depth } });
+      write(depth.current!, inMillimetres(newest.depth));
+      writeAttribute(gauge.current!, 'aria-valuenow', force.toFixed(2));
+      writeAttribute(gauge.current!, 'aria-valuemax', String(axes.force));
+      write(scale.current!, `${formatNumber(axes.force)} N`);
+      const width = `scaleX(${Math.min(1, force / axes.force).toFixed(3)})`;
+      if (bar.current!.style.transform !== width) bar.current!.style.transform = width;
       // Above the skin a reduced force makes no difference.
       gain.value = newest.depth > 0 ? Math.round(newest.gain * 100) : 100;
       newest = null;
     };
     const stop = onFrame((frame) => {
       newest = frame;
-      const force = magnitude(frame.force);
-      axes.take(force, frame.depth);
-      bar.current!.style.transform = `scaleX(${Math.min(1, force / axes.force)})`;
-      if (timer === 0) timer = window.setTimeout(set, PERIOD);
+      if (timer === 0) timer = window.setTimeout(set, NUMBER_PERIOD);
     });
     return () => {
       stop();
@@ -159,7 +163,7 @@ function ForceNumber() {
         <Button kind="quiet" label={t('readout.speak')} onClick={speak}><Icon name="speak" /></Button>
       </div>
       <div class="force-line">
-        <output ref={number} class="force-number" aria-live="off" data-testid="force-number" data-newtons="0" data-tick="0">0.00 N</output>
+        <output ref={number} class="force-number" aria-live="off" data-testid="force-number">0.00 N</output>
         <ErrorBarNumber />
       </div>
       <ErrorBarWords />

@@ -1,6 +1,6 @@
 // The view of the body with its overlays: legend, progress, problems, replay and game.
 
-import { effect, signal } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { language, t } from '../i18n';
 import { problemWords } from '../i18n/events';
@@ -18,6 +18,9 @@ import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
 import { handMode, isDeepest, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
+
+/** Whether nothing else moves the hand, so that it may follow the pointer. */
+const isFree = computed(() => state.value?.phase === 'running' && !state.value.is_motion_running);
 
 export function Stage() {
   const container = useRef<HTMLDivElement>(null);
@@ -38,7 +41,7 @@ export function Stage() {
     body.onFirstBody = () => {
       firstBodyMs.value = performance.mark('palpa-first-body').startTime;
     };
-    const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false });
+    const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false, hovers: false });
     hand.onTarget = (target) => {
       if (target !== null && target.depth > 0) lastTouched.value = target.point;
       isDeepest.value = hand.isDeepest;
@@ -55,6 +58,7 @@ export function Stage() {
           pressDepth: pressDepth.value,
           mode: picking.value === null ? handMode.value : 'mark',
           enabled: isController.value && !isReplaying.value,
+          hovers: isFree.value,
         }),
       ),
       effect(() => {

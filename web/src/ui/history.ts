@@ -4,6 +4,9 @@ import type { FrameSnapshot } from '../generated/wire';
 
 /** Length of the curves, s. */
 export const WINDOW = 15;
+/** Changes too small to be seen, N and m. */
+const UNSEEN_FORCE = 0.004;
+const UNSEEN_DEPTH = 5e-6;
 /** Frames come at 60 Hz at most. */
 const CAPACITY = 1200;
 
@@ -21,7 +24,7 @@ export class History {
     const last = this.end > this.begin ? times[this.end - 1] : -Infinity;
     // After a seek or a restart of the engine, earlier values belong to another time.
     if (frame.time < last || frame.is_replay !== this.replay || frame.time > last + WINDOW) this.clear();
-    else if (frame.time === last) return;
+    else if (frame.time === last || this.isAtRest(frame)) return;
     this.replay = frame.is_replay;
     if (this.end === 2 * CAPACITY) this.moveDown();
     times[this.end] = frame.time;
@@ -31,6 +34,14 @@ export class History {
     this.end++;
     while (this.end - this.begin > CAPACITY || times[this.begin] < frame.time - WINDOW) this.begin++;
     this.version++;
+  }
+
+  /** Whether nobody presses and nothing has moved since the last point: no curve needs another. */
+  private isAtRest(frame: FrameSnapshot): boolean {
+    if (this.end === this.begin || frame.is_replay === 1) return false;
+    const at = this.end - 1;
+    const [, depths, forces] = this.buffers;
+    return forces[at] < UNSEEN_FORCE && magnitude(frame.force) < UNSEEN_FORCE && Math.abs(depths[at] - frame.depth) < UNSEEN_DEPTH;
   }
 
   clear(): void {

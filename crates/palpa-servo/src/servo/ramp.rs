@@ -59,11 +59,15 @@ impl Ramp {
         if matches!(self.way, Way::DownLive { .. }) && faults.is_empty() && self.gain > 0.0 {
             self.way = Way::Up;
         }
-        let (Way::DownLive { quiet_for } | Way::DownHeld { quiet_for }) = &mut self.way else {
-            self.gain = (self.gain + dt / params.ramp_up.max(1e-3)).min(1.0);
-            return false;
+        let (quiet_for, time) = match &mut self.way {
+            Way::Up => {
+                self.gain = (self.gain + dt / params.ramp_up.max(1e-3)).min(1.0);
+                return false;
+            }
+            Way::DownLive { quiet_for } => (quiet_for, params.fade),
+            Way::DownHeld { quiet_for } => (quiet_for, params.ramp_down),
         };
-        self.gain = (self.gain - dt / params.ramp_down.max(1e-3)).max(0.0);
+        self.gain = (self.gain - dt / time.max(1e-3)).max(0.0);
         if self.gain > 0.0 || !faults.is_empty() {
             return false;
         }

@@ -88,7 +88,7 @@ fn a_stale_patch_ramps_to_zero_and_a_fresh_one_back() {
     let (mut servo, patch) = settled();
     let mut last = servo.command[0].force;
     let mut stale = false;
-    for _ in 0..200 {
+    for _ in 0..550 {
         let report = servo.tick(Some(DEEP));
         stale |= report.faults.contains(Faults::STALE_PATCH);
         assert!((report.tools[0].force - last).norm() <= 0.5 + 1e-12);
@@ -110,13 +110,13 @@ fn a_patch_that_is_a_little_late_costs_little_force() {
     let (mut servo, mut patch) = settled();
     let before = servo.command[0].force.z;
     let (mut least, mut n_stale) = (before, 0);
-    // Stale for five ticks, and then patches come again.
-    while n_stale < 5 {
+    // Silent for 150 ms, and then patches come again.
+    while n_stale < 50 {
         let report = servo.tick(Some(DEEP));
         n_stale += usize::from(report.faults.contains(Faults::STALE_PATCH));
         least = least.min(servo.command[0].force.z);
     }
-    for _ in 0..100 {
+    for _ in 0..200 {
         patch.id += 10_000;
         servo.send(patch.clone());
         servo.tick(Some(DEEP));
@@ -124,7 +124,7 @@ fn a_patch_that_is_a_little_late_costs_little_force() {
     }
     let after = servo.command[0].force.z;
     assert!(
-        least < 0.999 * before && least > 0.95 * before,
+        least < 0.999 * before && least > 0.94 * before,
         "{least} {before}"
     );
     assert!((after / before - 1.0).abs() < 1e-3, "{after} {before}");

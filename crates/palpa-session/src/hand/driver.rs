@@ -1,10 +1,10 @@
 //! The hand's path to its goal, at the speeds of a person's hand.
 //!
 //! ```text
-//!          travel, over the skin or round the body
+//!          glide close over the skin, or travel round the body
 //!     hover ───────────────────────────────► hover
-//!       ▲ │ down, at the speed of a press      │
-//!       │ ▼                                    ▼
+//!       ▲ │ down: fast in the air, then at     │
+//!       │ ▼ the speed of a press               ▼
 //!     pressed ── stroke, along the skin ──► pressed
 //! ```
 //! A place is a point of the skin at rest. The tool's tip is `depth` below it, along the inward
@@ -18,17 +18,23 @@ use super::skin::{Place, Skin};
 
 /// Height of the tip above the skin while it hovers, m.
 pub(crate) const HOVER: f64 = 6e-3;
-/// Speeds, m/s: down and up, along the skin while pressing, and in the air.
+/// The same on the way between two places that are pressed, m.
+const LOW: f64 = 2e-3;
+/// Speeds, m/s: into the skin, along it while pressing, and in the air.
 const PRESS_SPEED: f64 = 0.04;
 const STROKE_SPEED: f64 = 0.06;
-const AIR_SPEED: f64 = 0.35;
-/// Distance above which the hand lifts and travels through the air to a place, m.
+const AIR_SPEED: f64 = 0.4;
+/// Speed towards the skin and away from it in the air, m/s, and the height above it at which the hand slows
+/// down to the speed of a press, m.
+const FALL_SPEED: f64 = 0.15;
+const SLOW_BELOW: f64 = 1e-3;
+/// Distance above which the hand lifts to go to a place, m.
 const STRIDE: f64 = 15e-3;
-/// Shortest and longest wait over a new place, s. The mesh is refined there meanwhile.
-const SETTLE: f64 = 0.1;
-const LONGEST_SETTLE: f64 = 4.0;
-/// The hand presses a place only within this share of the radius of the mesh's fine part.
-const FINE: f64 = 0.5;
+/// A lifted hand glides close over the skin to places that are nearer than this, m, and whose normals differ by
+/// less than 60 degrees; to others it travels through the air.
+const GLIDE: f64 = 0.1;
+/// Largest step of a glide, m: the skin is followed in steps.
+const GLIDE_STEP: f64 = 4e-3;
 /// Distance between skin and tool on the path around the body, m; the tool's size is added.
 const CLEARANCE: f64 = 12e-3;
 
@@ -48,8 +54,6 @@ enum Doing {
     There,
     /// Travelling through the air, with the remaining points; the next one is last.
     Travel(Vec<Vec3>),
-    /// Waiting over a new place, with the time waited so far, s.
-    Settling(f64),
 }
 
 /// The hand on its way to a goal.
@@ -115,9 +119,7 @@ impl HandDriver {
     }
 
     /// Moves the hand by `dt` seconds. Returns the commanded pose of the tool in the scene's frame.
-    /// `fine` is the fine part of the mesh (centre and radius, m) if it moves with the hand: the
-    /// hand then waits over a new place until the mesh is fine there.
-    pub(crate) fn advance(&mut self, skin: &Skin, fine: Option<(Vec3, f64)>, dt: f64) -> Pose {
+    pub(crate) fn advance(&mut self, skin: &Skin, dt: f64) -> Pose {
         match &mut self.doing {
             Doing::Travel(points) => {
                 let mut way = AIR_SPEED * dt;
@@ -132,15 +134,6 @@ impl HandDriver {
                     points.pop();
                 }
                 if points.is_empty() {
-                    self.doing = Doing::Settling(0.0);
-                }
-            }
-            Doing::Settling(waited) => {
-                *waited += dt;
-                let is_fine = fine.is_none_or(|(middle, radius)| {
-                    (self.place.point - middle).norm() < FINE * radius
-                });
-                if *waited > LONGEST_SETTLE || is_fine && *waited > SETTLE {
                     self.doing = Doing::There;
                 }
             }
@@ -155,34 +148,53 @@ impl HandDriver {
             .is_some_and(|goal| (goal.place.point - self.place.point).norm() > STRIDE);
         let wanted = match self.goal {
             Some(goal) if !far => goal.depth,
-            _ => -HOVER,
+            // On the way to another place it stays low.
+            Some(_) => self.depth.clamp(-HOVER, -LOW),
+            None => -HOVER,
         };
-        let down = PRESS_SPEED * dt;
-        self.depth += (wanted - self.depth).clamp(-down, down);
+        self.depth = approached(self.depth, wanted, dt);
         if let Some(goal) = self.goal {
-            if far && self.depth <= -HOVER + 1e-6 {
-                self.travel(skin, goal.place);
-                return;
-            }
-            if !far {
-                self.stroke(skin, goal.place, dt);
+            let is_lifted = self.depth <= -LOW + 1e-6;
+            if far && is_lifted && !self.can_glide(&goal.place) {
+                if self.depth <= -HOVER + 1e-6 {
+                    self.travel(skin, goal.place);
+                    return;
+                }
+                self.depth = approached(self.depth, -HOVER, dt);
+            } else if !far || is_lifted {
+                self.follow(skin, goal.place, dt);
             }
         }
         self.tip = self.place.point - self.place.normal * self.depth;
     }
 
-    fn stroke(&mut self, skin: &Skin, to: Place, dt: f64) {
-        let off = to.point - self.place.point;
-        let way = STROKE_SPEED * dt;
-        if off.norm() <= way {
-            self.place = to;
-            return;
-        }
-        let ahead = self.place.point + off * (way / off.norm());
-        if let Some(mut place) = skin.nearest(ahead) {
+    /// Whether the hand can go to a place close over the skin.
+    fn can_glide(&self, to: &Place) -> bool {
+        (to.point - self.place.point).norm() < GLIDE && to.normal.dot(&self.place.normal) > 0.5
+    }
+
+    /// Moves along the skin towards a place: as a stroke, or faster in the air.
+    fn follow(&mut self, skin: &Skin, to: Place, dt: f64) {
+        let mut way = dt
+            * if self.depth < 0.0 {
+                AIR_SPEED
+            } else {
+                STROKE_SPEED
+            };
+        while way > 0.0 {
+            let off = to.point - self.place.point;
+            let step = way.min(GLIDE_STEP);
+            if off.norm() <= step {
+                self.place = to;
+                return;
+            }
+            way -= step;
+            let share = step / off.norm();
+            let Some(mut place) = skin.nearest(self.place.point + off * share) else {
+                return;
+            };
             // The normal turns towards the goal's normal at the pace of the movement, so that it
             // does not jump at edges of triangles.
-            let share = way / off.norm();
             let turned = self.place.normal.lerp(&to.normal, share);
             place.normal = turned.try_normalize(1e-6).unwrap_or(to.normal);
             self.place = place;
@@ -206,6 +218,19 @@ impl HandDriver {
         self.depth = -HOVER;
         self.doing = Doing::Travel(points);
     }
+}
+
+/// A depth that moves from one to another for `dt` seconds, m.
+fn approached(from: f64, to: f64, dt: f64) -> f64 {
+    let is_in_air = from < -SLOW_BELOW || (from <= 0.0 && to < from);
+    let speed = if is_in_air { FALL_SPEED } else { PRESS_SPEED };
+    // It does not fall into the skin in one step.
+    let slowed = if from < -SLOW_BELOW {
+        to.min(-SLOW_BELOW)
+    } else {
+        to
+    };
+    from + (slowed - from).clamp(-speed * dt, speed * dt)
 }
 
 fn is_outside(skin: &Skin, at: Vec3) -> bool {
@@ -289,9 +314,9 @@ mod tests {
         let mut hand = hand(&skin);
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-        let mut before = hand.advance(&skin, None, DT);
+        let mut before = hand.advance(&skin, DT);
         for _ in 0..60 {
-            let pose = hand.advance(&skin, None, DT);
+            let pose = hand.advance(&skin, DT);
             let way = pose.translation.vector - before.translation.vector;
             assert!(way.norm() <= PRESS_SPEED * DT + 1e-9);
             before = pose;
@@ -300,7 +325,7 @@ mod tests {
         assert!((before.translation.vector - wanted).norm() < 1e-9);
         assert!(!hand.is_lifted());
         hand.set_goal(None);
-        (0..60).for_each(|_| before = hand.advance(&skin, None, DT));
+        (0..60).for_each(|_| before = hand.advance(&skin, DT));
         assert!(hand.is_lifted());
         assert!((before.rotation * Vec3::z() - place.normal).norm() < 1e-9);
     }
@@ -312,7 +337,7 @@ mod tests {
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 1.0 }));
         let mut pose = Pose::identity();
-        (0..200).for_each(|_| pose = hand.advance(&skin, None, DT));
+        (0..200).for_each(|_| pose = hand.advance(&skin, DT));
         let depth = place.normal.dot(&(place.point - pose.translation.vector));
         assert!((depth - MOST_OF_TISSUE * 28e-3).abs() < 1e-6, "{depth}");
     }
@@ -326,7 +351,7 @@ mod tests {
         let mut least = f64::INFINITY;
         let mut pose = Pose::identity();
         for _ in 0..300 {
-            pose = hand.advance(&skin, None, DT);
+            pose = hand.advance(&skin, DT);
             let off_axis = pose.translation.vector.yz().norm();
             if hand.depth <= 0.0 {
                 least = least.min(off_axis);
@@ -344,12 +369,12 @@ mod tests {
         let place = *hand.place();
         hand.set_goal(Some(Goal { place, depth: 5e-3 }));
         (0..60).for_each(|_| {
-            hand.advance(&skin, None, DT);
+            hand.advance(&skin, DT);
         });
         for k in 1..=60 {
             let place = at(&skin, 0.08, f64::from(k) * 0.02);
             hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-            let tip = hand.advance(&skin, None, DT).translation.vector;
+            let tip = hand.advance(&skin, DT).translation.vector;
             assert!((tip.yz().norm() - 0.035).abs() < 8e-4, "{tip:?}");
         }
     }

@@ -28,11 +28,13 @@ pub(crate) use skin::{Place, Skin};
 /// A page that presses sends the hand's place at least this often. After a longer silence the hand
 /// lifts.
 const SILENCE: Duration = Duration::from_secs(1);
-/// The hand first goes to the start of the scene's motion; after this time the motion starts
-/// anyway.
+/// The hand first goes to the start of the scene's motion, and waits there for a fine mesh; after this time
+/// the motion starts anyway.
 const HOMING: Duration = Duration::from_secs(5);
 /// Distance from the start of the motion at which the hand has arrived, m.
 const ARRIVED: f64 = 1e-4;
+/// The scene's motion starts where the mesh is fine: within this share of the radius of its fine part.
+const FINE: f64 = 0.5;
 /// Largest coordinate that a page may send, m: no body is larger.
 const FAR: f64 = 100.0;
 
@@ -177,11 +179,11 @@ impl Hand {
             }
             Lead::Homing { since } => {
                 let since = *since;
-                let pose = self.driver.advance(ground.skin, ground.fine, dt);
-                let off = (self.driver.place().point - ground.home.point).norm();
-                if off < ARRIVED && self.driver.is_lifted()
-                    || now.saturating_duration_since(since) > HOMING
-                {
+                let pose = self.driver.advance(ground.skin, dt);
+                let off = |from: Vec3| (ground.home.point - from).norm();
+                let is_home = off(self.driver.place().point) < ARRIVED && self.driver.is_lifted();
+                let is_fine = (ground.fine).is_none_or(|(middle, r)| off(middle) < FINE * r);
+                if is_home && is_fine || now.saturating_duration_since(since) > HOMING {
                     let at = frame.inverse_transform_point(&Point3::from(self.driver.tip()));
                     let path = once_from(at.coords, ground.scene, frame);
                     self.lead = Lead::Moving { path, time: 0.0 };
@@ -198,7 +200,7 @@ impl Hand {
                 return frame * Pose::translation(at.x, at.y, at.z);
             }
         }
-        self.driver.advance(ground.skin, ground.fine, dt)
+        self.driver.advance(ground.skin, dt)
     }
 }
 

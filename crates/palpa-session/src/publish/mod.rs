@@ -3,7 +3,8 @@
 //!
 //! ```text
 //!  body, tick, look ──► Screen ── mesh before its frames ──────┐
-//!                         └─ Fields, on a thread of their own  ├──► Publisher ──► pages
+//!                         ├─ Fields, on a thread of their own  ├──► Publisher ──► pages
+//!                         └─ Pace: seldom at rest              │
 //!  state, problem ────► Status ── state, figures, notices ─────┘
 //! ```
 
@@ -12,6 +13,7 @@ mod fields;
 mod figures;
 mod frame;
 mod notes;
+mod pace;
 mod screen;
 mod status;
 

@@ -8,6 +8,7 @@ use palpa_viewer::Publisher;
 use palpa_viewer::control::Field;
 use palpa_viewer::wire::FrameSnapshot;
 
+use super::pace::Pace;
 use super::{Fields, frame};
 use crate::stage::Live;
 
@@ -28,6 +29,7 @@ pub(crate) struct Screen {
     shown: Option<u32>,
     n_meshes: u32,
     n_frames: u64,
+    pace: Pace,
 }
 
 impl Screen {
@@ -42,7 +44,19 @@ impl Screen {
             shown: None,
             n_meshes: 0,
             n_frames: 0,
+            pace: Pace::default(),
         }
+    }
+
+    /// Something has changed that ticks do not show: a request, the state, the number of pages.
+    pub(crate) fn wake(&mut self) {
+        self.pace.wake();
+    }
+
+    /// Whether a frame is due, `dt` seconds after the last call: each time while something moves, twice a
+    /// second at rest. `recorded` is the frame of a recording that is shown instead of the body.
+    pub(crate) fn is_due(&mut self, recorded: Option<&FrameSnapshot>, dt: f64) -> bool {
+        self.pace.is_due(recorded.unwrap_or(&self.frame), dt)
     }
 
     /// Whether any page is connected.

@@ -30,6 +30,7 @@ uniform float layerOpacity[${MAX_LAYERS}];
 uniform float layerGrain[${MAX_LAYERS}];
 uniform float isMapped;
 uniform float isPlain;
+uniform float grain;
 uniform int nLumps;
 uniform vec3 lumpCentre[${MAX_LUMPS}];
 uniform mat3 lumpAxes[${MAX_LUMPS}];
@@ -56,11 +57,11 @@ void main() {
   vec3 c = layerColours[k];
   if (isMapped > 0.5) {
     c = mapped(vValue);
-  } else if (isPlain < 0.5) {
+  } else if (isPlain < 0.5 && grain > 0.5) {
     // The grain of tissue: fat in lobules, muscle in fibres along the limb.
-    float grain = layerGrain[k];
-    if (grain > 1.5) c *= 1.0 + 0.16 * (noise(vRest * vec3(220.0, 900.0, 900.0)) - 0.5) + 0.10 * (noise(vRest * vec3(60.0, 260.0, 260.0)) - 0.5);
-    else if (grain > 0.5) c *= 1.0 + 0.09 * (noise(vRest * 420.0) - 0.5) + 0.05 * (noise(vRest * 1200.0) - 0.5);
+    float kind = layerGrain[k];
+    if (kind > 1.5) c *= 1.0 + 0.16 * (noise(vRest * vec3(220.0, 900.0, 900.0)) - 0.5) + 0.10 * (noise(vRest * vec3(60.0, 260.0, 260.0)) - 0.5);
+    else if (kind > 0.5) c *= 1.0 + 0.09 * (noise(vRest * 420.0) - 0.5) + 0.05 * (noise(vRest * 1200.0) - 0.5);
     else c *= 1.0 + 0.05 * (noise(vRest * 1100.0) - 0.5);
   }
   float alpha = layerOpacity[k];

@@ -35,6 +35,7 @@ uniform float opacity;
 uniform float isMapped;
 uniform float isFlat;
 uniform float skin;
+uniform float grain;
 uniform vec3 light;
 varying vec3 vRest;
 varying vec3 vNormal;
@@ -65,8 +66,11 @@ void main() {
   } else if (skin > 0.0) {
     // Mottling of blood under skin, broad and fine. By the place at rest, so that it
     // moves with the tissue.
-    float broad = noise(vRest * 55.0) + 0.5 * noise(vRest * 130.0) - 0.75;
-    float fine = noise(vRest * 900.0) - 0.5;
+    float broad = 0.0, fine = 0.0;
+    if (grain > 0.5) {
+      broad = noise(vRest * 55.0) + 0.5 * noise(vRest * 130.0) - 0.75;
+      fine = noise(vRest * 900.0) - 0.5;
+    }
     base *= 1.0 + skin * (vec3(0.05, -0.06, -0.06) * broad + 0.045 * fine);
     shine *= 1.0 + 0.5 * fine * skin;
   }
