@@ -118,6 +118,7 @@ export const en = {
   'curve.from': 'axis starts at {force} N',
   'curve.felt': 'felt best',
   'curve.felt_source': 'The skin’s Pacinian receptors respond at 40–800 Hz, most sensitively near 250 Hz (dashed): Bolanowski et al. 1988. No threshold of force is drawn: it depends on the grip.',
+  'curve.no_stroke': 'Press, then move along the skin.',
   'curve.live_only': 'Live only',
   'curve.seek': 'Click or drag to move in time',
 

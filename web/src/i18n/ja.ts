@@ -120,6 +120,7 @@ export const ja: Dictionary = {
   'curve.from': '縦軸は {force} N から',
   'curve.felt': '感じやすい範囲',
   'curve.felt_source': '皮膚のパチニ小体は 40～800 Hz に反応し、250 Hz 付近（破線）で最も敏感です（Bolanowski ほか 1988）。力の閾値は握り方で変わるため、描いていません。',
+  'curve.no_stroke': '押したまま皮膚に沿って動かしてください。',
   'curve.live_only': '再生中は表示できません',
   'curve.seek': 'クリックまたはドラッグで時刻を移動',
 

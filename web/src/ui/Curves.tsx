@@ -224,6 +224,8 @@ function CurveKey({ kind, lines, shown }: { kind: CurveKind; lines: CurveLines; 
   } else if (kind === 'spectrum') {
     words.push(['felt', t('curve.felt')]);
     if (isReplaying.value) return <p class="curve-none">{t('curve.live_only')}</p>;
+  } else if (kind === 'force-distance' && shown?.n === 0) {
+    return <p class="curve-none">{t('curve.no_stroke')}</p>;
   } else if (shown !== null) {
     if (shown.earlier > 0) words.push(['earlier', t('curve.earlier')]);
     if (shown.before > 0) words.push(['before', t('curve.before')]);

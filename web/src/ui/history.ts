@@ -7,8 +7,12 @@ import { Strokes } from './strokes';
 
 /** Longest window of the curves, s. */
 export const LONGEST = 60;
-/** Time between two frames beyond which a line is broken, s: nobody knows what was in it. */
-export const GAP = 0.25;
+/** A line is broken where frames are missing for this time, s, and for so many times the usual one between two
+ * frames, which is long where the page draws slowly. */
+const GAP = 0.25;
+const GAP_PERIODS = 4;
+/** Longest time between two frames that counts as usual, s. */
+const SLOWEST = 0.5;
 /** Frames come at 60 Hz at most. */
 const CAPACITY = 4096;
 /** Changes smaller than this share of an axis are not seen. */
@@ -31,15 +35,23 @@ export interface Moment {
   tissue: number;
   /** The nearest place of the skin at rest, m. */
   place: readonly [number, number, number];
+  /** Whether the engine reduces the force, after a fault: then no force does not mean that the tool is lifted. */
+  isReduced: boolean;
 }
 
-export type Column = Exclude<keyof Moment, 'place'>;
+/** A moment without values, which breaks lines. */
+export function missing(time: number): Moment {
+  return { time, depth: NaN, force: NaN, axial: NaN, x: NaN, y: NaN, z: NaN, tissue: NaN, place: [NaN, NaN, NaN], isReduced: false };
+}
+
+export type Column = Exclude<keyof Moment, 'place' | 'isReduced'>;
 const COLUMNS: readonly Column[] = ['time', 'depth', 'force', 'axial', 'x', 'y', 'z', 'tissue'];
 
 export function momentOf(frame: FrameSnapshot): Moment {
   const [x, y, z] = frame.force;
   const force = magnitude(frame.force);
-  return { time: frame.time, depth: frame.depth, force, axial: along(frame), x, y, z, tissue: magnitude(frame.tissue_force), place: frame.place };
+  const tissue = magnitude(frame.tissue_force);
+  return { time: frame.time, depth: frame.depth, force, axial: along(frame), x, y, z, tissue, place: frame.place, isReduced: frame.gain < 1 };
 }
 
 /** Lists that slide along buffers of twice their size, so that frames allocate nothing. Where frames are
@@ -54,6 +66,8 @@ export class History {
   private level: Moment | null = null;
   /** Whether the last moment in the lists is as the level. */
   private isLevel = false;
+  /** Usual time between two frames, s. */
+  private period = 1 / 60;
   private listeners = new Set<() => void>();
   /** Grows with every change that can be seen. */
   version = 0;
@@ -71,7 +85,11 @@ export class History {
     if (moment.time === last) return;
     // Earlier values belong to an engine that was started before. Runs and strokes stay, to compare.
     if (moment.time < last || moment.time > last + LONGEST) this.forgetTimes();
-    else if (moment.time > last + GAP) this.breakLines(last);
+    else {
+      const span = moment.time - last;
+      if (span > Math.max(GAP, GAP_PERIODS * this.period)) this.breakLines(last);
+      this.period += 0.2 * (Math.min(span, SLOWEST) - this.period);
+    }
     const wasSeen = this.runs.push(moment);
     const wasFelt = this.strokes.push(moment);
     if (this.level !== null && isAsBefore(moment, this.level)) {
@@ -137,10 +155,10 @@ export class History {
   }
 
   private breakLines(after: number): void {
-    this.append({ time: after + 1e-6, depth: NaN, force: NaN, axial: NaN, x: NaN, y: NaN, z: NaN, tissue: NaN, place: [NaN, NaN, NaN] });
+    this.append(missing(after + 1e-6));
     this.level = null;
     this.runs.break();
-    this.strokes.end();
+    this.strokes.break();
   }
 
   private append(moment: Moment): void {

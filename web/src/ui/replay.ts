@@ -5,7 +5,7 @@ import type { RecordingCurve } from '../generated/api';
 import { apiUrl } from '../connection';
 import { t } from '../i18n';
 import { isReplaying, notify, onFrame, send, state } from '../store';
-import type { Moment } from './history';
+import { missing, type Moment } from './history';
 
 /** Between two requests of a seek, ms. */
 const SEEK_PERIOD = 50;
@@ -93,10 +93,10 @@ function momentsOf(curve: RecordingCurve): Moment[] {
   const gaps = new Set(curve.gaps);
   const moments: Moment[] = [];
   curve.time.forEach((time, i) => {
-    if (gaps.has(i)) moments.push({ time: curve.time[i - 1], depth: NaN, force: NaN, axial: NaN, x: NaN, y: NaN, z: NaN, tissue: NaN, place: [NaN, NaN, NaN] });
+    if (gaps.has(i)) moments.push(missing(curve.time[i - 1]));
     const [x, y, z] = curve.force[i];
     const place = curve.place[i] as [number, number, number];
-    moments.push({ time, depth: curve.depth[i], force: Math.hypot(x, y, z), axial: curve.axial[i], x, y, z, tissue: curve.tissue_force[i], place });
+    moments.push({ time, depth: curve.depth[i], force: Math.hypot(x, y, z), axial: curve.axial[i], x, y, z, tissue: curve.tissue_force[i], place, isReduced: false });
   });
   return moments;
 }

@@ -38,6 +38,11 @@ export class Runs {
 
   /** Takes a moment. Returns whether a run has changed. */
   push(moment: Moment): boolean {
+    if (moment.isReduced) {
+      this.break();
+      this.felt = moment.time;
+      return false;
+    }
     const touches = moment.force > TOUCH;
     if (this.now === null) {
       const before = this.before;

@@ -30,7 +30,7 @@ export interface Stroke {
   places: Vec3[];
   /** Way from the start, m. */
   ways: number[];
-  /** N. */
+  /** N; NaN where moments are missing. */
   forces: number[];
 }
 
@@ -54,6 +54,11 @@ export class Strokes {
 
   /** Takes a moment. Returns whether a stroke has changed. */
   push(moment: Moment): boolean {
+    if (moment.isReduced) {
+      this.break();
+      this.felt = moment.time;
+      return false;
+    }
     if (moment.force <= TOUCH || !Number.isFinite(moment.place[0])) {
       if (moment.time > this.felt + LIFTED) this.end();
       return false;
@@ -61,7 +66,12 @@ export class Strokes {
     this.felt = moment.time;
     if (this.now === null) {
       this.anchor ??= moment;
-      if (distance(moment.place, this.anchor.place) < RESTING) return false;
+      const { place } = this.anchor;
+      if (distance(moment.place, place) < RESTING) {
+        // The force just before it moves, not that of the first touch.
+        this.anchor = { ...moment, place };
+        return false;
+      }
       this.begin(this.anchor);
     }
     const { places, times } = this.now!;
@@ -82,6 +92,15 @@ export class Strokes {
     this.now = null;
     this.anchor = null;
     this.isStroke = false;
+  }
+
+  /** Moments are missing: the line is broken, and the way goes on. */
+  break(): void {
+    if (this.now === null || Number.isNaN(this.now.forces.at(-1))) return;
+    this.now.times.push(this.now.times.at(-1)!);
+    this.now.places.push(this.now.places.at(-1)!);
+    this.now.ways.push(this.now.ways.at(-1)!);
+    this.now.forces.push(NaN);
   }
 
   clear(): void {

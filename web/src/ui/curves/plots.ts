@@ -26,6 +26,8 @@ const FAINTEST = 1e-5;
 
 /** What the key of a plot has to name. */
 export interface Shown {
+  /** Runs or strokes, ghosts among them. */
+  n: number;
   /** Ghosts of the same body, and of bodies before a change. */
   earlier: number;
   before: number;
@@ -34,7 +36,7 @@ export interface Shown {
   /** Where the axis of force begins, if it is not zero, N. */
   from: number | null;
 }
-const NOTHING: Shown = { earlier: 0, before: 0, gaps: 0, from: null };
+const NOTHING: Shown = { n: 0, earlier: 0, before: 0, gaps: 0, from: null };
 
 /** The course of a recording, in place of live data. */
 export interface Course {
@@ -77,7 +79,10 @@ export class Plot {
       };
       if (kind === 'force-distance') {
         this.strokes = new Strokes(Infinity);
-        for (const moment of moments) if (Number.isNaN(moment.force)) this.strokes.end(); else this.strokes.push(moment);
+        for (const moment of moments) {
+          if (Number.isNaN(moment.force)) this.strokes.break();
+          else this.strokes.push(moment);
+        }
       }
     }
     this.plot = new uPlot(this.options(), this.data(), element);
@@ -263,7 +268,7 @@ export class Plot {
       const [offset, sign] = onAxisOf(newest, stroke);
       stroke.forces.forEach((force, i) => {
         const x = (offset + sign * stroke.ways[i]) * 1e3;
-        if (x < 0 || x > length) return;
+        if (x < 0 || x > length || Number.isNaN(force)) return;
         least = Math.min(least, force);
         most = Math.max(most, force);
       });
@@ -480,20 +485,21 @@ function labels(unit: string): uPlot.Axis.Values {
 }
 
 /** Labels at powers of ten: "10 mN". */
-function decade(value: number): string | null {
+function decade(value: number | null): string | null {
+  if (value === null || value <= 0) return null;
   const power = Math.log10(value);
   if (Math.abs(power - Math.round(power)) > 1e-6) return null;
   return value < 0.9e-3 ? `${Math.round(value * 1e6)} µN` : value < 0.9 ? `${Math.round(value * 1e3)} mN` : `${Math.round(value)} N`;
 }
 
 /** Ghosts before the newest, of its body and of bodies before. */
-function kinds(all: readonly { body: string }[]): { earlier: number; before: number } {
+function kinds(all: readonly { body: string }[]): { n: number; earlier: number; before: number } {
   const body = history.runs.body;
   // A recording is of one body, and its strokes have no key.
   const isBefore = (one: { body: string }): boolean => one.body !== body && one.body !== '';
   const before = all.filter(isBefore).length;
   const newest = all.at(-1);
-  return { before, earlier: all.length - before - (newest !== undefined && !isBefore(newest) ? 1 : 0) };
+  return { n: all.length, before, earlier: all.length - before - (newest !== undefined && !isBefore(newest) ? 1 : 0) };
 }
 
 function brokenAt(values: readonly number[]): number {
