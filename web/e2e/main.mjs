@@ -7,4 +7,5 @@ import './game.test.mjs';
 import './recording.test.mjs';
 import './scene.test.mjs';
 import './access.test.mjs';
+import './curves.test.mjs';
 import './connection.test.mjs';

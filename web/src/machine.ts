@@ -24,5 +24,5 @@ export function drawPlainly(): void {
 
 /** Times between two drawings of a curve and between two changes of the numbers, ms: more often looks no smoother,
  * and the engine needs the processor too. */
-export const CURVE_PERIOD = isSoftwareWebGL === true ? 250 : 50;
+export const CURVE_PERIOD = isSoftwareWebGL === true ? 250 : 100;
 export const NUMBER_PERIOD = isSoftwareWebGL === true ? 200 : 80;

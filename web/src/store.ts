@@ -194,8 +194,15 @@ export const homeKey = computed(() => state.value?.home.point.join());
 
 /** Changes when another body is chosen. */
 export const galleryKey = computed(() => state.value?.gallery_key);
+/** Changes with the form of the body: curves of one form mean nothing for another. */
+const formKey = computed(() => JSON.stringify([galleryKey.value, scene.value?.body]));
+/** Changes with everything that is pressed, and what presses it. */
+const bodyKey = computed(() => {
+  const { press: _, motion: __, ...body } = scene.value ?? {};
+  return JSON.stringify(body);
+});
 effect(() => {
-  // Curves of one scene mean nothing in another.
-  void galleryKey.value;
+  void formKey.value;
   history.clear();
 });
+effect(() => history.setBody(bodyKey.value));

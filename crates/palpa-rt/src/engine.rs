@@ -11,6 +11,7 @@ use crate::{
     event::{RecordKind, Speaker},
     fault::FaultHooks,
     findings::Board,
+    late::LateTick,
     mailbox::{Reader, mailbox},
     record::StepRecord,
     recorder::{LogFile, Recorder, RecorderParams},
@@ -298,6 +299,12 @@ impl Engine {
     pub fn ended(&self) -> Vec<&'static str> {
         let is_over = |running: &&Running| running.handle.is_finished();
         (self.threads.iter().filter(is_over).map(|r| r.name)).collect()
+    }
+
+    /// Force and energy of the first device in the last ticks, oldest first: those of two seconds,
+    /// but for the last hundredths of a second.
+    pub fn late_ticks(&self) -> Vec<LateTick> {
+        self.findings.lock().late.to_vec()
     }
 
     /// Stops the engine: the forces ramp down, the devices are released, the rings are written to

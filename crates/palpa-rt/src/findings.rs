@@ -4,7 +4,7 @@
     reason = "shared by the recorder and those who ask it; no thread of the 1 kHz path knows of it"
 )]
 
-use crate::{event::Event, smoothness::ForceReport};
+use crate::{event::Event, late::LateTicks, smoothness::ForceReport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Results of the recorder.
@@ -13,6 +13,7 @@ pub(crate) struct Findings {
     pub(crate) forces: Vec<ForceReport>,
     pub(crate) events: Vec<Event>,
     pub(crate) has_file_failed: bool,
+    pub(crate) late: LateTicks,
 }
 
 /// Shared storage of the findings.

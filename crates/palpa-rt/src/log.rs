@@ -105,6 +105,21 @@ pub struct Header {
     pub notes: BTreeMap<String, String>,
 }
 
+impl Header {
+    /// Reads the header of a log, and nothing else of it.
+    ///
+    /// # Errors
+    /// [`LogError`]
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, LogError> {
+        for row in Rows::open(path)? {
+            if let Row::Header(header) = row? {
+                return Ok(header);
+            }
+        }
+        Ok(Self::default())
+    }
+}
+
 /// The rows of a log, in the order in which they were written; each is read when requested.
 pub struct Rows {
     path: PathBuf,

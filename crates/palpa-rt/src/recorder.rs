@@ -8,6 +8,7 @@ use crate::{
     clock::rest,
     event::{Event, Happening, Level, RecordKind},
     findings::Board,
+    late::LateTick,
     layout::Record,
     machine::Machine,
     record::{DeviceRecord, ServoRecord, SpecRecord, StepRecord, TickRecord},
@@ -116,7 +117,7 @@ impl Recorder {
     }
 
     fn drain(&mut self) {
-        let mut events = Vec::new();
+        let (mut events, mut late) = (Vec::new(), Vec::new());
         for ring in &mut self.events {
             while let Ok(event) = ring.pop() {
                 events.push(event);
@@ -124,6 +125,7 @@ impl Recorder {
         }
         while let Ok(entry) = self.ticks.pop() {
             self.last_time = entry.tick.now;
+            late.push(LateTick::from(&entry));
             let n = entry.tick.n_devices as usize;
             for (k, stats) in self.forces.iter_mut().enumerate().take(n) {
                 stats.add(&entry, k);
@@ -133,6 +135,7 @@ impl Recorder {
         while let Ok(step) = self.steps.pop() {
             self.try_file(|file| file.row(file.steps, step.now, &step));
         }
+        self.findings.lock().late.append(&mut late);
         for ((kind, n), said) in (self.counts_lost)().into_iter().zip(&mut self.said_lost) {
             if n > *said {
                 events.push(Event {

@@ -278,7 +278,8 @@ impl Desk {
         self.veil().check_recording()?;
         self.tape.close();
         self.end_motion();
-        let scene = &self.stage.need()?.world.scene;
+        let world = &self.stage.need()?.world;
+        let (scene, ruler) = (&world.scene, Arc::clone(&world.ruler));
         let (text, notes) = (scene.to_toml(), notes_of(scene)?);
         let log = new_log(&self.out)?;
         self.restart(&RecorderParams {
@@ -287,7 +288,7 @@ impl Desk {
             notes,
             machine: machine(),
         })?;
-        self.tape.begin(log);
+        self.tape.begin(log, ruler);
         Ok(())
     }
 
@@ -370,8 +371,13 @@ impl Desk {
             }
             HostFile::Body if !veil.shows_body_file() => None,
             HostFile::Body => self.stage.live()?.body(),
-            HostFile::RecordingLog | HostFile::RecordingCsv => {
-                Some(Material::Log(self.tape.log()?.to_owned()))
+            HostFile::RecordingLog | HostFile::RecordingCsv | HostFile::RecordingCurve => {
+                let (log, ruler) = self.tape.log()?;
+                Some(Material::Log(log.to_owned(), Arc::clone(ruler)))
+            }
+            HostFile::Spectrum => {
+                let ticks = self.stage.live()?.running.engine.late_ticks();
+                Some(Material::Ticks(ticks))
             }
         }
     }

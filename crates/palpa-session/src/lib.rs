@@ -27,6 +27,7 @@ mod publish;
 mod remote;
 mod replay;
 mod session;
+mod spectrum;
 mod stage;
 mod veil;
 mod world;

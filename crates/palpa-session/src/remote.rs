@@ -1,16 +1,20 @@
 //! The server's end of a session: sends orders to the session's thread, and assembles files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use anyhow::Context as _;
+use palpa::live::Ruler;
 use palpa_fem::Model;
 use palpa_mesh::{LayeredBody, Vec3};
-use palpa_rt::Table;
+use palpa_rt::{LEAD, LateTick, Table};
 use palpa_viewer::control::Request;
 use palpa_viewer::{Answer, Clients, Host, HostFile};
 
+use crate::replay::curve_of;
+use crate::spectrum::spectrum;
 use crate::world::World;
 use palpa_plot::vtu::Grid;
 
@@ -32,7 +36,10 @@ pub(super) enum Material {
     Scene(String),
     Tissue(Arc<Model>, Vec<Vec3>),
     Springs(Box<LayeredBody>, Vec<Vec3>),
-    Log(PathBuf),
+    /// The log of the recording, and the skin of its body.
+    Log(PathBuf, Arc<Ruler>),
+    /// The last ticks.
+    Ticks(Vec<LateTick>),
 }
 
 /// The server's end of a session.
@@ -40,6 +47,15 @@ pub(super) enum Material {
 pub struct Remote {
     pub(super) orders: Sender<Order>,
     pub(super) problem: Arc<Mutex<Option<String>>>,
+    pub(super) curve: Mutex<Option<Curve>>,
+}
+
+/// The curve of a recording as JSON. It is kept, because each page asks for it and a long log takes
+/// seconds to read.
+#[derive(Debug)]
+pub(super) struct Curve {
+    log: PathBuf,
+    json: Vec<u8>,
 }
 
 impl Host for Remote {
@@ -61,8 +77,7 @@ impl Host for Remote {
         let Some(material) = material else {
             return Ok(None);
         };
-        written(file, material)
-            .map(Some)
+        self.written(file, material)
             .map_err(|e| palpa::one_paragraph(&e))
     }
 
@@ -72,30 +87,60 @@ impl Host for Remote {
     }
 }
 
-fn written(file: HostFile, material: Material) -> anyhow::Result<Vec<u8>> {
-    Ok(match material {
-        Material::Scene(text) => text.into_bytes(),
-        Material::Tissue(model, displacements) => vtu(model.body(), &displacements)?,
-        Material::Springs(body, displacements) => vtu(&body, &displacements)?,
-        Material::Log(path) if file == HostFile::RecordingCsv => {
-            let folder = tempfile::tempdir()?;
-            palpa_rt::export(&path, folder.path(), Table::Csv)?;
-            joined(
-                &std::fs::read_to_string(folder.path().join("ticks.csv"))?,
-                &std::fs::read_to_string(folder.path().join("device0.csv"))?,
-            )
+impl Remote {
+    fn written(&self, file: HostFile, material: Material) -> anyhow::Result<Option<Vec<u8>>> {
+        Ok(Some(match (material, file) {
+            (Material::Log(log, ruler), HostFile::RecordingCurve) => self.curve(log, &ruler)?,
+            (Material::Ticks(ticks), _) => match spectrum(&ticks) {
+                Some(spectrum) => serde_json::to_vec(&spectrum)?,
+                None => return Ok(None),
+            },
+            (Material::Log(log, ruler), HostFile::RecordingCsv) => csv(&log, &ruler)?,
+            (Material::Log(log, _), _) => std::fs::read(log)?,
+            (Material::Scene(text), _) => text.into_bytes(),
+            (Material::Tissue(model, displacements), _) => vtu(model.body(), &displacements)?,
+            (Material::Springs(body, displacements), _) => vtu(&body, &displacements)?,
+        }))
+    }
+
+    /// The curve of a recording. Others who ask meanwhile wait for it.
+    fn curve(&self, log: PathBuf, ruler: &Ruler) -> anyhow::Result<Vec<u8>> {
+        let mut kept = self.curve.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(curve) = kept.as_ref().filter(|curve| curve.log == log) {
+            return Ok(curve.json.clone());
         }
-        Material::Log(path) => std::fs::read(path)?,
-    })
+        let curve = curve_of(&log, ruler).context("the course of the recording")?;
+        let json = serde_json::to_vec(&curve)?;
+        *kept = Some(Curve {
+            log,
+            json: json.clone(),
+        });
+        Ok(json)
+    }
 }
 
-/// Joins two CSV tables with a row per tick. The second table's first column, the tick, is left
-/// out. Its columns whose names the first table has too get the prefix `device_`.
+/// The table of the ticks of a log.
+fn csv(log: &Path, ruler: &Ruler) -> anyhow::Result<Vec<u8>> {
+    let folder = tempfile::tempdir()?;
+    palpa_rt::export(log, folder.path(), Table::Csv, |device| {
+        ruler.measure(device)
+    })?;
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name));
+    Ok(joined(&read("ticks.csv")?, &read("device0.csv")?))
+}
+
+/// Joins two CSV tables with a row per tick. First come the columns [`LEAD`] of the device, then those of
+/// the tick, then the device's others. The device's number of the tick is left out. Its columns whose
+/// names the first table has too get the prefix `device_`.
 fn joined(ticks: &str, device: &str) -> Vec<u8> {
     let mut out = String::with_capacity(ticks.len() + device.len());
     for (row, (a, b)) in ticks.lines().zip(device.lines()).enumerate() {
+        for cell in b.split(',').take(LEAD.len()) {
+            out.push_str(cell);
+            out.push(',');
+        }
         out.push_str(a);
-        for cell in b.split(',').skip(1) {
+        for cell in b.split(',').skip(LEAD.len() + 1) {
             let is_twice = row == 0 && a.split(',').any(|name| name == cell);
             out.push_str(if is_twice { ",device_" } else { "," });
             out.push_str(cell);
@@ -118,15 +163,17 @@ fn vtu(body: &LayeredBody, displacements: &[Vec3]) -> anyhow::Result<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
-    use super::joined;
+    use super::{LEAD, joined};
 
     #[test]
     fn tables_are_joined_with_each_name_once() {
+        let lead = LEAD.join(",");
         let table = joined(
             "tick,now,faults\n1,0.5,0\n",
-            "tick,force_x,faults\n1,2.5,1\n",
+            &format!("{lead},tick,force_x,faults\n0.5,3,2.5,,,,1,2.5,1\n"),
         );
-        let wanted = "tick,now,faults,force_x,device_faults\n1,0.5,0,2.5,1\n";
+        let wanted =
+            format!("{lead},tick,now,faults,force_x,device_faults\n0.5,3,2.5,,,,1,0.5,0,2.5,1\n");
         assert_eq!(String::from_utf8(table).unwrap(), wanted);
     }
 }

@@ -76,6 +76,7 @@ impl Session {
         let remote = Arc::new(Remote {
             orders: orders.clone(),
             problem: Arc::clone(&problem),
+            curve: Mutex::default(),
         });
         let session = Self {
             params,

@@ -102,8 +102,9 @@ impl Live {
         n_frames: u64,
     ) -> (EngineFigures, Vec<Notice>) {
         let report = self.running.engine.report();
+        let late = self.running.engine.late_ticks();
         self.figures
-            .make(&report, &self.entry, &self.step, n_nodes, n_frames)
+            .make(&report, &late, &self.entry, &self.step, n_nodes, n_frames)
     }
 }
 

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 pub use self::engine::{
     BarProblem, DeviceTrouble, EngineFigures, ErrorBar, EventInfo, EventKind, ForceLimit,
-    GrantedInfo, InjectedFault, LawFault, LostRecords, PriorityInfo, StepResult,
+    GrantedInfo, InjectedFault, LawFault, LostRecords, PriorityInfo, Spectrum, StepResult,
 };
 
 /// A point or a vector.
@@ -442,6 +442,27 @@ pub struct RecordingInfo {
     pub is_replaying: bool,
     /// Whether the recording plays by itself.
     pub is_playing: bool,
+}
+
+/// The course of a whole recording, from the ticks of the 1 kHz loop. Of each stretch of time the ticks
+/// with the least and the largest force and depth are kept, so that peaks stay. All lists have the
+/// same length, at most some 2000.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordingCurve {
+    /// Time since the start of the recording, s, ascending.
+    pub time: Vec<f64>,
+    /// Depth of the tool's tip below the skin at rest, along the normal at `place`, m.
+    pub depth: Vec<f64>,
+    /// The nearest place of the skin at rest, m.
+    pub place: Vec<Vec3>,
+    /// Force on the hand, N.
+    pub force: Vec<Vec3>,
+    /// Its component along the tool's axis, N.
+    pub axial: Vec<f64>,
+    /// Size of the tissue's force by the local model, before the limits of the device, N.
+    pub tissue_force: Vec<f64>,
+    /// Indices of the points before which ticks are missing: curves are broken there.
+    pub gaps: Vec<u32>,
 }
 
 /// A round of "find the lump".

@@ -49,4 +49,8 @@ pub enum HostFile {
     RecordingLog,
     /// The recording's ticks (CSV).
     RecordingCsv,
+    /// The course of the recording ([`RecordingCurve`](crate::control::RecordingCurve), JSON).
+    RecordingCurve,
+    /// Spectrum of the force in the last second ([`Spectrum`](crate::control::Spectrum), JSON).
+    Spectrum,
 }

@@ -164,8 +164,13 @@ fn engine(page: &mut Page, figures: &crate::control::EngineFigures) {
         figures.energy_out,
     );
     page.gauge(
+        "palpa_energy_unpaid_joules",
+        "Energy given to the hand that nothing paid for: the largest since the last figures.",
+        figures.energy_unpaid,
+    );
+    page.gauge(
         "palpa_energy_budget_joules",
-        "Energy that may be given out beyond what was taken in.",
+        "Bound on palpa_energy_unpaid_joules.",
         figures.energy_budget,
     );
     page.gauge(

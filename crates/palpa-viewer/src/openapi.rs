@@ -1,6 +1,6 @@
 //! The control API's document (OpenAPI 3.1), generated from the types.
 
-use crate::control::{EngineFigures, Envelope, Message, Reply, State};
+use crate::control::{EngineFigures, Envelope, Message, RecordingCurve, Reply, Spectrum, State};
 use schemars::Schema;
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
@@ -24,6 +24,16 @@ pub fn document() -> Value {
         &mut generator,
         "Figures of the engine.",
         SchemaGenerator::subschema_for::<EngineFigures>,
+    );
+    let curve = body(
+        &mut generator,
+        "The course of the recording.",
+        SchemaGenerator::subschema_for::<RecordingCurve>,
+    );
+    let spectrum = body(
+        &mut generator,
+        "Amplitudes of the force over about the last second.",
+        SchemaGenerator::subschema_for::<Spectrum>,
     );
     let reply = body(
         &mut generator,
@@ -76,6 +86,13 @@ pub fn document() -> Value {
             "/api/body.vtu": file("The deformed body", "application/xml", "For ParaView and other readers of VTK files."),
             "/api/recording.mcap": file("The recording", "application/octet-stream", "A log for `palpa replay`."),
             "/api/recording.csv": file("The ticks of the recording", "text/csv", "One row for each tick of the 1 kHz loop."),
+            "/api/recording/curve": { "get": { "summary": "The course of the recording, in a bounded number of points", "responses": {
+                "200": curve, "404": { "description": "There is no recording yet." },
+                "500": { "description": "The log cannot be read. The text says why." },
+                "503": { "description": "Too many files are being made." } } } },
+            "/api/spectrum": { "get": { "summary": "The spectrum of the force", "responses": {
+                "200": spectrum, "404": { "description": "The engine has not run for a second yet." },
+                "503": { "description": "Too many files are being made." } } } },
             "/ws": { "get": {
                 "summary": "The WebSocket",
                 "description": "Text messages are `Message` from the server and `Envelope` from the client. Binary messages are snapshots; \

@@ -54,6 +54,11 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
             "/api/recording.csv",
             get(|hub| file(hub, HostFile::RecordingCsv)),
         )
+        .route(
+            "/api/recording/curve",
+            get(|hub| file(hub, HostFile::RecordingCurve)),
+        )
+        .route("/api/spectrum", get(|hub| file(hub, HostFile::Spectrum)))
         .route("/metrics", get(figures))
         .layer(DefaultBodyLimit::max(MAX_MESSAGE))
         .route_layer(from_fn_with_state(Arc::clone(hub), guard::token));
@@ -199,6 +204,8 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
         HostFile::Body => ("application/xml", "body.vtu"),
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),
+        HostFile::RecordingCurve => ("application/json", "curve of a recording"),
+        HostFile::Spectrum => ("application/json", "spectrum"),
     };
     let Ok(permit) = Arc::clone(&hub.files).try_acquire_owned() else {
         let why = "other files are being made; ask again when they are there\n";
@@ -213,12 +220,14 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
     .await;
     match made {
         Ok(Ok(Some(bytes))) => {
+            let mut response = ([(header::CONTENT_TYPE, kind)], bytes).into_response();
             let disposition = format!("attachment; filename=\"{name}\"");
-            let headers = [
-                (header::CONTENT_TYPE, kind.to_owned()),
-                (header::CONTENT_DISPOSITION, disposition),
-            ];
-            (headers, bytes).into_response()
+            if kind != "application/json"
+                && let Ok(disposition) = disposition.parse()
+            {
+                (response.headers_mut()).insert(header::CONTENT_DISPOSITION, disposition);
+            }
+            response
         }
         Ok(Ok(None)) => {
             (StatusCode::NOT_FOUND, format!("there is no {name} yet\n")).into_response()

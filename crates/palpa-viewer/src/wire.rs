@@ -9,7 +9,7 @@
 use std::fmt::Write as _;
 
 /// Increased with every change of a field.
-pub const SNAPSHOT_VERSION: u32 = 2;
+pub const SNAPSHOT_VERSION: u32 = 3;
 
 /// A type that a snapshot can hold.
 trait Wire {
@@ -150,6 +150,10 @@ snapshot! {
         orientation: [f64; 4],
         /// Force on the hand commanded at this tick, N.
         force: [f64; 3],
+        /// Force of the tissue on the hand by the local model, before the limits of the device, N.
+        tissue_force: [f64; 3],
+        /// The place of the skin at rest that is nearest to the tool's tip, m.
+        place: [f64; 3],
         /// Depth of the tip below the skin at rest, m.
         depth: f64,
         /// Largest depth that the hand presses there, m; the thickness of the tissue limits it.

@@ -54,6 +54,7 @@ pub mod build;
 pub mod continuum;
 mod error;
 pub mod live;
+pub mod map;
 mod note;
 mod prepare;
 pub mod press;

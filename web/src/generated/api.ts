@@ -305,6 +305,63 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recording/curve": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The course of the recording, in a bounded number of points */
+        get: {
+            parameters: {
+                query?: never;
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description The course of the recording. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/json": components["schemas"]["RecordingCurve"];
+                    };
+                };
+                /** @description There is no recording yet. */
+                404: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The log cannot be read. The text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scene.toml": {
         parameters: {
             query?: never;
@@ -340,6 +397,56 @@ export interface paths {
                 };
                 /** @description The file cannot be made. The text says why. */
                 500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/spectrum": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The spectrum of the force */
+        get: {
+            parameters: {
+                query?: never;
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description Amplitudes of the force over about the last second. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/json": components["schemas"]["Spectrum"];
+                    };
+                };
+                /** @description The engine has not run for a second yet. */
+                404: {
                     headers: {
                         [name: string]: unknown;
                     };
@@ -655,7 +762,13 @@ export interface components {
         EngineFigures: {
             /**
              * Format: double
-             * @description Energy that the device may still give out beyond the energy taken in, J.
+             * @description The largest damping that the energy observer injected since the last figures, N s/m.
+             */
+            damping: number;
+            /**
+             * Format: double
+             * @description Bound on `energy_unpaid`, J. From 60 % of it the loop damps the hand gently, and beyond it as
+             *     much as the device can.
              */
             energy_budget: number;
             /**
@@ -668,6 +781,13 @@ export interface components {
              * @description Energy given to the hand since the start, J.
              */
             energy_out: number;
+            /**
+             * Format: double
+             * @description Energy that the loop gave to the hand and that neither the hand's work nor the tissue's stored
+             *     energy paid for, J: the largest since the last figures. This is the quantity that the energy
+             *     observer bounds: the negative of its bank.
+             */
+            energy_unpaid: number;
             /** @description The error bar of the force where the tool presses. */
             error_bar: components["schemas"]["ErrorBar"];
             /** @description The latest events, newest last. */
@@ -1339,6 +1459,27 @@ export interface components {
             /** @description The system's reason. */
             reason: string;
         };
+        /**
+         * @description The course of a whole recording, from the ticks of the 1 kHz loop. Of each stretch of time the ticks
+         *     with the least and the largest force and depth are kept, so that peaks stay. All lists have the
+         *     same length, at most some 2000.
+         */
+        RecordingCurve: {
+            /** @description Its component along the tool's axis, N. */
+            axial: number[];
+            /** @description Depth of the tool's tip below the skin at rest, along the normal at `place`, m. */
+            depth: number[];
+            /** @description Force on the hand, N. */
+            force: number[][];
+            /** @description Indices of the points before which ticks are missing: curves are broken there. */
+            gaps: number[];
+            /** @description The nearest place of the skin at rest, m. */
+            place: number[][];
+            /** @description Time since the start of the recording, s, ascending. */
+            time: number[];
+            /** @description Size of the tissue's force by the local model, before the limits of the device, N. */
+            tissue_force: number[];
+        };
         /** @description The recording. */
         RecordingInfo: {
             /**
@@ -1362,6 +1503,25 @@ export interface components {
              * @description Number of the request.
              */
             id?: number | null;
+        };
+        /**
+         * @description Amplitude spectrum of the commanded force over about the last second. Each axis is transformed for
+         *     itself, without its mean and with Hann's window; an amplitude is the norm over the three axes. A
+         *     vibration of 10 mN along an axis has the amplitude 10 mN.
+         */
+        Spectrum: {
+            /** @description Amplitudes at 0, `step`, 2 `step`, … up to half the rate of the loop, N. */
+            amplitude: number[];
+            /**
+             * Format: double
+             * @description Distance between two frequencies, Hz.
+             */
+            step: number;
+            /**
+             * Format: double
+             * @description Time of the newest tick in it, s since the engine's start.
+             */
+            time: number;
         };
         /** @description Everything that pages show, except the moving body. */
         State: {
@@ -1486,8 +1646,10 @@ export type NoticeLevel = components['schemas']['NoticeLevel'];
 export type Phase = components['schemas']['Phase'];
 export type PriorityInfo = components['schemas']['PriorityInfo'];
 export type Problem = components['schemas']['Problem'];
+export type RecordingCurve = components['schemas']['RecordingCurve'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type Reply = components['schemas']['Reply'];
+export type Spectrum = components['schemas']['Spectrum'];
 export type State = components['schemas']['State'];
 export type StepResult = components['schemas']['StepResult'];
 export type ToolInfo = components['schemas']['ToolInfo'];

@@ -1,6 +1,6 @@
 // Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.
 
-export const SNAPSHOT_VERSION = 2;
+export const SNAPSHOT_VERSION = 3;
 
 class Reader {
   private at = 0;
@@ -98,6 +98,10 @@ export interface FrameSnapshot {
   orientation: [number, number, number, number];
   /** Force on the hand commanded at this tick, N. */
   force: [number, number, number];
+  /** Force of the tissue on the hand by the local model, before the limits of the device, N. */
+  tissue_force: [number, number, number];
+  /** The place of the skin at rest that is nearest to the tool's tip, m. */
+  place: [number, number, number];
   /** Depth of the tip below the skin at rest, m. */
   depth: number;
   /** Largest depth that the hand presses there, m; the thickness of the tissue limits it. */
@@ -138,6 +142,8 @@ function readFrameSnapshot(r: Reader): FrameSnapshot {
     tool: [r.f64(), r.f64(), r.f64()],
     orientation: [r.f64(), r.f64(), r.f64(), r.f64()],
     force: [r.f64(), r.f64(), r.f64()],
+    tissue_force: [r.f64(), r.f64(), r.f64()],
+    place: [r.f64(), r.f64(), r.f64()],
     depth: r.f64(),
     deepest: r.f64(),
     gain: r.f64(),

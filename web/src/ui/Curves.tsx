@@ -1,203 +1,239 @@
-// Force over depth, force and depth over time: the last seconds.
+// The curves: force over depth, over time and over the way along the skin, depth over time, and the spectrum
+// of the force. They are drawn when their data has changed, at most ten times a second.
 
-import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
-import { useEffect, useRef } from 'preact/hooks';
+import { effect, signal } from '@preact/signals';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import type { Spectrum } from '../generated/api';
+import { apiUrl } from '../connection';
 import { language, t } from '../i18n';
-import { history, state } from '../store';
+import { history, isController, isReplaying, state, status } from '../store';
 import { CURVE_PERIOD } from '../machine';
-import { axes, roundUp } from './axes';
-import { WINDOW } from './history';
-import { theme } from './settings';
+import { axes, largest, roundUp } from './axes';
+import { Button } from './controls';
+import { Plot, type Shown } from './curves/plots';
+import { Icon } from './icons';
+import { formatNumber } from './quantity';
+import { drag, replayCourse, replayTime, seek } from './replay';
+import {
+  CURVES, CURVE_LINES, CURVE_WINDOWS, chooseCurve, curveKinds, curveLines, curveWindow, theme,
+  type CurveKind, type CurveLines,
+} from './settings';
 
-const FONT = '11px system-ui, sans-serif';
-/** The newest part of the force–depth curve, s. Older parts are paler. */
-const FRESH = 2;
+/** Between two spectra, ms. */
+const SPECTRUM_PERIOD = 500;
 
-type Kind = 'force-depth' | 'force-time' | 'depth-time';
+/** The plots on the page that show live data. */
+const plots = new Set<Plot>();
+let timer = 0;
+let drawnAt = 0;
+
+/** Draws all plots soon, unless that is under way. */
+function drawSoon(): void {
+  if (timer !== 0 || plots.size === 0) return;
+  const wait = Math.max(0, drawnAt + CURVE_PERIOD - performance.now());
+  timer = window.setTimeout(() => requestAnimationFrame(drawAll), wait);
+}
+
+function drawAll(): void {
+  timer = 0;
+  drawnAt = performance.now();
+  const most = history.runs.all.map((run) => run.most);
+  axes.settle(
+    Math.max(largest(history.list('force')), ...most.map(({ force }) => force), 0),
+    Math.max(largest(history.list('depth')), ...most.map(({ depth }) => depth), 0),
+  );
+  for (const plot of plots) if (plot.isVisible) plot.draw();
+}
+
+history.onChange(drawSoon);
 
 export function Curves() {
-  // The plots keep their colours and words, so new ones are made when those change.
-  const key = `${theme.value}-${language.value}`;
-  const now = state.value;
-  const usual = now?.usual_depth ?? 0.004;
-  axes.setLeast(1, roundUp(usual));
+  axes.setLeast(1, roundUp(state.value?.usual_depth ?? 0.004));
   return (
-    <div class="curves" key={key}>
-      <Curve kind="force-depth" />
-      <Curve kind="force-time" />
-      <Curve kind="depth-time" />
+    <div class="curves">
+      {curveKinds.value.map((kind, place) => <Curve key={place} place={place} kind={kind} />)}
     </div>
   );
 }
 
-function Curve({ kind }: { kind: Kind }) {
-  const place = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    const element = place.current!;
-    const plot = new uPlot(options(kind, element), emptyData(kind), element);
-    const resize = new ResizeObserver(() => plot.setSize(sizeOf(element)));
-    resize.observe(element);
-    let frame = 0;
-    let drawnVersion = -1;
-    let drawnAt = 0;
-    const draw = (now: number): void => {
-      frame = requestAnimationFrame(draw);
-      if (history.version === drawnVersion || now - drawnAt < CURVE_PERIOD) return;
-      drawnVersion = history.version;
-      drawnAt = now;
-      if (kind === 'force-depth') axes.settle(history.forces, history.depths);
-      plot.setData(dataOf(kind));
-    };
-    frame = requestAnimationFrame(draw);
-    return () => {
-      cancelAnimationFrame(frame);
-      resize.disconnect();
-      plot.destroy();
-    };
-  }, []);
-  const name = t(`curve.${kind}`);
+function Curve({ place, kind }: { place: number; kind: CurveKind }) {
+  const [shown] = useState(() => signal<Shown | null>(null));
+  const isOverTime = kind === 'force-time' || kind === 'depth-time';
+  // The plots keep their colours and words, so new ones are made when those change.
+  const course = isReplaying.value ? replayCourse.value : null;
+  const key = [kind, theme.value, language.value, isReplaying.value, course !== null, isOverTime && [curveLines.value, curveWindow.value]].join();
   return (
-    <figure class="curve">
+    <figure class="curve" data-testid={`curve-figure-${kind}`} data-earlier={shown.value?.earlier} data-before={shown.value?.before} data-gaps={shown.value?.gaps} data-from={shown.value?.from}>
       <figcaption>
-        {name}
-        {kind === 'force-time' && (
-          <span class="key">
-            <span class="key-force">|F|</span>
-            <span class="key-axial">{t('curve.axial')}</span>
-          </span>
-        )}
+        <Pick
+          label={t('curve.choose')}
+          value={kind}
+          options={CURVES.map((one) => [one, t(`curve.${one}`)])}
+          onChange={(chosen) => chooseCurve(place, chosen)}
+          testid={`curve-choose-${place}`}
+          isTitle
+        />
+        <span class="curve-tools">
+          {kind === 'force-time' && (
+            <Pick
+              label={t('curve.lines')}
+              value={curveLines.value}
+              options={CURVE_LINES.map((one) => [one, t(`curve.lines_${one}`)])}
+              onChange={(chosen) => (curveLines.value = chosen)}
+              testid="curve-lines"
+            />
+          )}
+          {isOverTime && !isReplaying.value && (
+            <Pick
+              label={t('curve.window')}
+              value={curveWindow.value}
+              options={CURVE_WINDOWS.map((one) => [one, `${one} s`])}
+              onChange={(chosen) => (curveWindow.value = chosen)}
+              testid={`curve-window-${kind}`}
+            />
+          )}
+          {(kind === 'force-depth' || kind === 'force-distance') && !isReplaying.value && (
+            <Button kind="quiet" label={t('curve.clear')} onClick={() => history.clearGhosts()} testid={`curve-clear-${kind}`}><Icon name="close" /></Button>
+          )}
+        </span>
       </figcaption>
-      <div ref={place} class="curve-place" role="img" aria-label={name} data-testid={`curve-${kind}`} />
+      <Place key={key} kind={kind} take={(next) => (shown.value = next)} />
+      <CurveKey kind={kind} lines={curveLines.value} shown={shown.value} />
     </figure>
   );
 }
 
-// Data
-
-const relative = new Float64Array(1200);
-const millimetres = new Float64Array(1200);
-
-/** Seconds before now: the axis stands still while the curve moves. */
-function relativeTimes(): Float64Array {
-  const times = history.times;
-  const now = times.length > 0 ? times[times.length - 1] : 0;
-  for (let i = 0; i < times.length; i++) relative[i] = times[i] - now;
-  return relative.subarray(0, times.length);
+/** A menu in the caption of a curve. */
+function Pick<T extends string>(props: {
+  label: string;
+  value: T;
+  options: readonly (readonly [value: T, label: string])[];
+  onChange: (value: T) => void;
+  testid: string;
+  isTitle?: boolean;
+}) {
+  return (
+    <select
+      class={props.isTitle ? 'curve-pick title' : 'curve-pick'}
+      aria-label={props.label}
+      title={props.label}
+      value={props.value}
+      onChange={(event) => props.onChange(event.currentTarget.value as T)}
+      data-testid={props.testid}
+    >
+      {props.options.map(([value, label]) => <option key={value} value={value}>{label}</option>)}
+    </select>
+  );
 }
 
-function depthsInMillimetres(): Float64Array {
-  const depths = history.depths;
-  for (let i = 0; i < depths.length; i++) millimetres[i] = depths[i] * 1e3;
-  return millimetres.subarray(0, depths.length);
-}
-
-function dataOf(kind: Kind): uPlot.AlignedData {
-  switch (kind) {
-    case 'force-depth':
-      // uPlot's type knows aligned data only; facets are documented for mode 2.
-      return [null, [depthsInMillimetres(), history.forces]] as unknown as uPlot.AlignedData;
-    case 'force-time':
-      return [relativeTimes(), history.axials, history.forces];
-    case 'depth-time':
-      return [relativeTimes(), depthsInMillimetres()];
-  }
-}
-
-function emptyData(kind: Kind): uPlot.AlignedData {
-  const none = new Float64Array(0);
-  if (kind === 'force-depth') return [null, [none, none]] as unknown as uPlot.AlignedData;
-  return kind === 'force-time' ? [none, none, none] : [none, none];
-}
-
-// Looks
-
-function sizeOf(element: HTMLElement): { width: number; height: number } {
-  return { width: Math.max(80, element.clientWidth), height: Math.max(60, element.clientHeight) };
-}
-
-function options(kind: Kind, element: HTMLElement): uPlot.Options {
-  const style = getComputedStyle(element);
-  const colour = (name: string): string => style.getPropertyValue(name).trim();
-  const axis: uPlot.Axis = {
-    stroke: colour('--ink-muted'),
-    font: FONT,
-    grid: { stroke: colour('--grid'), width: 1 },
-    ticks: { stroke: colour('--grid'), width: 1, size: 3 },
-    gap: 3,
-  };
-  const isPhase = kind === 'force-depth';
-  const isDepth = kind === 'depth-time';
-  // Depths above the skin are negative; a little of them is shown.
-  const depthRange = (): [number, number] => [-0.2 * axes.depth * 1e3, axes.depth * 1e3];
-  const forceRange = (): [number, number] => [0, axes.force];
-  const lines: uPlot.Series[] = isPhase
-    ? [{ paths: drawPhase(colour('--force')) as unknown as uPlot.Series.PathBuilder }]
-    : isDepth
-      ? [{ stroke: colour('--depth'), width: 1.75, points: { show: false } }]
-      : [
-          { stroke: colour('--ink-muted'), width: 1.25, dash: [4, 3], points: { show: false } },
-          { stroke: colour('--force'), width: 1.75, points: { show: false } },
-        ];
-  return {
-    ...sizeOf(element),
-    mode: isPhase ? 2 : 1,
-    legend: { show: false },
-    cursor: { show: false },
-    padding: [6, isPhase ? 22 : 14, 0, 0],
-    scales: {
-      x: { time: false, range: isPhase ? depthRange : () => [-WINDOW, 0] },
-      y: { range: isDepth ? depthRange : forceRange },
-    },
-    axes: [
-      { ...axis, size: 20, space: 40, values: isPhase ? labels(' mm') : labels(' s') },
-      { ...axis, size: 48, space: 24, values: labels(isDepth ? ' mm' : ' N') },
-    ],
-    series: [{}, ...lines],
-  };
-}
-
-/** Labels with the unit at the last number only. */
-function labels(unit: string): uPlot.Axis.Values {
-  return (_plot, splits) =>
-    splits.map((value, index) => {
-      const number = String(Number(value.toPrecision(6))).replace('-', '−');
-      return index === splits.length - 1 ? `${number}${unit}` : number;
+/** The plot in its place. */
+function Place({ kind, take }: { kind: CurveKind; take: (shown: Shown) => void }) {
+  const place = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const element = place.current!;
+    const moments = isReplaying.peek() ? (replayCourse.peek() ?? []) : null;
+    const course = moments === null ? null : { moments, duration: Math.max(state.peek()?.recording.duration ?? 0, moments.at(-1)?.time ?? 0) };
+    const plot = new Plot(element, { kind, lines: curveLines.peek(), window: Number(curveWindow.peek()), course });
+    const resize = new ResizeObserver(() => {
+      plot.resize();
+      if (course !== null) plot.showTime(replayTime.peek());
     });
+    resize.observe(element);
+    const ends = [effect(() => take(plot.shown.value)), () => resize.disconnect(), () => plot.destroy()];
+    if (course !== null) {
+      ends.push(effect(() => plot.showTime(replayTime.value)), seekBy(plot));
+    } else if (kind === 'spectrum') {
+      ends.push(watchSpectrum(plot));
+    } else {
+      plots.add(plot);
+      ends.push(() => plots.delete(plot));
+      drawSoon();
+    }
+    return () => {
+      for (const end of ends) end();
+    };
+  }, []);
+  const isSought = isReplaying.value && kind !== 'spectrum' && isController.value;
+  return (
+    <div
+      ref={place}
+      class={isSought ? 'curve-place sought' : 'curve-place'}
+      role="img"
+      aria-label={t(`curve.${kind}`)}
+      title={isSought ? t('curve.seek') : undefined}
+      data-testid={`curve-${kind}`}
+    />
+  );
 }
 
-/** Draws force over depth, which is no function of the depth: pale where it is old, with a dot
- * at the newest point. */
-function drawPhase(colour: string) {
-  return (plot: uPlot, _series: number): null => {
-    const n = history.length;
-    if (n === 0) return null;
-    const { ctx, bbox } = plot;
-    const times = history.times;
-    const depths = history.depths;
-    const forces = history.forces;
-    const x = (i: number): number => plot.valToPos(depths[i] * 1e3, 'x', true);
-    const y = (i: number): number => plot.valToPos(forces[i], 'y', true);
-    const fresh = times.findIndex((time) => time > times[n - 1] - FRESH);
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = 1.75 * devicePixelRatio;
-    ctx.lineJoin = 'round';
-    for (const [from, to, alpha] of [[0, fresh, 0.35], [Math.max(0, fresh - 1), n - 1, 1]] as const) {
-      ctx.globalAlpha = alpha;
-      ctx.beginPath();
-      for (let i = from; i <= to; i++) ctx.lineTo(x(i), y(i));
-      ctx.stroke();
-    }
-    ctx.globalAlpha = 1;
-    ctx.fillStyle = colour;
-    ctx.beginPath();
-    ctx.arc(x(n - 1), y(n - 1), 3.5 * devicePixelRatio, 0, 2 * Math.PI);
-    ctx.fill();
-    ctx.restore();
-    return null;
+/** Clicks and drags on a curve of a recording go to that time. Returns what ends it. */
+function seekBy(plot: Plot): () => void {
+  const over = plot.over;
+  const go = (event: PointerEvent): void => {
+    const box = over.getBoundingClientRect();
+    const time = plot.timeAt(event.clientX - box.left, event.clientY - box.top);
+    if (time !== null) seek(time);
   };
+  const down = (event: PointerEvent): void => {
+    if (event.button !== 0 || !isController.peek()) return;
+    over.setPointerCapture(event.pointerId);
+    drag(true);
+    go(event);
+  };
+  const move = (event: PointerEvent): void => {
+    if (over.hasPointerCapture(event.pointerId)) go(event);
+  };
+  const up = (): void => drag(false);
+  over.addEventListener('pointerdown', down);
+  over.addEventListener('pointermove', move);
+  over.addEventListener('pointerup', up);
+  over.addEventListener('pointercancel', up);
+  // The listeners go with the element.
+  return up;
+}
+
+/** Asks for spectra while anybody can see them. Returns what ends it. */
+function watchSpectrum(plot: Plot): () => void {
+  let isAsking = false;
+  const ask = async (): Promise<void> => {
+    if (isAsking || document.hidden || status.peek() !== 'open' || !plot.isVisible) return;
+    isAsking = true;
+    try {
+      const response = await fetch(apiUrl('api/spectrum'));
+      // The engine may just have started, or be busy with files: the next one comes soon.
+      if (response.ok) plot.drawSpectrum((await response.json()) as Spectrum);
+    } catch {
+      // The connection says so by itself.
+    } finally {
+      isAsking = false;
+    }
+  };
+  const watch = window.setInterval(() => void ask(), SPECTRUM_PERIOD);
+  return () => window.clearInterval(watch);
+}
+
+/** What the lines are. */
+function CurveKey({ kind, lines, shown }: { kind: CurveKind; lines: CurveLines; shown: Shown | null }) {
+  const words: [look: string, words: string][] = [];
+  if (kind === 'force-time') {
+    if (lines === 'parts') words.push(['part-x', 'x'], ['part-y', 'y'], ['part-z', 'z']);
+    else if (lines === 'size') words.push(['force', '|F|'], ['axial', t('curve.axial')]);
+    else words.push(['force', t('curve.device')], ['tissue', t('curve.tissue')]);
+  } else if (kind === 'spectrum') {
+    words.push(['felt', t('curve.felt')]);
+    if (isReplaying.value) return <p class="curve-none">{t('curve.live_only')}</p>;
+  } else if (kind === 'force-distance' && shown?.n === 0) {
+    return <p class="curve-none">{t('curve.no_stroke')}</p>;
+  } else if (shown !== null) {
+    if (shown.earlier > 0) words.push(['earlier', t('curve.earlier')]);
+    if (shown.before > 0) words.push(['before', t('curve.before')]);
+    if (shown.from !== null) words.push(['', t('curve.from', { force: formatNumber(shown.from) })]);
+  }
+  if (words.length === 0) return null;
+  return (
+    <p class="key" title={kind === 'spectrum' ? t('curve.felt_source') : undefined}>
+      {words.map(([look, text]) => <span key={text} class={look === '' ? 'key-note' : `key-${look}`}>{text}</span>)}
+    </p>
+  );
 }

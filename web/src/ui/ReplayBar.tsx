@@ -1,57 +1,19 @@
 // The bar of a replay: time slider and playback.
 
-import { signal } from '@preact/signals';
-import { useEffect, useId, useRef } from 'preact/hooks';
+import { useId } from 'preact/hooks';
 import { t } from '../i18n';
-import { askAloud, isController, onFrame, send, state } from '../store';
+import { askAloud, isController, state } from '../store';
 import { Button } from './controls';
 import { Icon } from './icons';
+import { KEY_STEP, drag, lastSought, replayTime, seek } from './replay';
 
-/** The time shown, s. */
-const time = signal(0);
-const SEEK_PERIOD = 50;
-/** Step of an arrow key, s: longer than a frame, so that it always reaches another one. */
-const KEY_STEP = 0.05;
-/** Longest time for which frames from before a seek are not shown, ms. */
-const ARRIVAL = 1000;
 const ARROWS: Record<string, number> = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
 export function ReplayBar() {
   const recording = state.value?.recording;
   const id = useId();
-  const isDragging = useRef(false);
-  const wanted = useRef<number | null>(null);
-  // The last time sought, until a frame of it has come: frames on the way show the time before it.
-  const sought = useRef<{ time: number; at: number } | null>(null);
-
-  useEffect(() => {
-    let shownAt = 0;
-    return onFrame((frame) => {
-      const now = performance.now();
-      if (frame.is_replay === 0 || isDragging.current || now - shownAt < 80) return;
-      const last = sought.current;
-      const isOnTheWay = last !== null && Math.abs(frame.time - last.time) > KEY_STEP && now - last.at < ARRIVAL;
-      if (isOnTheWay) return;
-      sought.current = null;
-      shownAt = now;
-      time.value = frame.time;
-    });
-  }, []);
-
   if (recording === undefined || !recording.is_replaying) return null;
-  const seek = (to: number): void => {
-    time.value = to;
-    sought.current = { time: to, at: performance.now() };
-    // Only the newest time is sent.
-    if (wanted.current === null) {
-      window.setTimeout(() => {
-        send({ type: 'seek', time: wanted.current ?? to });
-        wanted.current = null;
-      }, SEEK_PERIOD);
-    }
-    wanted.current = to;
-  };
-  const shown = Math.min(time.value, recording.duration);
+  const shown = Math.min(replayTime.value, recording.duration);
   const cannot = !isController.value;
   return (
     <section class="replay-bar" aria-label={t('record.replay')} data-testid="replay-bar">
@@ -77,13 +39,13 @@ export function ReplayBar() {
           const step = ARROWS[event.key];
           if (step === undefined) return;
           event.preventDefault();
-          seek(Math.min(Math.max((sought.current?.time ?? shown) + step * KEY_STEP, 0), recording.duration));
+          seek(lastSought() + step * KEY_STEP);
         }}
-        onPointerDown={() => (isDragging.current = true)}
+        onPointerDown={() => drag(true)}
         onInput={(event) => seek(event.currentTarget.valueAsNumber)}
-        onChange={() => (isDragging.current = false)}
-        onPointerUp={() => (isDragging.current = false)}
-        onPointerCancel={() => (isDragging.current = false)}
+        onChange={() => drag(false)}
+        onPointerUp={() => drag(false)}
+        onPointerCancel={() => drag(false)}
         data-testid="replay-slider"
       />
       <output for={id}>{shown.toFixed(1)} / {recording.duration.toFixed(1)} s</output>

@@ -54,15 +54,17 @@ class Axes {
     this.forceEnd.grow(force);
     this.depthEnd.grow(depth);
   }
-  settle(forces: Float64Array, depths: Float64Array): void {
-    this.forceEnd.settle(largest(forces));
-    this.depthEnd.settle(largest(depths));
+  /** Takes the largest force and depth shown. */
+  settle(force: number, depth: number): void {
+    this.forceEnd.settle(force);
+    this.depthEnd.settle(depth);
   }
 }
 
 export const axes = new Axes();
 
-function largest(values: Float64Array): number {
+/** The largest positive value; 0 if there is none. */
+export function largest(values: ArrayLike<number>): number {
   let most = 0;
   for (let i = 0; i < values.length; i++) if (values[i] > most) most = values[i];
   return most;

@@ -64,6 +64,33 @@ export type Tab = (typeof TABS)[number];
 export const tab = remembered<Tab>('tab', 'scene', isOneOf(...TABS));
 export const isPanelOpen = remembered('panel', true, isBoolean);
 
+// The curves.
+
+export const CURVES = ['force-depth', 'force-time', 'force-distance', 'depth-time', 'spectrum'] as const;
+export type CurveKind = (typeof CURVES)[number];
+const USUAL_CURVES: readonly CurveKind[] = ['force-depth', 'force-time', 'force-distance'];
+/** What each place for a curve shows, no two the same. */
+export const curveKinds = remembered<readonly CurveKind[]>('curves', USUAL_CURVES, (value) =>
+  Array.isArray(value) && value.length === USUAL_CURVES.length && new Set(value).size === value.length && value.every((one) => CURVES.includes(one as CurveKind)),
+);
+
+/** Shows a curve at a place. If it was at another place, the two change places. */
+export function chooseCurve(at: number, kind: CurveKind): void {
+  const kinds = [...curveKinds.value];
+  const before = kinds.indexOf(kind);
+  if (before >= 0) kinds[before] = kinds[at];
+  kinds[at] = kind;
+  curveKinds.value = kinds;
+}
+
+/** Length of the curves over time, s. */
+export const CURVE_WINDOWS = ['5', '15', '60'] as const;
+export const curveWindow = remembered<(typeof CURVE_WINDOWS)[number]>('curve_window', '15', isOneOf(...CURVE_WINDOWS));
+/** The lines of force over time: its size, its components, or that of the device and the tissue's. */
+export const CURVE_LINES = ['size', 'parts', 'tissue'] as const;
+export type CurveLines = (typeof CURVE_LINES)[number];
+export const curveLines = remembered<CurveLines>('curve_lines', 'size', isOneOf(...CURVE_LINES));
+
 // How the hand presses.
 
 type HandMode = 'press' | 'orbit';

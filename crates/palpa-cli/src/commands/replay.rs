@@ -3,13 +3,16 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use palpa_rt::{Ending, Log, ReplayParams, ReplayReport, Table, Tissue, Verdict, replay_watched};
+use palpa_rt::{
+    Ending, Header, Log, ReplayParams, ReplayReport, Table, Tissue, Verdict, replay_watched,
+};
 use palpa_scene::{ModelKind, Scene};
 use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use palpa::live::{FileState, LiveScene, SpringScene, changed_files, machine, scene_of};
+use palpa::live::{FileState, LiveScene, Ruler, SpringScene, changed_files, machine, scene_of};
+use palpa::one_paragraph;
 
 /// Run a log again and compare the forces, or export it as tables
 ///
@@ -234,13 +237,43 @@ fn damage(ending: &Ending) -> Option<String> {
     }
 }
 
+/// The skin at rest by which depths and places are measured. Without a scene that can be built, the
+/// rest of the log is exported all the same.
+fn ruler(args: &Args, context: &Context) -> anyhow::Result<Option<Ruler>> {
+    let header = Header::read(&args.log)?;
+    let scene = match &args.scene {
+        Some(path) => Ok(Scene::load(path)?),
+        None => scene_of(&header),
+    };
+    if let (Ok(scene), None) = (&scene, &args.scene) {
+        for file in changed_files(&header, scene) {
+            context.note(format!("{}: {}", file.path.display(), file.problem));
+        }
+    }
+    Ok(match scene.and_then(|scene| Ruler::of_scene(&scene)) {
+        Ok(ruler) => Some(ruler),
+        Err(error) => {
+            context.note(format!(
+                "depth and place stay empty, because the body of the log cannot be built: {}",
+                one_paragraph(&error)
+            ));
+            None
+        }
+    })
+}
+
 fn export(args: &Args, format: Format, context: &Context) -> anyhow::Result<Outcome> {
     let table = match format {
         Format::Csv => Table::Csv,
         Format::Parquet => Table::Parquet,
     };
     let out = context.out_dir()?;
-    let tables = palpa_rt::export(&args.log, out.path(), table)?;
+    let spinner = context.progress(0, "building the body of the log");
+    let ruler = ruler(args, context)?;
+    drop(spinner);
+    let tables = palpa_rt::export(&args.log, out.path(), table, |device| {
+        ruler.as_ref()?.measure(device)
+    })?;
     note_ending(&tables.ending, context);
     for file in &tables.files {
         context.say(file.display())?;

@@ -94,6 +94,7 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
     assert_eq!(bench.run(&export).0, 0);
     let n_rows = bench.read("tables/ticks.csv").lines().count() as u64;
     assert_eq!(n_rows, found["ticks"].as_u64().unwrap() + 1);
+    felt_where_it_presses(&bench.read("tables/device0.csv"));
 
     // Another body gives other forces, and the command says so.
     let stiffer = gel().with_layer(0, |_| Layer::elastic("gel", "12 kPa").levels(2));
@@ -105,6 +106,27 @@ fn a_run_is_reported_logged_exported_and_the_same_again() {
         "{found}"
     );
     assert!(found["max_force_difference_n"].as_f64().unwrap() > 1e-3);
+}
+
+/// Depth, force and place come first, and fit together: where the tool is over the flat skin there is no
+/// force, and the largest is deep below it.
+fn felt_where_it_presses(table: &str) {
+    let mut lines = table.lines();
+    let header = lines.next().unwrap();
+    let lead = "time_s,depth_mm,force_n,place_x_mm,place_y_mm,place_z_mm,tick,";
+    assert!(header.starts_with(lead), "{header}");
+    let rows: Vec<Vec<Option<f64>>> = lines
+        .map(|line| line.split(',').take(6).map(|c| c.parse().ok()).collect())
+        .collect();
+    let known: Vec<(f64, f64)> = rows.iter().filter_map(|r| Some((r[1]?, r[2]?))).collect();
+    // The ramp down at the end has no reading of the device.
+    assert!(known.len() > rows.len() / 2, "{} of {}", known.len(), rows.len());
+    let deepest = known.iter().map(|r| r.0).fold(0.0, f64::max);
+    assert!(deepest > 1.0, "{deepest} mm");
+    let above = known.iter().filter(|(depth, _)| *depth < -0.5);
+    assert!(above.clone().count() > 0 && above.clone().all(|(_, force)| *force < 1e-3));
+    let most = known.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    assert!(most.0 > 0.5 * deepest && most.1 > 0.02, "{most:?}");
 }
 
 /// The fine part of the mesh follows the tool: meshes come from the background, and a replay goes

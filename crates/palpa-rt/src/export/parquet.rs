@@ -27,17 +27,19 @@ pub(super) struct ParquetTable {
 }
 
 impl ParquetTable {
-    pub(super) fn create<R: Record>(path: &Path) -> Result<Self> {
-        let mut values = Vec::new();
+    /// `lead` are names of columns of real numbers before those of the record.
+    pub(super) fn create<R: Record>(path: &Path, lead: &[&str]) -> Result<Self> {
+        let mut values = vec![Value::F64(0.0); lead.len()];
         R::default().values(&mut values);
-        let fields = (R::columns().iter().zip(&values))
+        let names = (lead.iter().map(|&name| name.to_owned())).chain(R::columns());
+        let fields = (names.zip(&values))
             .map(|(name, value)| {
                 let (physical, logical) = match value {
                     Value::F64(_) => (Physical::DOUBLE, None),
                     Value::Bool(_) => (Physical::BOOLEAN, None),
                     Value::U64(_) => (Physical::INT64, Some(LogicalType::integer(64, false))),
                 };
-                let field = Type::primitive_type_builder(name, physical)
+                let field = Type::primitive_type_builder(&name, physical)
                     .with_repetition(Repetition::REQUIRED)
                     .with_logical_type(logical)
                     .build()?;

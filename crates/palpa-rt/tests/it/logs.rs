@@ -6,7 +6,10 @@ use crate::{
     toy::Bed,
 };
 use mcap::records::MessageHeader;
-use palpa_rt::{Ending, Engine, Log, Machine, ReplayParams, Table, Verdict, export, replay};
+use palpa_rt::{
+    DeviceRecord, Ending, Engine, Felt, LEAD, Log, Machine, ReplayParams, Table, Verdict, export,
+    replay,
+};
 use std::{
     collections::BTreeMap,
     fs,
@@ -116,7 +119,7 @@ fn a_damaged_log_says_so_and_reads_up_to_there() {
     let n = part.ticks.len();
     assert!(n > 0 && n < log.ticks.len(), "{n}");
     assert_eq!(part.ticks[..], log.ticks[..n]);
-    let tables = export(&path, folder.path().join("csv"), Table::Csv).unwrap();
+    let tables = export(&path, folder.path().join("csv"), Table::Csv, |_| None).unwrap();
     assert_eq!(tables.ending, part.ending);
 }
 
@@ -221,7 +224,7 @@ fn logs_of_other_layouts_and_partial_logs_are_refused_with_the_reason() {
     let as_is = |_: &str, text: String| text;
     let refused = || {
         let why = Log::open(&other).unwrap_err().to_string();
-        let tables = export(&other, folder.path().join("csv"), Table::Csv);
+        let tables = export(&other, folder.path().join("csv"), Table::Csv, |_| None);
         assert_eq!(tables.unwrap_err().to_string(), why);
         why
     };
@@ -312,7 +315,14 @@ fn tables_hold_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (_, log) = run(&path, Bed::new(), |engine, _| go_on(engine, 400, 40, 2));
-    let files = export(&path, folder.path().join("csv"), Table::Csv)
+    // Not known in the first ticks.
+    let measure = |device: &DeviceRecord| {
+        (device.tick > 200).then_some(Felt {
+            depth: 1e-3 * device.position[2],
+            place: [0.0, 0.25, device.position[2]],
+        })
+    };
+    let files = export(&path, folder.path().join("csv"), Table::Csv, measure)
         .unwrap()
         .files;
     let names: Vec<_> = files
@@ -336,6 +346,26 @@ fn tables_hold_the_same_numbers() {
         .collect();
     let want: Vec<f64> = log.ticks.iter().map(|e| e.devices[0].force[2]).collect();
     assert_eq!(forces, want);
+    let mut rows = csv::Reader::from_path(&files[2]).unwrap();
+    let names: Vec<String> = rows.headers().unwrap().iter().map(str::to_owned).collect();
+    assert_eq!(names[..6], LEAD);
+    assert_eq!(names[6], "tick");
+    let mut n_measured = 0;
+    for (row, entry) in rows.records().map(Result::unwrap).zip(&log.ticks) {
+        let lead: Vec<Option<f64>> = row.iter().take(6).map(|c| c.parse().ok()).collect();
+        let device = &entry.devices[0];
+        let force = device.force.iter().map(|f| f * f).sum::<f64>().sqrt();
+        assert_eq!((lead[0], lead[2]), (Some(entry.tick.now), Some(force)));
+        if device.is_there && device.tick > 200 {
+            let z = device.position[2];
+            let wanted = [1e3 * (1e-3 * z), 0.0, 250.0, 1e3 * z].map(Some);
+            assert_eq!([lead[1], lead[3], lead[4], lead[5]], wanted);
+            n_measured += 1;
+        } else {
+            assert_eq!([lead[1], lead[3], lead[4], lead[5]], [None; 4]);
+        }
+    }
+    assert!(n_measured > 0);
     let events = fs::read_to_string(&files[3]).unwrap();
     assert!(events.contains("info,haptic loop started"), "{events}");
 }
@@ -350,9 +380,11 @@ fn parquet_holds_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (_, log) = run(&path, Bed::new(), |engine, _| go_on(engine, 400, 40, 2));
-    let files = export(&path, folder.path().join("parquet"), Table::Parquet)
-        .unwrap()
-        .files;
+    let files = export(&path, folder.path().join("parquet"), Table::Parquet, |_| {
+        None
+    })
+    .unwrap()
+    .files;
     let steps = SerializedFileReader::new(fs::File::open(&files[1]).unwrap()).unwrap();
     let schema = steps.metadata().file_metadata().schema().clone();
     let column = |name: &str| {

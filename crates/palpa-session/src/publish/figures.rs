@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use palpa_rt::{Level, Quantiles, Report, StepRecord, TickEntry};
+use palpa_rt::{LateTick, Level, Quantiles, Report, StepRecord, TickEntry};
 use palpa_servo::{Faults, Limits};
 use palpa_viewer::control::{EngineFigures, ErrorBar, EventInfo, Notice, NoticeKind, NoticeLevel};
 
@@ -21,6 +21,8 @@ pub(crate) struct Figures {
     n_events: usize,
     limits: Limits,
     faults: Faults,
+    /// Time of the newest tick in them, s.
+    ticked: f64,
 }
 
 impl Figures {
@@ -34,6 +36,7 @@ impl Figures {
             n_events: 0,
             limits: Limits::NONE,
             faults: Faults::NONE,
+            ticked: f64::NEG_INFINITY,
         }
     }
 
@@ -43,10 +46,11 @@ impl Figures {
         self.faults |= Faults::from_bits(entry.tick.faults as u16);
     }
 
-    /// The present figures, and a notice of each error of the engine since the last ones.
+    /// The present figures, with the ticks that came `late` last, and a notice of each error of the engine since the last ones.
     pub(crate) fn make(
         &mut self,
         report: &Report,
+        late: &[LateTick],
         entry: &TickEntry,
         step: &StepRecord,
         n_nodes: usize,
@@ -60,6 +64,8 @@ impl Figures {
             .events
             .iter()
             .skip(report.events.len().saturating_sub(LATEST));
+        let since = late.iter().rev().take_while(|tick| tick.now > self.ticked);
+        let most = |of: fn(&LateTick) -> f64| since.clone().map(of).fold(0.0, f64::max);
         let figures = EngineFigures {
             seconds: report.duration,
             tissue_rate: rate(report.steps, self.steps),
@@ -76,7 +82,9 @@ impl Figures {
             faults: events::faults(self.faults),
             energy_in: device.energy_in,
             energy_out: device.energy_out,
+            energy_unpaid: most(|tick| -tick.bank),
             energy_budget: entry.tick.energy_budget,
+            damping: most(|tick| tick.damping),
             step_status: events::recorded(step.status),
             granted: report.granted.iter().map(events::granted).collect(),
             events: events
@@ -107,6 +115,7 @@ impl Figures {
             n_events: report.events.len(),
             limits: Limits::NONE,
             faults: Faults::NONE,
+            ticked: late.last().map_or(self.ticked, |tick| tick.now),
         };
         (figures, notices)
     }

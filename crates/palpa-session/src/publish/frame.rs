@@ -1,6 +1,7 @@
 //! Snapshots of engine and body, in the units and types of the wire.
 
 use nalgebra::Point3;
+use palpa::live::Ruler;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_rt::TickEntry;
 use palpa_servo::Pose;
@@ -63,28 +64,29 @@ pub(super) fn put_tick(
     frame: &mut FrameSnapshot,
     entry: &TickEntry,
     scene_from_device: &Pose,
+    ruler: &Ruler,
     over: &(Vec3, Vec3),
 ) {
     let (tick, device) = (&entry.tick, &entry.devices[0]);
-    let at = Vec3::from(device.position);
-    // The coupling is isotropic: the tool is displaced from the device in the direction of the
-    // tissue's force.
-    let push = Vec3::from(device.tissue_force).try_normalize(1e-9);
-    let tool = at + push.unwrap_or_default() * device.stretch;
-    let place = |p: Vec3| (scene_from_device * Point3::from(p)).coords;
     let turn = nalgebra::UnitQuaternion::try_new(
         nalgebra::Quaternion::from(nalgebra::Vector4::from(device.orientation)),
         0.1,
     );
-    let tip = place(tool);
+    let tip = ruler.tip(device);
     frame.tick = tick.tick as f64;
     frame.time = tick.now;
-    frame.device = place(at).into();
+    frame.device = (scene_from_device * Point3::from(device.position))
+        .coords
+        .into();
     frame.tool = tip.into();
     frame.orientation = (scene_from_device.rotation * turn.unwrap_or_default())
         .coords
         .into();
-    frame.force = (scene_from_device.rotation * Vec3::from(device.force)).into();
+    frame.force = ruler.in_scene(device.force).into();
+    frame.tissue_force = ruler.in_scene(device.tissue_force).into();
+    frame.place = ruler
+        .measure(device)
+        .map_or(over.0.into(), |felt| felt.place);
     frame.depth = over.1.dot(&(over.0 - tip));
     frame.gain = tick.gain;
     frame.n_active = tick.n_active;

@@ -82,6 +82,7 @@ impl Screen {
             &mut self.frame,
             &live.entry,
             &live.world.scene_from_device,
+            &live.world.ruler,
             &(place.point, place.normal),
         );
         self.frame.deepest = live.hand.deepest();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, bail};
+use palpa::live::Ruler;
 use palpa_viewer::wire::FrameSnapshot;
 
 use crate::publish::MeshBytes;
@@ -37,6 +38,7 @@ pub(crate) fn new_log(folder: &Path) -> anyhow::Result<PathBuf> {
 #[derive(Debug)]
 pub(crate) struct Film {
     log: PathBuf,
+    ruler: Arc<Ruler>,
     frames: Vec<FrameSnapshot>,
     meshes: Vec<(u32, MeshBytes)>,
     bytes: usize,
@@ -46,10 +48,11 @@ pub(crate) struct Film {
 }
 
 impl Film {
-    /// An empty film beside the log at `log`.
-    pub(super) fn new(log: PathBuf) -> Self {
+    /// An empty film beside the log at `log`, of a body whose skin is that of `ruler`.
+    pub(super) fn new(log: PathBuf, ruler: Arc<Ruler>) -> Self {
         Self {
             log,
+            ruler,
             frames: Vec::new(),
             meshes: Vec::new(),
             bytes: 0,
@@ -61,6 +64,11 @@ impl Film {
     /// The log of the engine.
     pub(super) fn log(&self) -> &Path {
         &self.log
+    }
+
+    /// The skin of the body that was recorded.
+    pub(super) fn ruler(&self) -> &Arc<Ruler> {
+        &self.ruler
     }
 
     /// Time of the last frame, s.
@@ -122,6 +130,12 @@ fn bytes_of(frame: &FrameSnapshot) -> usize {
 mod tests {
     use super::*;
 
+    fn empty() -> Film {
+        let skin = palpa_mesh::Surface::default();
+        let ruler = Ruler::new(skin, palpa_servo::Pose::identity());
+        Film::new(PathBuf::new(), Arc::new(ruler))
+    }
+
     fn frame(time: f64, mesh: u32, n: usize) -> FrameSnapshot {
         FrameSnapshot {
             time,
@@ -133,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_moment_is_the_last_frame_before_it_with_its_own_mesh() {
-        let mut film = Film::new(PathBuf::new());
+        let mut film = empty();
         assert!(film.at(0.0).is_none());
         let meshes = [1, 2].map(|i| Arc::new(vec![i]));
         for k in 0..10 {
@@ -161,7 +175,7 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_and_the_whole_time_stays() {
-        let mut film = Film::new(PathBuf::new());
+        let mut film = empty();
         let mesh = Arc::new(vec![0; 1000]);
         for k in 0..700 {
             film.add(&frame(0.1 * f64::from(k), 1, 300_000), &mesh);

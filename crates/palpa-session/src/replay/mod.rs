@@ -6,17 +6,21 @@
 //!                        └───── begin ─────┘
 //! ```
 
+mod curve;
 mod film;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context as _, bail};
+use palpa::live::Ruler;
 use palpa_viewer::control::RecordingInfo;
 use palpa_viewer::wire::FrameSnapshot;
 
 use self::film::Film;
 use crate::publish::MeshBytes;
 
+pub(crate) use curve::curve_of;
 pub(crate) use film::new_log;
 
 /// Longest recording, s: the log of one hour has some gigabytes.
@@ -46,9 +50,10 @@ pub(crate) struct Player {
 }
 
 impl Tape {
-    /// Begins a recording whose log is at `log`. The previous recording is dropped.
-    pub(crate) fn begin(&mut self, log: PathBuf) {
-        *self = Self::UnderWay(Film::new(log));
+    /// Begins a recording whose log is at `log`, of a body whose skin is that of `ruler`. The previous
+    /// recording is dropped.
+    pub(crate) fn begin(&mut self, log: PathBuf, ruler: Arc<Ruler>) {
+        *self = Self::UnderWay(Film::new(log, ruler));
     }
 
     /// Whether a recording is under way.
@@ -83,10 +88,10 @@ impl Tape {
         }
     }
 
-    /// The log of the recording, once it is over.
-    pub(crate) fn log(&self) -> Option<&Path> {
+    /// The log of the recording, and the skin of its body, once it is over.
+    pub(crate) fn log(&self) -> Option<(&Path, &Arc<Ruler>)> {
         match self {
-            Self::Over(film, _) | Self::Shown(film, _) => Some(film.log()),
+            Self::Over(film, _) | Self::Shown(film, _) => Some((film.log(), film.ruler())),
             Self::Empty | Self::UnderWay(_) => None,
         }
     }
@@ -197,11 +202,15 @@ impl Tape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
+
+    fn ruler() -> Arc<Ruler> {
+        let skin = palpa_mesh::Surface::default();
+        Arc::new(Ruler::new(skin, palpa_servo::Pose::identity()))
+    }
 
     fn recorded(n_frames: u32) -> Tape {
         let mut tape = Tape::default();
-        tape.begin(PathBuf::from("log.mcap"));
+        tape.begin(PathBuf::from("log.mcap"), ruler());
         for k in 0..n_frames {
             let frame = FrameSnapshot {
                 time: 0.1 * f64::from(k),
@@ -253,7 +262,7 @@ mod tests {
     fn a_recording_lasts_an_hour_at_most() {
         let mut tape = recorded(1);
         assert!(!tape.is_full(4000.0));
-        tape.begin(PathBuf::new());
+        tape.begin(PathBuf::new(), ruler());
         assert!(!tape.is_full(3599.0) && tape.is_full(3601.0));
     }
 }

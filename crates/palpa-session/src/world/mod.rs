@@ -12,7 +12,7 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use nalgebra::Point3;
 use palpa::build::BuiltBody;
-use palpa::live::{LiveScene, SpringScene};
+use palpa::live::{LiveScene, Ruler, SpringScene};
 use palpa::press;
 use palpa::{Note, Prepared};
 use palpa_fem::Model;
@@ -40,6 +40,8 @@ pub(crate) struct World {
     pub(crate) method: Method,
     /// The skin at rest.
     pub(crate) skin: Skin,
+    /// The same skin, by which places and depths are measured.
+    pub(crate) ruler: Arc<Ruler>,
     /// Surfaces of the bones, m.
     pub(crate) bones: Vec<Surface>,
     /// The layers, from the skin down.
@@ -126,6 +128,7 @@ impl World {
                 Kind::Springs(_) => Method::Reference,
             },
             skin,
+            ruler: Arc::new(Ruler::new(body.skin.clone(), scene_from_device)),
             bones: built.bones.clone(),
             layers: layer_infos(&scene, body),
             lumps: Vec::new(),

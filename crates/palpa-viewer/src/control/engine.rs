@@ -39,8 +39,15 @@ pub struct EngineFigures {
     pub energy_in: f64,
     /// Energy given to the hand since the start, J.
     pub energy_out: f64,
-    /// Energy that the device may still give out beyond the energy taken in, J.
+    /// Energy that the loop gave to the hand and that neither the hand's work nor the tissue's stored
+    /// energy paid for, J: the largest since the last figures. This is the quantity that the energy
+    /// observer bounds: the negative of its bank.
+    pub energy_unpaid: f64,
+    /// Bound on `energy_unpaid`, J. From 60 % of it the loop damps the hand gently, and beyond it as
+    /// much as the device can.
     pub energy_budget: f64,
+    /// The largest damping that the energy observer injected since the last figures, N s/m.
+    pub damping: f64,
     /// Result of the tissue's last step.
     pub step_status: StepResult,
     /// Priorities and cores that the system granted to the threads.
@@ -51,6 +58,19 @@ pub struct EngineFigures {
     pub snapshot_rate: f64,
     /// The error bar of the force where the tool presses.
     pub error_bar: ErrorBar,
+}
+
+/// Amplitude spectrum of the commanded force over about the last second. Each axis is transformed for
+/// itself, without its mean and with Hann's window; an amplitude is the norm over the three axes. A
+/// vibration of 10 mN along an axis has the amplitude 10 mN.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Spectrum {
+    /// Time of the newest tick in it, s since the engine's start.
+    pub time: f64,
+    /// Distance between two frequencies, Hz.
+    pub step: f64,
+    /// Amplitudes at 0, `step`, 2 `step`, … up to half the rate of the loop, N.
+    pub amplitude: Vec<f64>,
 }
 
 /// How far the force may be from that of an infinitely fine mesh of the same body, where the tool

@@ -182,6 +182,7 @@ async fn files_have_their_names() {
     assert!(body.text.contains("the disk is full"));
     assert_eq!(get(&server, "/api/recording.mcap").status, 404);
     assert_eq!(get(&server, "/api/recording.csv").status, 404);
+    assert_eq!(get(&server, "/api/recording/curve").status, 404);
 
     let mut page = Page::open(&server).await;
     page.ask(Request::StartRecording).await;
@@ -190,6 +191,12 @@ async fn files_have_their_names() {
     let csv = get(&server, "/api/recording.csv");
     assert_eq!(csv.headers["content-type"], "text/csv; charset=utf-8");
     assert!(csv.headers["content-disposition"].contains("palpa-recording.csv"));
+    let curve = get(&server, "/api/recording/curve");
+    assert_eq!(curve.headers["content-type"], "application/json");
+    assert!(!curve.headers.contains_key("content-disposition"));
+    let curve: Value = serde_json::from_str(&curve.text).unwrap();
+    assert_eq!(curve["time"], serde_json::json!([0.0, 0.5]));
+    assert_eq!(get(&server, "/api/spectrum").status, 404);
     let force: f64 = csv.text.lines().nth(1).unwrap().parse().unwrap();
     assert!((force - 1.2).abs() < 1e-12);
 }

@@ -2,7 +2,7 @@
 //! size.
 
 use palpa_viewer::wire::{FrameSnapshot, MeshSnapshot, SNAPSHOT_VERSION};
-use proptest::{array::uniform3, array::uniform4, collection::vec, prelude::*};
+use proptest::{array::uniform3, array::uniform4, array::uniform6, collection::vec, prelude::*};
 
 /// Reads as `Reader` of `web/src/generated/wire.ts` does.
 struct Reader<'a> {
@@ -73,6 +73,8 @@ fn read_frame(bytes: &[u8]) -> FrameSnapshot {
         tool: r.f64s(),
         orientation: r.f64s(),
         force: r.f64s(),
+        tissue_force: r.f64s(),
+        place: r.f64s(),
         depth: r.f64(),
         deepest: r.f64(),
         gain: r.f64(),
@@ -112,15 +114,15 @@ proptest! {
     #[test]
     fn a_frame_is_read_back(
         numbers in uniform4(any::<u32>()),
-        places in uniform4(uniform3(-1.0..1.0)),
+        places in uniform6(uniform3(-1.0..1.0)),
         orientation in uniform4(-1.0..1.0),
         displacements in vec(any::<i16>(), 0..40),
         field_values in vec(any::<u16>(), 0..40),
     ) {
         let [mesh, sequence, faults, limits] = numbers;
-        let [device, tool, force, [depth, gain, time]] = places;
+        let [device, tool, force, tissue_force, place, [depth, gain, time]] = places;
         let frame = FrameSnapshot {
-            mesh, sequence, faults, limits, device, tool, force, depth, gain, time, orientation,
+            mesh, sequence, faults, limits, device, tool, force, tissue_force, place, depth, gain, time, orientation,
             displacements, field_values, displacement_unit: 1e-6, field: 2, field_min: -1e3, field_max: 4e5,
             is_replay: 1, tick: 1e9, n_active: 17, step_status: 2, deepest: 0.0125,
         };
@@ -138,11 +140,11 @@ fn where_things_lie() {
         ..FrameSnapshot::default()
     };
     let bytes = frame.encode();
-    assert_eq!(bytes[..12], [2, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
+    assert_eq!(bytes[..12], [3, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
     // Version, kind, mesh, sequence, is_replay; then doubles from the next multiple of 8.
     assert_eq!(bytes[24..32], 1f64.to_le_bytes());
-    // 2 + 13 + 3 doubles, 4 numbers, a double; the list's length and its items.
-    let list = 24 + 18 * 8 + 4 * 4 + 8;
+    // 2 + 19 + 3 doubles, 4 numbers, a double; the list's length and its items.
+    let list = 24 + 24 * 8 + 4 * 4 + 8;
     assert_eq!(bytes[list..list + 10], [3, 0, 0, 0, 0xfe, 0xff, 3, 0, 4, 0]);
     // field (at a multiple of 4), two doubles, a list of one.
     let field = (list + 10).next_multiple_of(4);

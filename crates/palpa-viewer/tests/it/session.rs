@@ -5,7 +5,8 @@ use palpa_scene::ContactShape;
 use palpa_viewer::{
     Answer, Clients, Host, HostFile, Publisher, Server, ServerParams,
     control::{
-        Field, Hand, LayerInfo, Method, Phase, Problem, RecordingInfo, Request, State, ToolInfo,
+        Field, Hand, LayerInfo, Method, Phase, Problem, RecordingCurve, RecordingInfo, Request,
+        State, ToolInfo,
     },
     wire::{FrameSnapshot, MeshSnapshot},
 };
@@ -256,7 +257,15 @@ impl Host for Session {
         match file {
             HostFile::Scene => Ok(Some(inner.scene().to_string().into_bytes())),
             HostFile::Body => Err("the disk is full".into()),
-            HostFile::RecordingLog => Ok(None),
+            HostFile::RecordingLog | HostFile::Spectrum => Ok(None),
+            HostFile::RecordingCurve => {
+                let there = inner.recording.duration > 0.0;
+                let curve = RecordingCurve {
+                    time: vec![0.0, 0.5],
+                    ..RecordingCurve::default()
+                };
+                Ok(there.then(|| json!(curve).to_string().into_bytes()))
+            }
             HostFile::RecordingCsv => {
                 let there = inner.recording.duration > 0.0;
                 Ok(there.then(|| inner.rows.clone().into_bytes()))

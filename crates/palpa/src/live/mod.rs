@@ -16,6 +16,7 @@ mod moving;
 mod prober;
 mod record;
 mod rehearsal;
+mod ruler;
 mod springs;
 mod watch;
 
@@ -27,6 +28,7 @@ pub use moving::LiveTissue;
 pub use prober::Prober;
 pub use record::{FileState, changed_files, notes_of, scene_of};
 pub use rehearsal::{RehearsalParams, RehearsalTick, rehearse};
+pub use ruler::Ruler;
 pub use springs::{SpringScene, SpringTissue};
 pub use watch::{Look, Seen, Watch};
 

@@ -162,29 +162,38 @@ function anchor(x: number): 'start' | 'middle' | 'end' {
   return x < 20 ? 'start' : x > WIDTH - 20 ? 'end' : 'middle';
 }
 
-/** Energy given to the hand, as a share of the energy taken from it plus the budget. */
+/** The energy that the observer bounds, with its bound, and the totals. */
 function Energy({ now }: { now: EngineFigures }) {
-  const allowed = now.energy_in + now.energy_budget;
-  const share = allowed > 0 ? Math.min(1, now.energy_out / allowed) : 0;
+  const { energy_unpaid: unpaid, energy_budget: bound } = now;
+  const isBeyond = unpaid > bound && bound > 0;
+  const share = bound > 0 ? Math.min(1, unpaid / bound) : 0;
+  const words = t('engine.energy_of', { unpaid: withPrefix(unpaid, 'J', 2), bound: withPrefix(bound, 'J', 2) });
   return (
     <>
+      <p class="meter-head">
+        <span>{t('engine.energy_unpaid')}</span>
+        <span class={isBeyond ? 'bad' : undefined} data-testid="energy-unpaid" data-joules={unpaid}>{words}</span>
+      </p>
       <div
-        class="meter"
+        class={isBeyond ? 'meter beyond' : 'meter'}
         role="meter"
-        aria-label={t('engine.energy')}
+        aria-label={t('engine.energy_unpaid')}
         aria-valuemin={0}
         aria-valuemax={100}
         aria-valuenow={Math.round(share * 100)}
+        aria-valuetext={words}
+        data-testid="energy-meter"
       >
         <div style={{ width: `${share * 100}%` }} />
       </div>
+      {isBeyond && <p class="bad" role="status" data-testid="energy-beyond">{t('engine.energy_beyond')}</p>}
       <dl class="figures">
+        <dt>{t('engine.damping')}</dt>
+        <dd>{now.damping > 0 ? `${formatNumber(now.damping, 2)} N s/m` : t('engine.damping_none')}</dd>
         <dt>{t('engine.energy_in')}</dt>
         <dd>{withPrefix(now.energy_in, 'J')}</dd>
         <dt>{t('engine.energy_out')}</dt>
         <dd>{withPrefix(now.energy_out, 'J')}</dd>
-        <dt>{t('engine.energy_budget')}</dt>
-        <dd>{withPrefix(now.energy_budget, 'J')}</dd>
       </dl>
     </>
   );
