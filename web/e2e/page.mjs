@@ -128,7 +128,7 @@ export class PalpaPage {
     let last = [];
     return until('the force is steady', async () => {
       const now = await this.readout();
-      const isHeldBack = (await this.page.locator('.held-back').count()) > 0;
+      const isHeldBack = (await this.page.locator('.held-back[data-on]').count()) > 0;
       if (isHeldBack || now.newtons === 0) last = [];
       else if (last.at(-1)?.tick !== now.tick) last.push(now);
       // Six tenths of a second; or three readings, where a slow machine has fewer.

@@ -3,7 +3,7 @@
 import { batch, computed, effect, signal } from '@preact/signals';
 import type { EngineFigures, Hello, Message, NoticeLevel, State } from './generated/api';
 import type { SceneTable } from './generated/scene';
-import { SNAPSHOT_VERSION, type FrameSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
+import { SNAPSHOT_VERSION, type FrameSnapshot, type MapSnapshot, type MeshSnapshot, type Snapshot } from './generated/wire';
 import { Connection, type ConnectionStatus, type Request } from './connection';
 import { language, t } from './i18n';
 import { noticeWords } from './i18n/events';
@@ -90,8 +90,19 @@ export function onFrame(listener: (frame: FrameSnapshot) => void): () => void {
   return () => frameListeners.delete(listener);
 }
 
+let latestMap: MapSnapshot | null = null;
+const mapListeners = new Set<(map: MapSnapshot) => void>();
+export function onMap(listener: (map: MapSnapshot) => void): () => void {
+  mapListeners.add(listener);
+  if (latestMap !== null) listener(latestMap);
+  return () => mapListeners.delete(listener);
+}
+
 function takeSnapshot(snapshot: Snapshot): void {
-  if (snapshot.kind === 1) {
+  if (snapshot.kind === 3) {
+    latestMap = snapshot;
+    for (const listener of mapListeners) listener(snapshot);
+  } else if (snapshot.kind === 1) {
     latestMesh = snapshot;
     for (const listener of meshListeners) listener(snapshot);
   } else {

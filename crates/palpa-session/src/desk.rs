@@ -20,6 +20,7 @@ use crate::builder::{Builder, Wanted};
 use crate::drill::Drills;
 use crate::game::Game;
 use crate::hand::{goal_of, in_range};
+use crate::palpation::Palpation;
 use crate::publish::{Fields, Screen, Status, Told, granted};
 use crate::remote::{Material, Order};
 use crate::replay::{Tape, new_log};
@@ -50,6 +51,7 @@ pub(crate) struct Desk {
     game: Option<Game>,
     bars: Bars,
     drills: Drills,
+    palpation: Palpation,
     screen: Screen,
     status: Status,
 }
@@ -78,6 +80,7 @@ impl Desk {
             game: None,
             bars: workers.bars,
             drills: Drills::new(params.allows_faults),
+            palpation: Palpation::default(),
             screen: Screen::new(publisher.clone(), workers.fields),
             status: Status::new(publisher, params.allows_faults, problem),
         }
@@ -154,6 +157,7 @@ impl Desk {
                 self.veil().check_field(field)?;
                 self.status.set_field(field);
             }
+            Request::ClearMap => self.palpation.clear(),
             Request::StartGame { seed, n_lumps } => self.start_game(seed, n_lumps)?,
             Request::Mark { point } => self.game()?.mark(in_range(point, "point")?)?,
             Request::Unmark => self.game()?.unmark(),
@@ -205,6 +209,8 @@ impl Desk {
         }
         match built.and_then(|world| self.stage.replace(world)) {
             Ok(()) => {
+                // What was felt belongs to the body before.
+                self.palpation.clear();
                 self.describe();
                 self.status.well();
                 if let Some(game) = &mut self.game {
@@ -371,6 +377,11 @@ impl Desk {
             }
             HostFile::Body if !veil.shows_body_file() => None,
             HostFile::Body => self.stage.live()?.body(),
+            HostFile::Map | HostFile::MapCsv if !veil.shows_map() => None,
+            HostFile::Map | HostFile::MapCsv => {
+                let skin = self.stage.live()?.world.skin.surface().clone();
+                Some(Material::Map(Box::new(self.palpation.whole()), skin))
+            }
             HostFile::RecordingLog | HostFile::RecordingCsv | HostFile::RecordingCurve => {
                 let (log, ruler) = self.tape.log()?;
                 Some(Material::Log(log.to_owned(), Arc::clone(ruler)))
@@ -423,6 +434,7 @@ impl Desk {
             if let Some(game) = &mut self.game {
                 game.feel(place, force, dt);
             }
+            (self.palpation).feel(self.screen.tick(), &live.world, dt);
             let is_wanted = self.tape.is_under_way() || self.screen.is_watched() && is_due;
             let shows_lumps = Veil::of(self.game.as_ref()).shows_lumps();
             if live.entry.tick.tick > 0
@@ -433,6 +445,12 @@ impl Desk {
                 self.tape.add(frame, mesh);
                 is_made = true;
             }
+        }
+        let is_hidden = !Veil::of(self.game.as_ref()).shows_map();
+        if self.screen.is_watched()
+            && let Some(map) = self.palpation.news(is_hidden, dt)
+        {
+            self.screen.show_map(&map);
         }
         match self.tape.shown() {
             Some((frame, mesh)) if is_due => self.screen.show_recorded(frame, mesh),

@@ -23,6 +23,7 @@ mod edit;
 pub mod gallery;
 mod game;
 mod hand;
+mod palpation;
 mod publish;
 mod remote;
 mod replay;

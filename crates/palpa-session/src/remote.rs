@@ -7,12 +7,14 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use palpa::live::Ruler;
+use palpa::map::PalpationMap;
 use palpa_fem::Model;
-use palpa_mesh::{LayeredBody, Vec3};
+use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_rt::{LEAD, LateTick, Table};
 use palpa_viewer::control::Request;
 use palpa_viewer::{Answer, Clients, Host, HostFile};
 
+use crate::palpation;
 use crate::replay::curve_of;
 use crate::spectrum::spectrum;
 use crate::world::World;
@@ -38,6 +40,8 @@ pub(super) enum Material {
     Springs(Box<LayeredBody>, Vec<Vec3>),
     /// The log of the recording, and the skin of its body.
     Log(PathBuf, Arc<Ruler>),
+    /// The palpation map, and the skin.
+    Map(Box<PalpationMap>, Surface),
     /// The last ticks.
     Ticks(Vec<LateTick>),
 }
@@ -97,6 +101,8 @@ impl Remote {
             },
             (Material::Log(log, ruler), HostFile::RecordingCsv) => csv(&log, &ruler)?,
             (Material::Log(log, _), _) => std::fs::read(log)?,
+            (Material::Map(map, _), HostFile::MapCsv) => palpation::table(&map).into_bytes(),
+            (Material::Map(map, skin), _) => palpation::grid(&map, &skin)?,
             (Material::Scene(text), _) => text.into_bytes(),
             (Material::Tissue(model, displacements), _) => vtu(model.body(), &displacements)?,
             (Material::Springs(body, displacements), _) => vtu(&body, &displacements)?,

@@ -69,6 +69,11 @@ impl<'a> Veil<'a> {
         !self.is_drawn()
     }
 
+    /// Whether the palpation map may be shown: it shows what the hand is to find by itself.
+    pub(crate) fn shows_map(self) -> bool {
+        !self.is_drawn()
+    }
+
     /// The scene for the file of the scene.
     pub(crate) fn scene_file(self, scene: &'a Scene) -> &'a Scene {
         match self {

@@ -48,6 +48,15 @@ impl Publisher {
         });
     }
 
+    /// Publishes the palpation map, a [`MapSnapshot`](crate::wire::MapSnapshot). The latest wins, and each client
+    /// that connects later gets it too.
+    pub fn map(&self, snapshot: Vec<u8>) {
+        self.board.picture.send_modify(|picture| {
+            let serial = picture.map.as_ref().map_or(0, |m| m.serial) + 1;
+            picture.map = Some(Shot::new(0, serial, snapshot));
+        });
+    }
+
     /// Publishes a changed state. The controller, the number of clients and a new revision are
     /// filled in here.
     pub fn state(&self, state: State) {
@@ -103,11 +112,13 @@ pub(crate) struct Board {
     seats: Mutex<Seats>,
 }
 
-/// A mesh and a frame. They share one watch, so that no client sees a frame without its mesh.
+/// A mesh, a frame and a map. They share one watch, so that no client sees a frame without its mesh.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Picture {
     pub(crate) mesh: Option<Shot>,
     pub(crate) frame: Option<Shot>,
+    /// The palpation map; it belongs to the body, whatever its mesh.
+    pub(crate) map: Option<Shot>,
 }
 
 /// A snapshot, shared by all clients.

@@ -336,6 +336,8 @@ struct Outlet<'a> {
     mesh: u64,
     /// Serial number of the last frame sent; at first, of the one before the first frame.
     frame: u64,
+    /// Serial number of the map that the client has.
+    map: u64,
     /// Time of the last text or binary message.
     spoke_at: Instant,
 }
@@ -353,6 +355,7 @@ impl<'a> Outlet<'a> {
             board,
             mesh: 0,
             frame: before,
+            map: 0,
             spoke_at: Instant::now(),
         }
     }
@@ -387,8 +390,12 @@ impl<'a> Outlet<'a> {
         }
     }
 
-    /// Sends the mesh if the client lacks it, then the frame if it belongs to that mesh.
-    async fn picture(&mut self, Picture { mesh, frame }: Picture) -> Result<(), End> {
+    /// Sends map and mesh if the client lacks them, then the frame if it belongs to that mesh.
+    async fn picture(&mut self, Picture { mesh, frame, map }: Picture) -> Result<(), End> {
+        if let Some(map) = map.filter(|map| map.serial != self.map) {
+            self.map = map.serial;
+            self.send(ws::Message::Binary(map.bytes)).await?;
+        }
         let Some(mesh) = mesh else {
             return Ok(());
         };

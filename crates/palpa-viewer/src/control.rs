@@ -86,6 +86,8 @@ pub enum Request {
         /// The field.
         field: Field,
     },
+    /// Forget what was felt: the palpation map becomes empty.
+    ClearMap,
     /// Start a round of "find the lump": hide lumps at random places.
     StartGame {
         /// The same seed hides the lumps at the same places. Without it, a new seed is chosen.

@@ -45,6 +45,10 @@ pub enum HostFile {
     Scene,
     /// The body in its present deformed state (VTU).
     Body,
+    /// The palpation map on the skin (VTU).
+    Map,
+    /// The places of the palpation map (CSV).
+    MapCsv,
     /// The recording (MCAP).
     RecordingLog,
     /// The recording's ticks (CSV).

@@ -46,6 +46,8 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
         .route("/api/engine", get(engine))
         .route("/api/scene.toml", get(|hub| file(hub, HostFile::Scene)))
         .route("/api/body.vtu", get(|hub| file(hub, HostFile::Body)))
+        .route("/api/map.vtu", get(|hub| file(hub, HostFile::Map)))
+        .route("/api/map.csv", get(|hub| file(hub, HostFile::MapCsv)))
         .route(
             "/api/recording.mcap",
             get(|hub| file(hub, HostFile::RecordingLog)),
@@ -202,6 +204,8 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
     let (kind, name) = match file {
         HostFile::Scene => ("application/toml", "scene.toml"),
         HostFile::Body => ("application/xml", "body.vtu"),
+        HostFile::Map => ("application/xml", "palpation-map.vtu"),
+        HostFile::MapCsv => ("text/csv; charset=utf-8", "palpation-map.csv"),
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),
         HostFile::RecordingCurve => ("application/json", "curve of a recording"),

@@ -9,7 +9,7 @@
 use std::fmt::Write as _;
 
 /// Increased with every change of a field.
-pub const SNAPSHOT_VERSION: u32 = 3;
+pub const SNAPSHOT_VERSION: u32 = 4;
 
 /// A type that a snapshot can hold.
 trait Wire {
@@ -185,6 +185,33 @@ snapshot! {
     }
 }
 
+snapshot! {
+    /// The palpation map: the places of the skin that were felt. Sent after every change, a few times a second.
+    MapSnapshot = 3 {
+        /// Grows with every change.
+        revision: u32,
+        /// Places of the skin at rest, m: x, y, z of each in turn.
+        points: Vec<f32>,
+        /// Outward normals there.
+        normals: Vec<f32>,
+        /// Secant stiffness of each place, N/m.
+        stiffness: Vec<f32>,
+        /// By how much each place is stiffer than its surroundings, as a share of them; NaN if too little around
+        /// it was felt.
+        shares: Vec<f32>,
+        /// Width of each spot (standard deviation), m.
+        widths: Vec<f32>,
+        /// 1 if a place stands out from its surroundings.
+        has_finding: u32,
+        /// That place, m.
+        finding: [f64; 3],
+        /// By how much it is stiffer than its surroundings, as a share of them.
+        finding_share: f64,
+        /// Number of places that were forgotten, because there were too many.
+        n_forgotten: u32,
+    }
+}
+
 /// The page's reader of snapshots, as TypeScript source.
 pub fn typescript() -> String {
     let mut out = format!(
@@ -193,8 +220,9 @@ pub fn typescript() -> String {
     );
     MeshSnapshot::typescript(&mut out);
     FrameSnapshot::typescript(&mut out);
+    MapSnapshot::typescript(&mut out);
     out.push_str(
-        "\nexport type Snapshot = MeshSnapshot | FrameSnapshot;\n\n\
+        "\nexport type Snapshot = MeshSnapshot | FrameSnapshot | MapSnapshot;\n\n\
          /** Reads a snapshot; its lists look into `buffer`. Throws when it is of another version or cut off. */\n\
          export function readSnapshot(buffer: ArrayBuffer): Snapshot {\n\
          \x20 const r = new Reader(buffer);\n\
@@ -203,6 +231,7 @@ pub fn typescript() -> String {
          \x20 const kind = r.u32();\n\
          \x20 if (kind === 1) return readMeshSnapshot(r);\n\
          \x20 if (kind === 2) return readFrameSnapshot(r);\n\
+         \x20 if (kind === 3) return readMapSnapshot(r);\n\
          \x20 throw new Error(`snapshot of unknown kind ${kind}`);\n\
          }\n",
     );

@@ -2,5 +2,6 @@
 
 export { BodyView } from './view';
 export { DEFAULT_OPTIONS, NoWebGL2 } from './options';
-export type { Legend, Picked, SectionArea, Vec3, ViewOptions } from './options';
+export type { MapKind } from './palpation';
+export type { Legend, MapLegend, Picked, SectionArea, Vec3, ViewOptions } from './options';
 export { COLOURINGS, quantityOf, type ColourBy } from './quantities';

@@ -1,5 +1,6 @@
 // The options of the view, and the types of what it reports.
 
+import type { MapKind } from './palpation';
 import type { ColourBy } from './quantities';
 
 export type Vec3 = [number, number, number];
@@ -29,6 +30,8 @@ export interface ViewOptions {
   tool: boolean;
   force: boolean;
   coverage: boolean;
+  /** What the palpation map shows on the skin. */
+  palpation: MapKind;
   reducedMotion: boolean;
 }
 
@@ -46,6 +49,7 @@ export const DEFAULT_OPTIONS: ViewOptions = {
   tool: true,
   force: true,
   coverage: true,
+  palpation: 'surroundings',
   reducedMotion: false,
 };
 
@@ -59,6 +63,19 @@ export interface Legend {
   /** Whether the stops are evenly spaced in the logarithm. */
   isLog?: boolean;
   categories?: { name: string; colour: string }[];
+}
+
+/** The legend of the palpation map. */
+export interface MapLegend {
+  kind: 'absolute' | 'surroundings';
+  /** Range of the colours: N/m, or shares of the surroundings. */
+  range: [number, number];
+  stops: string[];
+  /** Number of places that were felt, and of those that were forgotten. */
+  n: number;
+  nForgotten: number;
+  /** By how much the place that stands out is stiffer than its surroundings; null if none stands out. */
+  finding: number | null;
 }
 
 /** Areas of the section, m². */

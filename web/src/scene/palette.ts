@@ -84,6 +84,11 @@ const MAPS = {
     stops: ['#001261', '#033e7d', '#1e6f9d', '#71a8c4', '#c9dde7', '#ece5e0', '#eacebd', '#d39774', '#be6533', '#8b2706', '#590008'],
     lines: 'theme',
   },
+  /** Inferno (van der Walt and Smith, 2015), without its darkest end: what stands out glows. */
+  inferno: {
+    stops: ['#4a0c6b', '#781c6d', '#a52c60', '#cf4446', '#ed6925', '#fb9b06', '#f7d13d', '#fcffa4'],
+    lines: 'theme',
+  },
 } satisfies Record<string, ColourMap>;
 type MapName = keyof typeof MAPS;
 
@@ -98,6 +103,13 @@ const MAP_OF: Record<Quantity, MapName> = {
 
 export function mapOf(quantity: Quantity): ColourMap {
   return MAPS[MAP_OF[quantity]];
+}
+
+/** The colours of the palpation map. */
+export const PALPATION_STOPS = MAPS.inferno.stops;
+
+export function palpationTexture(): DataTexture {
+  return mapTexture(PALPATION_STOPS);
 }
 
 /** The texture of each quantity's map; quantities of one map share it. */

@@ -138,7 +138,7 @@ export class Surfaces {
       this.outer[k].visible = visible && isThrough(k - 1);
       this.inner[k].visible = visible && opacity === 1 && k < n - 1 && isThrough(k + 1);
       this.walls[k].visible = visible;
-      this.outer[k].material.look(look);
+      this.outer[k].material.look({ ...look, isSkin: k === 0 });
       this.inner[k].material.look({ ...look, side: BackSide });
       this.walls[k].material.look({ ...look, skin: look.skin * 0.5, isFlat: true, side: DoubleSide });
       // Transparent layers are drawn after the solid ones, from the inside out.

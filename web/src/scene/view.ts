@@ -2,7 +2,7 @@
 
 import { PCFShadowMap, Raycaster, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { State } from '../generated/api';
-import type { FrameSnapshot, MeshSnapshot } from '../generated/wire';
+import type { FrameSnapshot, MapSnapshot, MeshSnapshot } from '../generated/wire';
 import { isSoftwareWebGL } from '../machine';
 import { Body } from './body';
 import { Colouring } from './colouring';
@@ -14,9 +14,10 @@ import { DrawLoop } from './loop';
 import { LumpsView } from './lumps';
 import { MarksView } from './marks';
 import type { SharedUniforms } from './materials';
-import { DEFAULT_OPTIONS, NoWebGL2, type Legend, type Picked, type SectionArea, type Vec3, type ViewOptions } from './options';
+import { DEFAULT_OPTIONS, NoWebGL2, type Legend, type MapLegend, type Picked, type SectionArea, type Vec3, type ViewOptions } from './options';
 import { Gizmo, ScaleBar } from './overlay';
-import { BONE, CORE, LUMP, mapOf, mapTextures, type Theme } from './palette';
+import { BONE, CORE, LUMP, mapOf, mapTextures, PALPATION_STOPS, palpationTexture, type Theme } from './palette';
+import { PalpationVolume } from './palpation';
 import { nearestOnSkin, pickNearest, pickSkin } from './picking';
 import { pictureOf } from './picture';
 import { Quality, type Detail } from './quality';
@@ -39,6 +40,7 @@ export class BodyView {
   onLegend: (legend: Legend | null) => void = () => {};
   onSection: (area: SectionArea | null) => void = () => {};
   onCutaway: (position: number) => void = () => {};
+  onMapLegend: (legend: MapLegend | null) => void = () => {};
   onFirstBody: () => void = () => {};
   /** Pictures follow each other more slowly, so that the engine keeps up; or no longer. */
   onYield: (yields: boolean) => void = () => {};
@@ -57,7 +59,11 @@ export class BodyView {
   private readonly marks = new MarksView();
   private readonly colouring = new Colouring();
   private readonly maps = mapTextures();
-  private readonly shared: SharedUniforms = { map: { value: null }, range: { value: new Vector2(0, 1) }, isLog: { value: 0 }, grain: { value: 1 } };
+  private readonly volume = new PalpationVolume();
+  private readonly shared: SharedUniforms = {
+    ...this.volume.uniforms, palpationMap: { value: palpationTexture() },
+    map: { value: null }, range: { value: new Vector2(0, 1) }, isLog: { value: 0 }, grain: { value: 1 },
+  };
   private readonly cutaway: CutawayView;
   private readonly materials: Materials = new Map();
   private readonly lumps: LumpsView;
@@ -73,10 +79,12 @@ export class BodyView {
   private waitingMesh: MeshSnapshot | null = null;
   private meshTimer = 0;
   private frame: FrameSnapshot | null = null;
+  private map: MapSnapshot | null = null;
   private isFirst = true;
   private isHeld = false;
   private size = new Vector2(1, 1);
   private legendKey = '';
+  private mapLegendKey = '';
 
   constructor(container: HTMLElement, options: ViewOptions) {
     this.options = { ...DEFAULT_OPTIONS, ...options };
@@ -156,6 +164,11 @@ export class BodyView {
     if (this.frame && looksSame(this.frame, frame)) return;
     this.frame = frame;
     this.loop.invalidate('frame');
+  }
+
+  setMap(map: MapSnapshot): void {
+    this.map = map;
+    this.loop.invalidate('style');
   }
 
   setState(state: State): void {
@@ -247,6 +260,8 @@ export class BodyView {
     this.marks.dispose();
     this.tool.dispose();
     this.stage.dispose();
+    this.volume.dispose();
+    this.shared.palpationMap.value?.dispose();
     for (const map of Object.values(this.maps)) map.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
@@ -425,7 +440,24 @@ export class BodyView {
     const isSeenThrough = looks.some((l) => !l.visible || l.opacity < 1);
     this.lumps.set(isSeenThrough ? lumps : [], body, LUMP, Boolean(state?.game?.result));
     this.marks.set(state?.game ?? null, body, options.coverage);
+    this.feel(body);
     if (state) this.tool.set(state.tool.shape ?? null, state.max_force, body.radius);
+  }
+
+  /** Shows what was felt, and its legend. */
+  private feel(body: Body): void {
+    const { map, volume, options: { palpation: kind, colourBy } } = this;
+    // A map of another quantity covers the skin.
+    const isOn = kind !== 'off' && !Colouring.isMap(colourBy);
+    volume.set(map, isOn ? kind : 'off', body);
+    const legend: MapLegend | null = kind === 'off' || map === null || map.stiffness.length === 0 || !isOn ? null : {
+      kind, range: volume.range, stops: PALPATION_STOPS, n: map.stiffness.length, nForgotten: map.n_forgotten,
+      finding: map.has_finding === 1 ? map.finding_share : null,
+    };
+    const key = JSON.stringify(legend);
+    if (key === this.mapLegendKey) return;
+    this.mapLegendKey = key;
+    this.onMapLegend(legend);
   }
 
   private slice(body: Body, surfaces: Surfaces): void {

@@ -7,13 +7,14 @@ import { problemWords } from '../i18n/events';
 import { HandControl } from '../hand';
 import { BodyView, NoWebGL2, type Vec3 } from '../scene';
 import {
-  ask, askAloud, edit, homeKey, isController, isReplaying, isWatching, notify, onFrame, onMesh, scene, send, state,
+  ask, askAloud, edit, homeKey, isController, isReplaying, isWatching, notify, onFrame, onMap, onMesh, scene, send, state,
 } from '../store';
-import { bodyView, firstBodyMs, legend, section } from './body';
+import { bodyView, firstBodyMs, legend, mapLegend, section, yields } from './body';
 import { Button, Segmented } from './controls';
 import { GameBar } from './GameBar';
 import { Icon } from './icons';
 import { LegendBox } from './LegendBox';
+import { MapBox } from './MapBox';
 import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
@@ -36,6 +37,8 @@ export function Stage() {
       return;
     }
     body.onLegend = (next) => (legend.value = next);
+    body.onMapLegend = (next) => (mapLegend.value = next);
+    body.onYield = (next) => (yields.value = next);
     body.onSection = (next) => (section.value = next);
     body.onCutaway = (position) => show({ cutaway: { ...wanted.peek().cutaway, position } });
     body.onFirstBody = () => {
@@ -66,6 +69,7 @@ export function Stage() {
         hand.forget();
       }),
       onMesh((mesh) => body.setMesh(mesh)),
+      onMap((map) => body.setMap(map)),
       onFrame((frame) => {
         body.setFrame(frame);
         if (frame.is_replay === 0) hand.deepest = frame.deepest;
@@ -88,10 +92,12 @@ export function Stage() {
       <div class="stage-top">
         <GameBar />
         <PickingHint />
+        <Yields />
         {isWatching.value && <p class="chip">{t(state.value?.controller == null ? 'control.nobody_chip' : 'control.watching_chip')}</p>}
       </div>
       <div class="stage-bottom">
         {problem === 'none' && <LegendBox />}
+        {problem === 'none' && <MapBox />}
         <ReplayBar />
       </div>
       <Phase />
@@ -133,6 +139,17 @@ function moveLump(index: number, point: Vec3): Promise<string | null> {
   delete changed.at;
   delete changed.below_vertex;
   return edit([path, changed]);
+}
+
+/** Says that pictures are slower so that the force keeps up. */
+function Yields() {
+  if (!yields.value) return null;
+  return (
+    <p class="chip" role="status" data-testid="yields">
+      {t('view.yields')}
+      <Button kind="quiet" onClick={() => bodyView.value?.neverYield()} testid="never-yield">{t('view.never_yield')}</Button>
+    </p>
+  );
 }
 
 function PickingHint() {

@@ -131,6 +131,7 @@ export const view = computed<ViewOptions>(() => {
   return {
     ...options,
     lumps: false,
+    palpation: 'off',
     wireframe: false,
     colourBy: showsLumps(options.colourBy) ? 'tissue' : options.colourBy,
     range: showsLumps(options.colourBy) ? null : options.range,

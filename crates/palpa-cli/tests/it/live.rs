@@ -120,7 +120,12 @@ fn felt_where_it_presses(table: &str) {
         .collect();
     let known: Vec<(f64, f64)> = rows.iter().filter_map(|r| Some((r[1]?, r[2]?))).collect();
     // The ramp down at the end has no reading of the device.
-    assert!(known.len() > rows.len() / 2, "{} of {}", known.len(), rows.len());
+    assert!(
+        known.len() > rows.len() / 2,
+        "{} of {}",
+        known.len(),
+        rows.len()
+    );
     let deepest = known.iter().map(|r| r.0).fold(0.0, f64::max);
     assert!(deepest > 1.0, "{deepest} mm");
     let above = known.iter().filter(|(depth, _)| *depth < -0.5);

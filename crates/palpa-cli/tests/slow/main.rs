@@ -7,6 +7,7 @@ mod fast_hands;
 mod faults;
 mod lump_stroke;
 mod moving;
+mod palpation_map;
 mod slabs;
 mod stable;
 mod verify;

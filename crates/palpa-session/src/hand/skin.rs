@@ -59,6 +59,11 @@ impl Skin {
         }
     }
 
+    /// The surface.
+    pub(crate) fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
     /// The place nearest to a point.
     pub(crate) fn nearest(&self, point: Vec3) -> Option<Place> {
         let closest = self.index.closest(point)?;

@@ -6,7 +6,7 @@ use palpa::live::Seen;
 use palpa_mesh::Vec3;
 use palpa_viewer::Publisher;
 use palpa_viewer::control::Field;
-use palpa_viewer::wire::FrameSnapshot;
+use palpa_viewer::wire::{FrameSnapshot, MapSnapshot};
 
 use super::pace::Pace;
 use super::{Fields, frame};
@@ -132,6 +132,16 @@ impl Screen {
         });
         frame::put_field(&mut self.frame, field);
         Some((&self.frame, &self.mesh))
+    }
+
+    /// The body's latest tick; its nodes may be older.
+    pub(crate) fn tick(&self) -> &FrameSnapshot {
+        &self.frame
+    }
+
+    /// Shows a palpation map.
+    pub(crate) fn show_map(&self, map: &MapSnapshot) {
+        self.publisher.map(map.encode());
     }
 
     /// Requests a new mesh with the next frame.

@@ -257,7 +257,9 @@ impl Host for Session {
         match file {
             HostFile::Scene => Ok(Some(inner.scene().to_string().into_bytes())),
             HostFile::Body => Err("the disk is full".into()),
-            HostFile::RecordingLog | HostFile::Spectrum => Ok(None),
+            HostFile::Map | HostFile::MapCsv | HostFile::RecordingLog | HostFile::Spectrum => {
+                Ok(None)
+            }
             HostFile::RecordingCurve => {
                 let there = inner.recording.duration > 0.0;
                 let curve = RecordingCurve {

@@ -1,9 +1,12 @@
 // What the shaders of tissue have in common: the colour map, and noise for the grain of tissue.
 
 import type { Texture, Vector2 } from 'three';
+import type { MapUniforms } from '../palpation';
 
 /** Uniforms that all materials of the body share, so that a change reaches all of them. */
-export interface SharedUniforms {
+export interface SharedUniforms extends MapUniforms {
+  /** Colours of the palpation map. */
+  palpationMap: { value: Texture | null };
   map: { value: Texture | null };
   /** Values at the ends of the colour map, SI; their decimal logarithms when `isLog` is 1. */
   range: { value: Vector2 };
@@ -25,6 +28,19 @@ float noise(vec3 p) {
   return mix(
     mix(mix(hash(i), hash(i + vec3(1, 0, 0)), f.x), mix(hash(i + vec3(0, 1, 0)), hash(i + vec3(1, 1, 0)), f.x), f.y),
     mix(mix(hash(i + vec3(0, 0, 1)), hash(i + vec3(1, 0, 1)), f.x), mix(hash(i + vec3(0, 1, 1)), hash(i + vec3(1, 1, 1)), f.x), f.y), f.z);
+}
+`;
+
+/** `felt(rest)`: the value of the palpation map at a place at rest, 0 to 1, and how well it is known, 0 to 1. */
+export const FELT = /* glsl */ `
+uniform sampler3D palpation;
+uniform sampler2D palpationMap;
+uniform vec3 palpationLow;
+uniform vec3 palpationSize;
+uniform float palpationOn;
+vec2 felt(vec3 rest) {
+  vec2 v = texture(palpation, (rest - palpationLow) / palpationSize).rg;
+  return vec2(v.r / max(v.g, 1e-3), v.g);
 }
 `;
 

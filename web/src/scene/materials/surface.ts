@@ -2,12 +2,13 @@
 // terminator and reddens there, as it does under skin.
 
 import { BackSide, Color, DoubleSide, FrontSide, type Plane, ShaderMaterial, type Side, UniformsLib, UniformsUtils, type Vector3 } from 'three';
-import { MAP, NOISE, type SharedUniforms } from './shared';
+import { FELT, MAP, NOISE, type SharedUniforms } from './shared';
 
 const SURFACE_VERTEX = /* glsl */ `
 attribute vec3 rest;
 attribute float value;
 varying vec3 vRest;
+varying vec3 vMoved;
 varying vec3 vNormal;
 varying vec3 vView;
 varying float vValue;
@@ -23,6 +24,7 @@ void main() {
   #include <shadowmap_vertex>
   #include <clipping_planes_vertex>
   vRest = rest;
+  vMoved = position - rest;
   vNormal = transformedNormal;
   vView = -mvPosition.xyz;
   vValue = value;
@@ -36,8 +38,11 @@ uniform float isMapped;
 uniform float isFlat;
 uniform float skin;
 uniform float grain;
+uniform float isSkin;
+uniform float hasGrid;
 uniform vec3 light;
 varying vec3 vRest;
+varying vec3 vMoved;
 varying vec3 vNormal;
 varying vec3 vView;
 varying float vValue;
@@ -48,6 +53,13 @@ varying float vValue;
 #include <clipping_planes_pars_fragment>
 ${NOISE}
 ${MAP}
+${FELT}
+// Lines of a grid of 5 mm, drawn where the skin has moved.
+float gridLine(float x) {
+  float cell = x * 200.0;
+  float width = max(fwidth(cell), 1e-4);
+  return 1.0 - smoothstep(0.6, 1.6, abs(fract(cell - 0.5) - 0.5) / width);
+}
 void main() {
   #include <clipping_planes_fragment>
   vec3 V = normalize(vView);
@@ -73,6 +85,23 @@ void main() {
     }
     base *= 1.0 + skin * (vec3(0.05, -0.06, -0.06) * broad + 0.045 * fine);
     shine *= 1.0 + 0.5 * fine * skin;
+  }
+
+  if (isSkin > 0.5 && isMapped < 0.5) {
+    float moved = length(vMoved);
+    // Pressed skin turns pale.
+    base = mix(base, vec3(0.95, 0.82, 0.74), 0.55 * smoothstep(0.0008, 0.006, moved));
+    if (palpationOn > 0.5) {
+      vec2 f = felt(vRest);
+      vec3 glow = texture2D(palpationMap, vec2(f.x * 0.99609375 + 0.001953125, 0.5)).rgb;
+      float known = smoothstep(0.12, 0.6, f.y);
+      base = mix(base, glow, 0.88 * known);
+      shine *= 1.0 - 0.7 * known;
+    }
+    if (hasGrid > 0.5) {
+      float near = smoothstep(0.0002, 0.0009, moved);
+      if (near > 0.01) base *= 1.0 - 0.30 * near * max(gridLine(vRest.x), max(gridLine(vRest.y), gridLine(vRest.z)));
+    }
   }
 
   float ndl = dot(N, L);
@@ -107,6 +136,8 @@ export interface SurfaceLook {
   /** Strength of mottling and of light scattered under the skin, 0 to 1. */
   skin: number;
   isFlat?: boolean;
+  /** The outside of the body, which can be felt. */
+  isSkin?: boolean;
   side?: Side;
 }
 
@@ -122,6 +153,8 @@ export class SurfaceMaterial extends ShaderMaterial {
         isMapped: { value: 0 },
         isFlat: { value: 0 },
         skin: { value: 0 },
+        isSkin: { value: 0 },
+        hasGrid: { value: 1 },
         light,
         ...shared,
       },
@@ -136,13 +169,14 @@ export class SurfaceMaterial extends ShaderMaterial {
     });
   }
 
-  look({ colour, opacity, isMapped, skin, isFlat, side }: SurfaceLook): void {
+  look({ colour, opacity, isMapped, skin, isFlat, side, isSkin }: SurfaceLook): void {
     const u = this.uniforms;
     (u.colour.value as Color).set(colour);
     u.opacity.value = opacity;
     u.isMapped.value = isMapped ? 1 : 0;
     u.skin.value = skin;
     u.isFlat.value = isFlat ? 1 : 0;
+    u.isSkin.value = isSkin ? 1 : 0;
     this.side = side ?? FrontSide;
     this.shadowSide = this.side === BackSide ? DoubleSide : null;
     this.transparent = opacity < 1;

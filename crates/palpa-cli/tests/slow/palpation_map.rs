@@ -1,0 +1,171 @@
+//! Five strokes of a hand with a Falcon over the forearm of the gallery: the palpation map finds the lump, and
+//! nothing where there is none.
+
+use nalgebra::Point3;
+use palpa::live::{LiveScene, RehearsalParams, open_device, rehearse, servo_params};
+use palpa::map::{PalpationMap, Touch};
+use palpa_device::{LiveTarget, Vec3};
+use palpa_mesh::SurfaceIndex;
+use palpa_rt::StepStatus;
+use palpa_scene::Scene;
+use palpa_session::gallery;
+
+const STEP_TIME: f64 = 4e-3;
+/// A touch of the map every so many ticks, as a session makes them.
+const EVERY: usize = 16;
+const DEPTH: f64 = 6e-3;
+const ABOVE: f64 = 4e-3;
+const HALF: f64 = 25e-3;
+/// Between two strokes, m.
+const APART: f64 = 6e-3;
+/// Speeds, m/s: down and up, along the skin, and in the air.
+const DOWN: f64 = 0.04;
+const ALONG: f64 = 0.025;
+const AIR: f64 = 0.1;
+
+/// The way of the hand: places (along, across, depth), m, one for each step.
+fn way() -> Vec<[f64; 3]> {
+    let mut way = vec![[-HALF, -2.0 * APART, -ABOVE]; 200];
+    let go = |to: [f64; 3], speed: f64, way: &mut Vec<[f64; 3]>| {
+        let from = *way.last().unwrap();
+        let length = (0..3)
+            .map(|c| (to[c] - from[c]).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let n = (length / (speed * STEP_TIME)).ceil().max(1.0) as usize;
+        way.extend((1..=n).map(|k| {
+            let share = k as f64 / n as f64;
+            [0, 1, 2].map(|c| from[c] + share * (to[c] - from[c]))
+        }));
+    };
+    for k in -2..=2 {
+        let across = f64::from(k) * APART;
+        let (from, to) = if k % 2 == 0 {
+            (-HALF, HALF)
+        } else {
+            (HALF, -HALF)
+        };
+        go([from, across, -ABOVE], AIR, &mut way);
+        go([from, across, DEPTH], DOWN, &mut way);
+        go([to, across, DEPTH], ALONG, &mut way);
+        go([to, across, -ABOVE], DOWN, &mut way);
+    }
+    way
+}
+
+struct Skin {
+    surface: palpa_mesh::Surface,
+    index: SurfaceIndex,
+    normals: Vec<Vec3>,
+}
+
+impl Skin {
+    fn nearest(&self, point: Vec3) -> (Vec3, Vec3) {
+        let closest = self.index.closest(point).unwrap();
+        let corners = self.surface.triangles[closest.triangle as usize];
+        let normal: Vec3 = (corners.iter().zip(closest.weights))
+            .map(|(&v, w)| self.normals[v as usize] * w)
+            .sum();
+        (closest.point, normal.normalize())
+    }
+}
+
+fn map_of(scene: &Scene) -> PalpationMap {
+    let live = LiveScene::build(scene).unwrap();
+    let surface = live.prepared.grown.growth.body.skin.clone();
+    let skin = Skin {
+        index: SurfaceIndex::build(&surface),
+        normals: surface.vertex_normals(),
+        surface,
+    };
+    let frame = live.scene_from_device;
+    let (home, up) = skin.nearest((frame * Point3::origin()).coords);
+    let along = Vec3::x();
+    let across = up.cross(&along).normalize();
+    let place = |[x, y, _]: [f64; 3]| skin.nearest(home + along * x + across * y + up * 5e-3);
+    let tips: Vec<Vec3> = (way().into_iter())
+        .map(|at| {
+            let (point, normal) = place(at);
+            let tip = point - normal * at[2];
+            (frame.inverse() * Point3::from(tip)).coords
+        })
+        .collect();
+    let target = LiveTarget::new(tips[0]);
+    let mut device = open_device(&scene.device, target.clone()).unwrap();
+    let params = RehearsalParams {
+        step_time: STEP_TIME,
+        duration: tips.len() as f64 * STEP_TIME,
+        servo: servo_params(&*device),
+        ..RehearsalParams::default()
+    };
+    let mut tissue = live.tissue_at(tips[0]).unwrap();
+    let mut converged = Vec::new();
+    let ticks = rehearse(&mut tissue, &mut *device, &params, |_, _, done| {
+        target.set(tips[converged.len().min(tips.len() - 1)]);
+        converged.push(done.status == StepStatus::Converged);
+    });
+    let per_step = (STEP_TIME / params.servo.period).round() as usize;
+    let mut map = PalpationMap::default();
+    for (k, tick) in ticks.iter().enumerate().step_by(EVERY) {
+        let tool = &tick.report.tools[0];
+        let tip = (frame * Point3::from(tick.position + tool.stretch)).coords;
+        let (point, normal) = skin.nearest(tip);
+        let depth = normal.dot(&(point - tip));
+        let shape = scene.tool.contact().unwrap().shape;
+        let touch = Touch {
+            point,
+            normal,
+            depth,
+            force: normal.dot(&(frame.rotation * tool.tissue_force)),
+            radius: shape.contact_radius_at(depth.max(0.0)),
+            is_sound: tick.report.faults.is_empty()
+                && tick.report.gain >= 1.0
+                && converged[(k / per_step).min(converged.len() - 1)],
+        };
+        map.feel(Some(&touch), EVERY as f64 * params.servo.period);
+    }
+    while !map.update(usize::MAX) {}
+    map
+}
+
+#[test]
+fn five_strokes_find_the_lump_and_nothing_without_it() {
+    let scene = gallery::scene("forearm_lump").unwrap();
+    let live = LiveScene::build(&scene).unwrap();
+    let lump = live.prepared.lumps()[0].pose().translation.vector;
+    let above = {
+        let surface = &live.prepared.grown.growth.body.skin;
+        SurfaceIndex::build(surface).closest(lump).unwrap().point
+    };
+    let mut without = scene.clone();
+    without.lumps.clear();
+    let (with, without) = (map_of(&scene), map_of(&without));
+    for (name, map) in [("lump", &with), ("no lump", &without)] {
+        let shares = map.against_surroundings();
+        let best = (map.spots().iter())
+            .filter_map(|spot| {
+                Some((
+                    map.value_at(&spot.point, &spot.normal, shares)?.0,
+                    spot.point,
+                ))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap();
+        println!(
+            "{name}: {} spots, stiffness {:.3} to {:.3} N/mm, brightest {:+.1} %, {:.1} mm from the place above the lump",
+            map.spots().len(),
+            map.stiffness()
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min)
+                * 1e-3,
+            map.stiffness().iter().copied().fold(0.0, f64::max) * 1e-3,
+            100.0 * best.0,
+            (best.1 - above).norm() * 1e3,
+        );
+    }
+    assert!(with.spots().len() > 80);
+    let found = with.finding().expect("the lump stands out");
+    assert!((found.point - above).norm() < 5e-3, "{found:?}");
+    assert_eq!(without.finding(), None);
+}
