@@ -4,8 +4,15 @@ import type { Moment } from './history';
 
 /** Force from which the tool touches, N: without contact it is zero. */
 export const TOUCH = 1e-6;
-/** Time without a force after which the tool has been lifted, s. */
-export const LIFTED = 0.15;
+/** Times without a force after which the tool has been lifted, s: above the skin at rest, and in the dent that the
+ * tool leaves. A late contact patch may let the force go for a moment. */
+const LIFTED = 0.15;
+const LEFT = 1;
+
+/** Whether the tool is lifted at a moment without a force; `felt` is the time of the last force, s. */
+export function isLifted({ time, depth }: Moment, felt: number): boolean {
+  return time > felt + (depth < 0 ? LIFTED : LEFT);
+}
 /** Runs before the newest one. */
 const GHOSTS = 3;
 /** Shorter runs are none, s. */
@@ -54,7 +61,7 @@ export class Runs {
     }
     this.before = moment;
     if (touches) this.felt = moment.time;
-    else if (moment.time > this.felt + LIFTED) {
+    else if (isLifted(moment, this.felt)) {
       this.end();
       return true;
     }

@@ -2,7 +2,7 @@
 // lifted, rests, or turns back.
 
 import { distance, type Moment } from './history';
-import { LIFTED, TOUCH } from './runs';
+import { TOUCH, isLifted } from './runs';
 
 type Vec3 = readonly [number, number, number];
 
@@ -60,7 +60,8 @@ export class Strokes {
       return false;
     }
     if (moment.force <= TOUCH || !Number.isFinite(moment.place[0])) {
-      if (moment.time > this.felt + LIFTED) this.end();
+      if (isLifted(moment, this.felt)) this.end();
+      else this.break();
       return false;
     }
     this.felt = moment.time;
