@@ -1,6 +1,6 @@
 // Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.
 
-export const SNAPSHOT_VERSION = 3;
+export const SNAPSHOT_VERSION = 4;
 
 class Reader {
   private at = 0;
@@ -160,7 +160,48 @@ function readFrameSnapshot(r: Reader): FrameSnapshot {
   };
 }
 
-export type Snapshot = MeshSnapshot | FrameSnapshot;
+/** The palpation map: the places of the skin that were felt. Sent after every change, a few times a second. */
+export interface MapSnapshot {
+  kind: 3;
+  /** Grows with every change. */
+  revision: number;
+  /** Places of the skin at rest, m: x, y, z of each in turn. */
+  points: Float32Array;
+  /** Outward normals there. */
+  normals: Float32Array;
+  /** Secant stiffness of each place, N/m. */
+  stiffness: Float32Array;
+  /** By how much each place is stiffer than its surroundings, as a share of them; NaN if too little around it was felt. */
+  shares: Float32Array;
+  /** Width of each spot (standard deviation), m. */
+  widths: Float32Array;
+  /** 1 if a place stands out from its surroundings. */
+  has_finding: number;
+  /** That place, m. */
+  finding: [number, number, number];
+  /** By how much it is stiffer than its surroundings, as a share of them. */
+  finding_share: number;
+  /** Number of places that were forgotten, because there were too many. */
+  n_forgotten: number;
+}
+
+function readMapSnapshot(r: Reader): MapSnapshot {
+  return {
+    kind: 3,
+    revision: r.u32(),
+    points: r.f32s(),
+    normals: r.f32s(),
+    stiffness: r.f32s(),
+    shares: r.f32s(),
+    widths: r.f32s(),
+    has_finding: r.u32(),
+    finding: [r.f64(), r.f64(), r.f64()],
+    finding_share: r.f64(),
+    n_forgotten: r.u32(),
+  };
+}
+
+export type Snapshot = MeshSnapshot | FrameSnapshot | MapSnapshot;
 
 /** Reads a snapshot; its lists look into `buffer`. Throws when it is of another version or cut off. */
 export function readSnapshot(buffer: ArrayBuffer): Snapshot {
@@ -170,5 +211,6 @@ export function readSnapshot(buffer: ArrayBuffer): Snapshot {
   const kind = r.u32();
   if (kind === 1) return readMeshSnapshot(r);
   if (kind === 2) return readFrameSnapshot(r);
+  if (kind === 3) return readMapSnapshot(r);
   throw new Error(`snapshot of unknown kind ${kind}`);
 }
