@@ -9,6 +9,7 @@
 # make cross      cargo check for Windows and for Linux on ARM
 # make loop       a minute of the 1 kHz loop in real time, and the same minute run again
 # make bench      the thesis's table and the moving step, measured here
+# make bench-page what the page costs and how soon it feels, in a browser on an idle machine (PAGE_OPTIONS=…)
 
 SHARED  ?= ../shared
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
@@ -24,7 +25,7 @@ BOOK_TOOLS ?= $(abspath $(TARGET))/tools
 MDBOOK  := $(or $(shell command -v mdbook 2>/dev/null),$(BOOK_TOOLS)/bin/mdbook)
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 
-.PHONY: run test hunt test-page test-slow test-data shared lint docs cross bench loop dist
+.PHONY: run test hunt test-page test-slow test-data shared lint docs cross bench bench-page loop dist
 
 run: $(PAGE)
 	cargo run --release --package palpa-cli -- view
@@ -111,6 +112,11 @@ cross:
 bench:
 	cargo run --release --package palpa-cli -- reproduce
 	cargo run --release --package palpa-cli -- bench
+
+bench-page: $(PAGE)
+	cargo build --release --package palpa-cli
+	node web/e2e/browser.mjs --install
+	cd web && PALPA_BIN="$(abspath $(TARGET))/release/palpa" npm run bench-page -- $(PAGE_OPTIONS)
 
 loop:
 	cargo run --release --package palpa-cli -- loop-report

@@ -4,6 +4,7 @@ import './touch.test.mjs';
 import './bars.test.mjs';
 import './cutaway.test.mjs';
 import './game.test.mjs';
+import './map.test.mjs';
 import './recording.test.mjs';
 import './scene.test.mjs';
 import './access.test.mjs';

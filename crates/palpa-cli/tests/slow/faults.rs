@@ -121,8 +121,10 @@ fn check_limits(log: &Log, spec: &DeviceSpec) {
     }
 }
 
-/// Time in which the law lets most of a force go, s, on the clock of the ticks.
+/// Times in which the law lets most of a force go, s, on the clock of the ticks: without a device, and while the
+/// force fades because there is no new patch.
 const LET_GO: f64 = 0.09;
+const FADED: f64 = 0.25;
 
 /// Without a device, or once the patch of a paused tissue is stale, nothing presses on.
 fn check_let_go(log: &Log, report: &Report, usual: f64) {
@@ -131,12 +133,12 @@ fn check_let_go(log: &Log, report: &Report, usual: f64) {
         events.find(|e| e.time >= from && is(&e.what)).unwrap().time
     };
     let paused = said(&|e| *e == Happening::Injected(Injection::TissuePauses), 0.0);
-    for (fault, from) in [
-        (Faults::BAD_READING, 0.0),
-        (Faults::DEVICE_LOST, 0.0),
-        (Faults::STALE_PATCH, paused),
+    for (fault, from, time) in [
+        (Faults::BAD_READING, 0.0, LET_GO),
+        (Faults::DEVICE_LOST, 0.0, LET_GO),
+        (Faults::STALE_PATCH, paused, FADED),
     ] {
-        let end = said(&|e| has(e, fault), from) + LET_GO;
+        let end = said(&|e| has(e, fault), from) + time;
         let k = (log.ticks).partition_point(|t| t.tick.now < end);
         let there = log.ticks[k].devices[0].force[2];
         assert!(there.abs() < 0.7 * usual, "{fault:?}: {there} N");

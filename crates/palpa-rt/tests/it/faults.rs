@@ -98,13 +98,13 @@ fn a_tissue_that_stops_lets_the_force_go_and_brings_it_back() {
 #[test]
 fn a_patch_that_comes_late_is_a_stall_and_no_jump() {
     let (report, _) = faulty(&Bed::new(), |engine, hand| {
-        engine.faults().delay_tissue(0.1);
+        engine.faults().delay_tissue(0.2);
         until("the late patch came", || {
-            engine.tissue_stats().wall.max() > 0.1
+            engine.tissue_stats().wall.max() > 0.2
         });
         until_felt(hand);
         // One that is so late that it must not be felt at all.
-        engine.faults().delay_tissue(0.4);
+        engine.faults().delay_tissue(0.9);
         until_zero(hand);
         until_felt(hand);
     });
