@@ -6,5 +6,7 @@ import './cutaway.test.mjs';
 import './game.test.mjs';
 import './recording.test.mjs';
 import './scene.test.mjs';
+import './power.test.mjs';
+import './own.test.mjs';
 import './access.test.mjs';
 import './connection.test.mjs';

@@ -8,9 +8,11 @@ use std::time::Duration;
 use palpa_fem::Model;
 use palpa_mesh::{LayeredBody, Vec3};
 use palpa_rt::Table;
-use palpa_viewer::control::Request;
+use palpa_scene::{LengthUnit, Scene};
+use palpa_viewer::control::{Request, Uploaded};
 use palpa_viewer::{Answer, Clients, Host, HostFile};
 
+use crate::own::{Folder, Shelf, packed};
 use crate::world::World;
 use palpa_plot::vtu::Grid;
 
@@ -30,6 +32,8 @@ pub(super) enum Order {
 /// The data of a file, before it is written.
 pub(super) enum Material {
     Scene(String),
+    /// The scene with its files, and the folder that keeps them until they are packed.
+    Archive(Box<Scene>, Option<Arc<Folder>>),
     Tissue(Arc<Model>, Vec<Vec3>),
     Springs(Box<LayeredBody>, Vec<Vec3>),
     Log(PathBuf),
@@ -40,6 +44,7 @@ pub(super) enum Material {
 pub struct Remote {
     pub(super) orders: Sender<Order>,
     pub(super) problem: Arc<Mutex<Option<String>>>,
+    pub(super) shelf: Shelf,
 }
 
 impl Host for Remote {
@@ -66,6 +71,19 @@ impl Host for Remote {
             .map_err(|e| palpa::one_paragraph(&e))
     }
 
+    fn upload(&self, name: &str, bytes: Vec<u8>) -> Result<Uploaded, String> {
+        let taken = self.shelf.take(name, &bytes);
+        taken.map_err(|error| palpa::one_paragraph(&error))
+    }
+
+    fn check_uploaded(&self, id: u32, unit: LengthUnit) -> Option<Uploaded> {
+        self.shelf.check(id, unit)
+    }
+
+    fn uploaded_mesh(&self, id: u32) -> Option<Vec<u8>> {
+        Some(self.shelf.mesh(id)?.encode())
+    }
+
     fn problem(&self) -> Option<String> {
         let problem = self.problem.lock();
         problem.unwrap_or_else(PoisonError::into_inner).clone()
@@ -75,6 +93,7 @@ impl Host for Remote {
 fn written(file: HostFile, material: Material) -> anyhow::Result<Vec<u8>> {
     Ok(match material {
         Material::Scene(text) => text.into_bytes(),
+        Material::Archive(scene, _files) => packed(&scene)?,
         Material::Tissue(model, displacements) => vtu(model.body(), &displacements)?,
         Material::Springs(body, displacements) => vtu(&body, &displacements)?,
         Material::Log(path) if file == HostFile::RecordingCsv => {

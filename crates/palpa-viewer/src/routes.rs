@@ -9,7 +9,7 @@ use crate::{
     host::HostFile,
     hub::Hub,
     limits::{ANSWER_WAIT, MAX_CLIENTS, MAX_MESSAGE, Verdict},
-    metrics, openapi, page,
+    metrics, openapi, page, upload,
 };
 use axum::{
     Json, Router,
@@ -54,6 +54,13 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
             "/api/recording.csv",
             get(|hub| file(hub, HostFile::RecordingCsv)),
         )
+        .route(
+            "/api/scene.zip",
+            get(|hub| file(hub, HostFile::SceneArchive)),
+        )
+        .route("/api/upload", post(upload::take))
+        .route("/api/upload/check", get(upload::check))
+        .route("/api/upload/mesh", get(upload::mesh))
         .route("/metrics", get(figures))
         .layer(DefaultBodyLimit::max(MAX_MESSAGE))
         .route_layer(from_fn_with_state(Arc::clone(hub), guard::token));
@@ -196,6 +203,7 @@ fn json(text: Option<String>, missing: &'static str) -> Response {
 async fn file(State(hub): Shared, file: HostFile) -> Response {
     let (kind, name) = match file {
         HostFile::Scene => ("application/toml", "scene.toml"),
+        HostFile::SceneArchive => ("application/zip", "scene.zip"),
         HostFile::Body => ("application/xml", "body.vtu"),
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),

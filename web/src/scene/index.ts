@@ -3,4 +3,5 @@
 export { BodyView } from './view';
 export { DEFAULT_OPTIONS, NoWebGL2 } from './options';
 export type { Legend, Picked, SectionArea, Vec3, ViewOptions } from './options';
+export type { CameraPose } from './rig';
 export { COLOURINGS, quantityOf, type ColourBy } from './quantities';
