@@ -60,7 +60,7 @@ test-slow:
 	@if command -v cargo-nextest >/dev/null; then cargo nextest run --release --package palpa-cli --features slow-tests --test slow; \
 	else cargo test --release --package palpa-cli --features slow-tests --test slow; fi
 
-test-data: shared $(VENV)/ready
+test-data: shared $(VENV)/ready $(PAGE)
 	rm -rf "$(RESULTS)"
 	@command -v ccx >/dev/null || echo "test-data: CalculiX (ccx) is not installed, its tests are left out"
 	PALPA_SHARED="$$(cd "$(SHARED)" && pwd)" cargo test --release --package palpa-cli --features data-tests --test data \
@@ -68,6 +68,9 @@ test-data: shared $(VENV)/ready
 	cargo test --workspace --test it -- vtu::
 	cargo run --release --package palpa-cli --features data-tests -- press --out "$(RESULTS)/press"
 	"$(VENV)/bin/python" tools/check_vtu.py "$(RESULTS)"
+	node web/e2e/browser.mjs --install
+	cd web && PALPA_SHARED="$$(cd .. && cd "$(SHARED)" && pwd)" PALPA_BIN="$(abspath $(TARGET))/release/palpa" \
+	  PALPA_SHOTS="$(abspath $(SHOTS))" node --test --test-reporter=spec e2e/data.test.mjs
 
 shared:
 	@test -d "$(SHARED)" || { echo "make test-data: no folder \"$(SHARED)\"; say where the data is: make test-data SHARED=…" >&2; exit 1; }

@@ -7,6 +7,8 @@ import './game.test.mjs';
 import './map.test.mjs';
 import './recording.test.mjs';
 import './scene.test.mjs';
+import './power.test.mjs';
+import './own.test.mjs';
 import './access.test.mjs';
 import './curves.test.mjs';
 import './connection.test.mjs';

@@ -4,11 +4,14 @@ import './style/layout.css';
 import './style/controls.css';
 import './style/panels.css';
 import './style/stage.css';
+import './style/own.css';
 import { effect } from '@preact/signals';
 import { connect, isController, send, state } from './store';
 import { App } from './ui/App';
 import { beginFeedback } from './ui/feedback';
+import { beginRestoring } from './ui/restore';
 import { neededField, theme } from './ui/settings';
+import { beginLinks } from './ui/share';
 import { computed } from '@preact/signals';
 import { drawPlainly } from './machine';
 
@@ -20,6 +23,8 @@ effect(() => {
 
 render(<App />, document.getElementById('app')!);
 beginFeedback();
+beginRestoring();
+beginLinks();
 connect();
 
 // The engine computes a field only while a page shows it.

@@ -8,6 +8,7 @@ import { Connection, type ConnectionStatus, type Request } from './connection';
 import { language, t } from './i18n';
 import { noticeWords } from './i18n/events';
 import { History } from './ui/history';
+import { inPageWords } from './ui/words';
 
 export type Vec3 = [number, number, number];
 
@@ -112,24 +113,23 @@ function takeSnapshot(snapshot: Snapshot): void {
   }
 }
 
-// The scene as it was loaded, for “Reset”.
+// The scenes as they were loaded, for “Reset” of single layers. The engine numbers the loads.
 
+const MOST_ORIGINALS = 50;
+const originals = new Map<number, SceneTable>();
 export const original = signal<SceneTable | null>(null);
-let originalKey: string | null | undefined;
-let originalRevision: string | null = null;
-
-/** The next scene from the engine is a newly loaded one, not an edited one. */
-function awaitScene(): void {
-  originalRevision = JSON.stringify(state.value?.scene ?? null);
-}
+let runOfOriginals: string | null = null;
 
 function keepOriginal(next: State): void {
-  const key = next.gallery_key ?? null;
-  const isChosen = originalRevision !== null && JSON.stringify(next.scene) !== originalRevision;
-  if (original.value !== null && !isChosen && (key === null || key === originalKey)) return;
-  original.value = next.scene as SceneTable;
-  originalKey = key;
-  originalRevision = null;
+  const run = hello.peek()?.run ?? null;
+  if (run !== runOfOriginals) originals.clear();
+  runOfOriginals = run;
+  if (next.scene == null) return;
+  if (!next.is_changed) {
+    originals.set(next.origin, next.scene as SceneTable);
+    for (const origin of originals.keys()) if (originals.size > MOST_ORIGINALS) originals.delete(origin);
+  }
+  original.value = originals.get(next.origin) ?? null;
 }
 
 function takeMessage(message: Message): void {
@@ -147,10 +147,10 @@ function takeMessage(message: Message): void {
       figures.value = message;
       break;
     case 'notice':
-      notify(message.level, noticeWords(message.what, language.value));
+      notify(message.level, inPageWords(noticeWords(message.what, language.value), scene.peek()));
       break;
     case 'reply':
-      if (message.error != null) notify('warning', message.error);
+      if (message.error != null) notify('warning', inPageWords(message.error, scene.peek()));
   }
 }
 
@@ -175,12 +175,8 @@ export function connect(): void {
 /** Sends a request; resolves to the reason of a refusal, or null. Shows nothing: fields show the
  * reason themselves. */
 export async function ask(request: Request): Promise<string | null> {
-  const isScene = request.type === 'load_text';
-  if (isScene) awaitScene();
   const error = (await connection?.request(request)) ?? (connection === null ? t('connection.not_connected') : null);
-  // A refused scene does not come.
-  if (isScene && error !== null) originalRevision = null;
-  return error;
+  return error === null ? null : inPageWords(error, scene.peek());
 }
 
 /** Sends a request, and shows a refusal as a notice. */
@@ -204,7 +200,7 @@ export function edit(...edits: [path: string, value: unknown][]): Promise<string
 export const homeKey = computed(() => state.value?.home.point.join());
 
 /** Changes when another body is chosen. */
-export const galleryKey = computed(() => state.value?.gallery_key);
+export const galleryKey = computed(() => state.value?.gallery_key ?? state.value?.origin);
 /** Changes with the form of the body: curves of one form mean nothing for another. */
 const formKey = computed(() => JSON.stringify([galleryKey.value, scene.value?.body]));
 /** Changes with everything that is pressed, and what presses it. */

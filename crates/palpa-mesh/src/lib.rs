@@ -26,7 +26,9 @@ pub use coarsen::Coarsening;
 pub use distance::{SurfaceIndex, closest_on_triangle};
 pub use growth::{Growth, GrowthError, GrowthParams, LayerSpec, grow};
 pub use part::Part;
-pub use read::{Format, ReadError, SurfaceFile, read_surface, read_surface_bytes};
+pub use read::{
+    Format, ReadError, SurfaceFile, read_surface, read_surface_bytes, read_surface_named,
+};
 pub use repair::{RepairOptions, RepairReport, repair};
 pub use surface::Surface;
 pub use weld::{weld_exact, weld_within};

@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Device, Lump, MaterialStatus, Mesh, Model, Motion, SceneError, Status, Thickness, Tissue, Tool,
-    resolve,
+    Device, Lump, LumpShape, MaterialStatus, Mesh, Model, Motion, SceneError, Status, Thickness,
+    Tissue, Tool, resolve,
     write::{self, Names},
 };
 
@@ -286,6 +286,52 @@ impl Scene {
     /// they can be edited.
     pub fn to_toml_in_full(&self) -> String {
         write::to_toml(self, Names::None)
+    }
+
+    /// All files that the scene refers to, with the folder of the scene: the skin, bones, thicknesses
+    /// and lumps, in this order. A file that is used twice is listed twice.
+    pub fn files(&self) -> Vec<&Path> {
+        let mut files = Vec::new();
+        if let Skin::File(path) = &self.body.skin {
+            files.push(path.as_path());
+        }
+        files.extend(self.body.bones.iter().map(PathBuf::as_path));
+        for layer in &self.layers {
+            if let Some(Thickness::File(path)) = &layer.thickness {
+                files.push(path);
+            }
+        }
+        for lump in &self.lumps {
+            if let LumpShape::Mesh(path) = &lump.shape {
+                files.push(path);
+            }
+        }
+        files
+    }
+
+    /// The same scene with its files elsewhere: `place` gives the new path of each of
+    /// [`Self::files`], and paths are written relative to `base_dir`.
+    #[must_use]
+    pub fn with_files_at(&self, base_dir: &Path, mut place: impl FnMut(&Path) -> PathBuf) -> Self {
+        let mut scene = self.clone();
+        base_dir.clone_into(&mut scene.base_dir);
+        if let Skin::File(path) = &mut scene.body.skin {
+            *path = place(path);
+        }
+        for path in &mut scene.body.bones {
+            *path = place(path);
+        }
+        for layer in &mut scene.layers {
+            if let Some(Thickness::File(path)) = &mut layer.thickness {
+                *path = place(path);
+            }
+        }
+        for lump in &mut scene.lumps {
+            if let LumpShape::Mesh(path) = &mut lump.shape {
+                *path = place(path);
+            }
+        }
+        scene
     }
 
     /// Number of prisms under each skin triangle: one less than the nodes in a column.

@@ -1,11 +1,13 @@
-//! The wanted scene, and the thread that builds its body.
+//! The thread that builds the body of the wanted scene.
 //!
 //! ```text
 //!  Idle ── build ──► Building ── another scene is wanted ──► Stale
 //!    ▲ finish: take over │                                     │ finish: leave it, build again
-//!    └───────────────────┘                                     └──► Building
+//!    ├───────────────────┤ cancel                              └──► Building
+//!    └─ finish: leave it ┴──► Cancelled
 //! ```
-//! One body is built at a time. Meanwhile, the previous body can be pressed.
+//! One body is built at a time. Meanwhile, the previous body can be pressed. A build cannot be
+//! interrupted: one that is cancelled ends by itself, and its body is left.
 
 use std::io;
 use std::sync::mpsc::Sender;
@@ -16,15 +18,6 @@ use palpa_scene::Scene;
 use crate::remote::Order;
 use crate::world::World;
 
-/// A scene that a page asked for.
-#[derive(Debug, Clone)]
-pub(crate) struct Wanted {
-    /// The scene.
-    pub(crate) scene: Scene,
-    /// Its key, if it is of the gallery.
-    pub(crate) key: Option<String>,
-}
-
 /// The builder's state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Work {
@@ -32,8 +25,21 @@ enum Work {
     Idle,
     /// The wanted scene is being built.
     Building,
-    /// A scene is being built that is no longer wanted.
+    /// A scene is being built that is no longer wanted; another one is.
     Stale,
+    /// A scene is being built that is no longer wanted; the present body is.
+    Cancelled,
+}
+
+/// What to do with a body that was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Built {
+    /// It is the wanted one.
+    Wanted,
+    /// Another one is wanted: build again.
+    Stale,
+    /// None is wanted any more.
+    Unwanted,
 }
 
 /// Starts to build a scene on another thread. The outcome arrives as [`Order::Built`].
@@ -41,21 +47,18 @@ type StartBuilding = Box<dyn FnMut(&Scene) -> io::Result<()> + Send>;
 
 /// The builder.
 pub(crate) struct Builder {
-    /// The scene of the present body, or the scene that will replace it.
-    pub(crate) wanted: Wanted,
     work: Work,
     start: StartBuilding,
 }
 
 impl Builder {
     /// A builder that builds on threads of its own and sends each outcome to `orders`.
-    pub(crate) fn new(wanted: Wanted, orders: Sender<Order>) -> Self {
-        Self::starting(wanted, Box::new(move |scene| spawn(scene, &orders)))
+    pub(crate) fn new(orders: Sender<Order>) -> Self {
+        Self::starting(Box::new(move |scene| spawn(scene, &orders)))
     }
 
-    fn starting(wanted: Wanted, start: StartBuilding) -> Self {
+    fn starting(start: StartBuilding) -> Self {
         Self {
-            wanted,
             work: Work::Idle,
             start,
         }
@@ -65,27 +68,40 @@ impl Builder {
     ///
     /// # Errors
     /// When the system gives no thread.
-    pub(crate) fn build(&mut self) -> io::Result<()> {
+    pub(crate) fn build(&mut self, wanted: &Scene) -> io::Result<()> {
         self.work = match self.work {
             Work::Idle => {
-                (self.start)(&self.wanted.scene)?;
+                (self.start)(wanted)?;
                 Work::Building
             }
-            Work::Building | Work::Stale => Work::Stale,
+            Work::Building | Work::Stale | Work::Cancelled => Work::Stale,
         };
         Ok(())
     }
 
-    /// Called when a build has ended. Returns whether it was for the wanted scene; if not, build
-    /// again.
-    #[must_use]
-    pub(crate) fn finish(&mut self) -> bool {
-        std::mem::replace(&mut self.work, Work::Idle) != Work::Stale
+    /// The body that is being built is not wanted any more, nor is another. Returns whether there was
+    /// one.
+    pub(crate) fn cancel(&mut self) -> bool {
+        let is_wanted = self.is_building();
+        if is_wanted {
+            self.work = Work::Cancelled;
+        }
+        is_wanted
     }
 
-    /// Whether a body is being built.
+    /// Called when a build has ended. Returns what to do with its body.
+    #[must_use]
+    pub(crate) fn finish(&mut self) -> Built {
+        match std::mem::replace(&mut self.work, Work::Idle) {
+            Work::Stale => Built::Stale,
+            Work::Cancelled => Built::Unwanted,
+            Work::Idle | Work::Building => Built::Wanted,
+        }
+    }
+
+    /// Whether a body is being built that is wanted.
     pub(crate) fn is_building(&self) -> bool {
-        self.work != Work::Idle
+        matches!(self.work, Work::Building | Work::Stale)
     }
 }
 
@@ -111,17 +127,14 @@ mod tests {
     use super::*;
     use std::sync::{Arc, Mutex};
 
-    fn wanted(key: &str) -> Wanted {
+    fn scene(name: &str) -> Scene {
         let mut scene = Scene::embedded();
-        scene.layers[0].tissue.name = key.to_owned();
-        Wanted {
-            scene,
-            key: Some(key.to_owned()),
-        }
+        name.clone_into(&mut scene.layers[0].tissue.name);
+        scene
     }
 
     /// A builder, and the scenes that it started to build.
-    fn builder(key: &str) -> (Builder, Arc<Mutex<Vec<String>>>) {
+    fn builder() -> (Builder, Arc<Mutex<Vec<String>>>) {
         let started = Arc::<Mutex<Vec<String>>>::default();
         let log = Arc::clone(&started);
         let start: StartBuilding = Box::new(move |scene| {
@@ -130,38 +143,52 @@ mod tests {
                 .push(scene.layers[0].tissue.name.clone());
             Ok(())
         });
-        (Builder::starting(wanted(key), start), started)
+        (Builder::starting(start), started)
     }
 
     #[test]
     fn a_body_that_is_still_wanted_is_taken_over() {
-        let (mut builder, started) = builder("a");
-        assert!(!builder.is_building());
-        builder.build().unwrap();
+        let (mut builder, started) = builder();
+        assert!(!builder.is_building() && !builder.cancel());
+        builder.build(&scene("a")).unwrap();
         assert!(builder.is_building());
-        assert!(builder.finish());
+        assert_eq!(builder.finish(), Built::Wanted);
         assert!(!builder.is_building());
         assert_eq!(*started.lock().unwrap(), ["a"]);
     }
 
     #[test]
     fn of_scenes_wanted_meanwhile_only_the_latest_is_built() {
-        let (mut builder, started) = builder("a");
-        builder.build().unwrap();
-        for key in ["b", "c", "d"] {
-            builder.wanted = wanted(key);
-            builder.build().unwrap();
+        let (mut builder, started) = builder();
+        builder.build(&scene("a")).unwrap();
+        for name in ["b", "c"] {
+            builder.build(&scene(name)).unwrap();
+            assert!(builder.is_building());
         }
-        assert_eq!(*started.lock().unwrap(), ["a"]);
-        // "a" is built but no longer wanted.
-        assert!(!builder.finish());
-        builder.build().unwrap();
-        assert_eq!(*started.lock().unwrap(), ["a", "d"]);
-        assert!(builder.finish());
+        assert_eq!(builder.finish(), Built::Stale);
+        builder.build(&scene("c")).unwrap();
+        assert_eq!(builder.finish(), Built::Wanted);
+        assert_eq!(*started.lock().unwrap(), ["a", "c"]);
     }
 
     #[test]
-    fn without_a_thread_the_builder_is_idle_and_can_be_asked_again() {
+    fn a_body_that_was_cancelled_is_left() {
+        let (mut builder, started) = builder();
+        builder.build(&scene("a")).unwrap();
+        assert!(builder.cancel());
+        assert!(!builder.is_building(), "nothing that is wanted");
+        // One build at a time, still.
+        builder.build(&scene("b")).unwrap();
+        assert_eq!(*started.lock().unwrap(), ["a"]);
+        assert_eq!(builder.finish(), Built::Stale);
+        builder.build(&scene("b")).unwrap();
+        assert!(builder.cancel());
+        assert_eq!(builder.finish(), Built::Unwanted);
+        assert_eq!(*started.lock().unwrap(), ["a", "b"]);
+    }
+
+    #[test]
+    fn without_a_thread_nothing_is_being_built() {
         let mut n_left = 1;
         let start: StartBuilding = Box::new(move |_| {
             n_left -= 1;
@@ -171,10 +198,10 @@ mod tests {
                 Ok(())
             }
         });
-        let mut builder = Builder::starting(wanted("a"), start);
-        assert!(builder.build().is_err());
+        let mut builder = Builder::starting(start);
+        assert!(builder.build(&scene("a")).is_err());
         assert!(!builder.is_building());
-        builder.build().unwrap();
-        assert!(builder.finish());
+        builder.build(&scene("a")).unwrap();
+        assert_eq!(builder.finish(), Built::Wanted);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A request that concerns several parts is a method here; all other code is in the parts.
 
-use std::path::PathBuf;
+use std::path::{MAIN_SEPARATOR, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -14,12 +14,15 @@ use palpa_rt::RecorderParams;
 use palpa_scene::Scene;
 use palpa_viewer::control::{Field, Hand, NoticeKind, NoticeLevel, Phase, Problem, Request};
 use palpa_viewer::{Answer, Clients, HostFile, Publisher};
+use serde_json::Value;
 
 use crate::bars::Bars;
-use crate::builder::{Builder, Wanted};
+use crate::builder::{Builder, Built};
 use crate::drill::Drills;
 use crate::game::Game;
 use crate::hand::{goal_of, in_range};
+use crate::history::{History, Origin, Wanted};
+use crate::own::{Folder, Shelf};
 use crate::palpation::Palpation;
 use crate::publish::{Fields, Screen, Status, Told, granted};
 use crate::remote::{Material, Order};
@@ -44,8 +47,20 @@ pub(crate) struct Desk {
     out: PathBuf,
     /// Seed of the next round of the game, if the page gives none.
     seed: Option<u64>,
+    /// The scene that the program was started with: scenes given as text are relative to its folder.
+    home: Scene,
     clients: Clients,
     stage: Stage,
+    history: History,
+    /// Number of scenes that were loaded.
+    n_loaded: u64,
+    /// The scene of the present body; while lumps are hidden in it, the one before.
+    present: Option<Wanted>,
+    /// The wanted scene with the lumps that a game hides, and whether the present body has them.
+    hidden: Option<Scene>,
+    has_hidden: bool,
+    /// The files that pages have sent.
+    shelf: Shelf,
     builder: Builder,
     tape: Tape,
     game: Option<Game>,
@@ -65,17 +80,22 @@ impl Desk {
         problem: Arc<Mutex<Option<String>>>,
         publisher: Publisher,
         workers: Workers,
+        shelf: Shelf,
     ) -> Self {
-        let wanted = Wanted {
-            scene: params.scene,
-            key: params.gallery_key,
-        };
+        let first = Wanted::loaded(1, params.scene.clone(), params.gallery_key, None);
         Self {
             out: params.out,
             seed: params.seed,
+            home: params.scene,
             clients: Clients::default(),
             stage: Stage::default(),
-            builder: Builder::new(wanted, orders),
+            history: History::new(first),
+            n_loaded: 1,
+            present: None,
+            hidden: None,
+            has_hidden: false,
+            shelf,
+            builder: Builder::new(orders),
             tape: Tape::default(),
             game: None,
             bars: workers.bars,
@@ -113,7 +133,18 @@ impl Desk {
             self.status.change();
         }
         let result = self.request(request, Instant::now());
-        answer(result.map_err(|error| one_paragraph(&error)));
+        answer(result.map_err(|error| self.words(&error)));
+    }
+
+    /// An error in words. Users know their files by their names, not by the temporary folder.
+    fn words(&self, error: &anyhow::Error) -> String {
+        let text = one_paragraph(error);
+        let folders = [Some(self.history.wanted()), self.present.as_ref()];
+        (folders.into_iter().flatten())
+            .filter_map(|wanted| wanted.files.as_ref())
+            .fold(text, |text, folder| {
+                text.replace(&format!("{}{MAIN_SEPARATOR}", folder.path().display()), "")
+            })
     }
 
     fn request(&mut self, request: Request, now: Instant) -> anyhow::Result<()> {
@@ -124,17 +155,55 @@ impl Desk {
             Request::Lift => self.lift(),
             Request::LoadScene { key } => {
                 let scene = gallery::scene(&key)?;
-                self.want(scene, Some(key))?;
+                self.load(scene, Some(key), None, now)?;
             }
-            Request::LoadText { text } => {
-                let scene = edit::parsed(&text, &self.builder.wanted.scene.base_dir)?;
-                self.want(scene, None)?;
+            Request::LoadText { text, files } if files.is_empty() => {
+                let scene = edit::parsed(&text, &self.home.base_dir)?;
+                self.load(scene, None, None, now)?;
+            }
+            Request::LoadText { text, files } => {
+                let (scene, folder) = self.shelf.scene_of_text(&text, &files)?;
+                self.load(scene, None, Some(folder), now)?;
+            }
+            Request::LoadTable { scene, key, files } => self.load_table(scene, key, &files, now)?,
+            Request::LoadUploaded { file } => {
+                let (scene, folder) = self.shelf.scene(file)?;
+                self.load(scene, None, Some(folder), now)?;
+            }
+            Request::Grow {
+                skin,
+                bones,
+                unit,
+                template,
+            } => {
+                let (scene, folder) = self.shelf.grown(skin, &bones, unit, template)?;
+                self.load(scene, None, Some(folder), now)?;
             }
             Request::Edit { edits } => {
-                let Wanted { scene, key } = &self.builder.wanted;
-                let (scene, key) = (edit::edited(scene, &edits)?, key.clone());
-                self.want(scene, key)?;
+                let wanted = self.history.wanted();
+                let wanted = wanted.changed(edit::edited(&wanted.scene, &edits)?);
+                let keys = edits.into_iter().map(|edit| edit.path).collect();
+                self.want(wanted, keys, now)?;
             }
+            Request::Undo => {
+                self.check_may_change()?;
+                self.history.undo().context("there is nothing to undo")?;
+                self.follow();
+            }
+            Request::Redo => {
+                self.check_may_change()?;
+                self.history.redo().context("there is nothing to redo")?;
+                self.follow();
+            }
+            Request::ResetScene => {
+                let wanted = self.history.wanted();
+                if !wanted.is_changed() {
+                    bail!("the scene is as it was loaded");
+                }
+                let wanted = wanted.changed(wanted.origin.scene.clone());
+                self.want(wanted, Vec::new(), now)?;
+            }
+            Request::CancelBuild => self.cancel_build()?,
             Request::RunMotion => {
                 self.tape.close();
                 let live = self.stage.need()?;
@@ -175,27 +244,107 @@ impl Desk {
 
     // The scene and its body.
 
-    fn want(&mut self, scene: Scene, key: Option<String>) -> anyhow::Result<()> {
+    fn load(
+        &mut self,
+        scene: Scene,
+        key: Option<String>,
+        files: Option<Arc<Folder>>,
+        now: Instant,
+    ) -> anyhow::Result<()> {
+        let wanted = Wanted::loaded(self.n_loaded + 1, scene, key, files);
+        self.want(wanted, Vec::new(), now)?;
+        self.n_loaded += 1;
+        Ok(())
+    }
+
+    /// Loads a scene that a page remembers or has from a link. Such a scene names no files but those
+    /// that were uploaded, and those that the program was started with.
+    fn load_table(
+        &mut self,
+        table: Value,
+        key: Option<String>,
+        files: &[u32],
+        now: Instant,
+    ) -> anyhow::Result<()> {
+        let original = key.as_deref().map(gallery::scene).transpose()?;
+        let text = edit::text_of(table, original.as_ref())?;
+        let (scene, folder) = if files.is_empty() {
+            let scene = edit::parsed_by_key(&text, &self.home.base_dir)?;
+            let known = self.home.files();
+            if let Some(path) = (scene.files().into_iter()).find(|path| !known.contains(path)) {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                bail!("the scene needs its file {name}; open the scene together with its files");
+            }
+            (scene, None)
+        } else {
+            let (scene, folder) = self.shelf.scene_of_text(&text, files)?;
+            (scene, Some(folder))
+        };
+        let mut wanted = Wanted::loaded(self.n_loaded + 1, scene, key, folder);
+        if let Some(scene) = original {
+            let number = wanted.origin.number;
+            wanted.origin = Arc::new(Origin { number, scene });
+        }
+        self.want(wanted, Vec::new(), now)?;
+        self.n_loaded += 1;
+        Ok(())
+    }
+
+    /// Wants another scene. `keys` are those that an edit has set.
+    fn want(&mut self, wanted: Wanted, keys: Vec<String>, now: Instant) -> anyhow::Result<()> {
+        self.check_may_change()?;
+        self.history.push(wanted, keys, now);
+        self.follow();
+        Ok(())
+    }
+
+    /// Refuses a change of the scene when it would spoil a game or a recording.
+    fn check_may_change(&self) -> anyhow::Result<()> {
         if self.game.is_some() {
             bail!("the scene cannot be changed while lumps are hidden; end the game first");
         }
         if self.tape.is_under_way() {
             bail!("the scene cannot be changed while it is recorded; stop the recording first");
         }
+        Ok(())
+    }
+
+    /// Builds the scene that is wanted now.
+    fn follow(&mut self) {
         self.tape.close();
         if self.end_motion() {
             self.status
                 .notice(NoticeLevel::Info, NoticeKind::MotionEnded);
         }
-        self.builder.wanted = Wanted { scene, key };
         self.build();
+    }
+
+    fn cancel_build(&mut self) -> anyhow::Result<()> {
+        if self.game.is_some() {
+            bail!("lumps are being hidden; end the game instead");
+        }
+        let is_live = self.stage.live().is_some();
+        let present = self.present.as_ref().filter(|_| is_live);
+        let present = present.context("there is no body yet that could be kept")?;
+        if !self.builder.cancel() {
+            bail!("no body is being built");
+        }
+        self.history.give_up(present);
         Ok(())
+    }
+
+    /// The scene to build: the wanted one, with the lumps of a game.
+    fn scene(&self) -> &Scene {
+        let wanted = &self.history.wanted().scene;
+        self.hidden.as_ref().unwrap_or(wanted)
     }
 
     /// Builds the wanted scene.
     pub(crate) fn build(&mut self) {
         self.status.change();
-        if let Err(error) = self.builder.build() {
+        let wanted = &self.history.wanted().scene;
+        let scene = self.hidden.as_ref().unwrap_or(wanted);
+        if let Err(error) = self.builder.build(scene) {
             self.fail(Problem::NoThread {
                 reason: error.to_string(),
             });
@@ -204,29 +353,42 @@ impl Desk {
 
     fn take_over(&mut self, built: anyhow::Result<World>) {
         self.status.change();
-        if !self.builder.finish() {
-            return self.build();
+        match self.builder.finish() {
+            Built::Wanted => {}
+            Built::Stale => return self.build(),
+            Built::Unwanted => return,
         }
         match built.and_then(|world| self.stage.replace(world)) {
             Ok(()) => {
                 // What was felt belongs to the body before.
                 self.palpation.clear();
+                self.has_hidden = self.hidden.is_some();
+                if !self.has_hidden {
+                    self.present = Some(self.history.wanted().clone());
+                }
                 self.describe();
                 self.status.well();
                 if let Some(game) = &mut self.game {
                     game.begin();
                 }
             }
-            Err(error) => {
-                self.fail(refused(&error));
-                if let Some(live) = self.stage.live() {
-                    // The previous body stays, and so does its scene.
-                    self.builder.wanted = Wanted {
-                        scene: live.world.scene.clone(),
-                        key: self.status.gallery_key().map(str::to_owned),
-                    };
-                }
+            Err(error) => self.give_up(&error),
+        }
+    }
+
+    /// The wanted scene cannot be built. The previous body stays, and so does its scene.
+    fn give_up(&mut self, error: &anyhow::Error) {
+        self.fail(self.refused(error));
+        if self.hidden.take().is_some() {
+            // Without its lumps there is no game.
+            self.game = None;
+            if self.has_hidden {
+                self.build();
             }
+        } else if let Some(present) = &self.present
+            && self.stage.live().is_some()
+        {
+            self.history.give_up(present);
         }
     }
 
@@ -237,7 +399,7 @@ impl Desk {
         if self.stage.live().is_some() {
             self.describe();
         } else if let Err(error) = &outcome {
-            self.fail(refused(error));
+            self.fail(self.refused(error));
             self.build();
         }
         outcome
@@ -245,10 +407,15 @@ impl Desk {
 
     fn describe(&mut self) {
         if let Some(live) = self.stage.live() {
-            let key = self.builder.wanted.key.as_deref();
             let veil = Veil::of(self.game.as_ref());
-            self.status.describe(&live.world, key, veil);
+            let wanted = (self.present.as_ref()).unwrap_or_else(|| self.history.wanted());
+            self.status.describe(&live.world, wanted, veil);
         }
+    }
+
+    fn refused(&self, error: &anyhow::Error) -> Problem {
+        let text = self.words(error);
+        Problem::Refused { text }
     }
 
     fn fail(&mut self, problem: Problem) {
@@ -328,7 +495,7 @@ impl Desk {
         let live = self.stage.need()?;
         let before = match &self.game {
             Some(game) => &game.before,
-            None => &self.builder.wanted.scene,
+            None => &self.history.wanted().scene,
         };
         let (game, scene) = Game::hide(&live.world, before, seed.or(self.seed), n_lumps)?;
         if let Some(next) = &mut self.seed {
@@ -338,7 +505,7 @@ impl Desk {
         live.hand.end_motion();
         self.status.set_field(Field::None);
         self.game = Some(game);
-        self.builder.wanted.scene = scene;
+        self.hidden = Some(scene);
         // Hide the scene's own lumps from pages too.
         self.describe();
         self.build();
@@ -360,8 +527,8 @@ impl Desk {
     }
 
     fn end_game(&mut self) -> anyhow::Result<()> {
-        let game = self.game.take().context("no round is under way")?;
-        self.builder.wanted.scene = game.before;
+        self.game.take().context("no round is under way")?;
+        self.hidden = None;
         self.build();
         Ok(())
     }
@@ -372,8 +539,13 @@ impl Desk {
         let veil = self.veil();
         match file {
             HostFile::Scene => {
-                let scene = veil.scene_file(&self.builder.wanted.scene);
+                let scene = veil.scene_file(self.scene());
                 Some(Material::Scene(scene.to_toml()))
+            }
+            HostFile::SceneArchive => {
+                let scene = veil.scene_file(self.scene()).clone();
+                let files = self.history.wanted().files.clone();
+                Some(Material::Archive(Box::new(scene), files))
             }
             HostFile::Body if !veil.shows_body_file() => None,
             HostFile::Body => self.stage.live()?.body(),
@@ -491,7 +663,7 @@ impl Desk {
         self.end_motion();
         match self.stage.restart(&RecorderParams::default()) {
             Ok(()) => self.describe(),
-            Err(error) => self.fail(refused(&error)),
+            Err(error) => self.fail(self.refused(&error)),
         }
     }
 
@@ -507,17 +679,13 @@ impl Desk {
             is_motion_running: live.is_some_and(|live| live.hand.is_in_motion()),
             recording: self.tape.info(),
             game: self.game.as_ref().map(Game::info),
+            n_undo: self.history.n_undo() as u32,
+            n_redo: self.history.n_redo() as u32,
         });
     }
 
     /// Ends the engine and closes a recording.
     pub(crate) fn end(mut self) {
         self.stage.end();
-    }
-}
-
-fn refused(error: &anyhow::Error) -> Problem {
-    Problem::Refused {
-        text: one_paragraph(error),
     }
 }

@@ -37,13 +37,40 @@ pub(crate) fn edited(scene: &Scene, edits: &[Edit]) -> anyhow::Result<Scene> {
     name_again(&mut value, &in_full, &as_json(&scene.to_toml())?);
     let text = toml::to_string(&without_nulls(value))
         .context("the edited scene cannot be written as a scene file")?;
-    Ok(Scene::parse(&text, &scene.base_dir).map_err(SceneError::by_key)?)
+    parsed_by_key(&text, &scene.base_dir)
+}
+
+/// The scene file for a scene given as JSON. Tissues that are the same as in `original` get their names
+/// there back.
+///
+/// # Errors
+/// When it has values that a scene file cannot have.
+pub(crate) fn text_of(mut value: Value, original: Option<&Scene>) -> anyhow::Result<String> {
+    if let Some(original) = original {
+        name_again(
+            &mut value,
+            &to_json(original)?,
+            &as_json(&original.to_toml())?,
+        );
+    }
+    toml::to_string(&without_nulls(value)).context("the scene cannot be written as a scene file")
+}
+
+/// A scene from a text that no user has seen: errors name keys without lines.
+///
+/// # Errors
+/// When the text is not a valid scene.
+pub(crate) fn parsed_by_key(text: &str, base: &Path) -> anyhow::Result<Scene> {
+    Ok(Scene::parse(text, base).map_err(SceneError::by_key)?)
 }
 
 /// Puts the catalogue's names back for tissues that no edit has changed, so that their sources are
 /// known again.
 fn name_again(value: &mut Value, in_full: &Value, named: &Value) {
     for list in ["layer", "lump"] {
+        if !value[list].is_array() {
+            continue;
+        }
         let tissues = |scene: &Value| -> Vec<Value> {
             let items = scene[list].as_array().map_or(&[][..], Vec::as_slice);
             items.iter().map(|item| item["tissue"].clone()).collect()

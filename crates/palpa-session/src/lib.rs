@@ -3,7 +3,9 @@
 //! ```text
 //!  server ── requests ──► remote ── orders ──► session (thread, 60 Hz) ──► desk
 //!
-//!   desk ┬─► builder   the scene that is wanted, built on a thread of its own
+//!   desk ┬─► history   the scenes that were wanted, for undo and redo
+//!        ├─► own       users' files: check, template, ZIP, temporary folders
+//!        ├─► builder   the body of the wanted scene, built on a thread of its own
 //!        ├─► stage     the body under the hand and its engine:  world ──► engine ──► device
 //!        │     └ hand  who leads the tool, and its way:         hand ───► device
 //!        ├─► replay    the recording, and what is shown of it
@@ -23,6 +25,8 @@ mod edit;
 pub mod gallery;
 mod game;
 mod hand;
+mod history;
+mod own;
 mod palpation;
 mod publish;
 mod remote;

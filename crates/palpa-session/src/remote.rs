@@ -11,9 +11,11 @@ use palpa::map::PalpationMap;
 use palpa_fem::Model;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_rt::{LEAD, LateTick, Table};
-use palpa_viewer::control::Request;
+use palpa_scene::{LengthUnit, Scene};
+use palpa_viewer::control::{Request, Uploaded};
 use palpa_viewer::{Answer, Clients, Host, HostFile};
 
+use crate::own::{Folder, Shelf, packed};
 use crate::palpation;
 use crate::replay::curve_of;
 use crate::spectrum::spectrum;
@@ -36,6 +38,8 @@ pub(super) enum Order {
 /// The data of a file, before it is written.
 pub(super) enum Material {
     Scene(String),
+    /// The scene with its files, and the folder that keeps them until they are packed.
+    Archive(Box<Scene>, Option<Arc<Folder>>),
     Tissue(Arc<Model>, Vec<Vec3>),
     Springs(Box<LayeredBody>, Vec<Vec3>),
     /// The log of the recording, and the skin of its body.
@@ -52,6 +56,7 @@ pub struct Remote {
     pub(super) orders: Sender<Order>,
     pub(super) problem: Arc<Mutex<Option<String>>>,
     pub(super) curve: Mutex<Option<Curve>>,
+    pub(super) shelf: Shelf,
 }
 
 /// The curve of a recording as JSON. It is kept, because each page asks for it and a long log takes
@@ -85,6 +90,19 @@ impl Host for Remote {
             .map_err(|e| palpa::one_paragraph(&e))
     }
 
+    fn upload(&self, name: &str, bytes: Vec<u8>) -> Result<Uploaded, String> {
+        let taken = self.shelf.take(name, &bytes);
+        taken.map_err(|error| palpa::one_paragraph(&error))
+    }
+
+    fn check_uploaded(&self, id: u32, unit: LengthUnit) -> Option<Uploaded> {
+        self.shelf.check(id, unit)
+    }
+
+    fn uploaded_mesh(&self, id: u32) -> Option<Vec<u8>> {
+        Some(self.shelf.mesh(id)?.encode())
+    }
+
     fn problem(&self) -> Option<String> {
         let problem = self.problem.lock();
         problem.unwrap_or_else(PoisonError::into_inner).clone()
@@ -104,6 +122,7 @@ impl Remote {
             (Material::Map(map, _), HostFile::MapCsv) => palpation::table(&map).into_bytes(),
             (Material::Map(map, skin), _) => palpation::grid(&map, &skin)?,
             (Material::Scene(text), _) => text.into_bytes(),
+            (Material::Archive(scene, _files), _) => packed(&scene)?,
             (Material::Tissue(model, displacements), _) => vtu(model.body(), &displacements)?,
             (Material::Springs(body, displacements), _) => vtu(&body, &displacements)?,
         }))

@@ -11,6 +11,7 @@ use palpa_viewer::Publisher;
 
 use crate::bars::Bars;
 use crate::desk::{Desk, Workers};
+use crate::own::Shelf;
 use crate::publish::Fields;
 use crate::remote::{Order, Remote};
 use crate::world::BEFORE_THE_BROWSER;
@@ -48,6 +49,7 @@ pub struct Session {
     inbox: Receiver<Order>,
     orders: Sender<Order>,
     problem: Arc<Mutex<Option<String>>>,
+    shelf: Shelf,
 }
 
 /// A running session. When dropped, it stops: the engine ramps the force down and a recording is
@@ -73,16 +75,19 @@ impl Session {
     pub fn new(params: SessionParams) -> (Self, Arc<Remote>) {
         let (orders, inbox) = channel();
         let problem = Arc::<Mutex<Option<String>>>::default();
+        let shelf = Shelf::default();
         let remote = Arc::new(Remote {
             orders: orders.clone(),
             problem: Arc::clone(&problem),
             curve: Mutex::default(),
+            shelf: shelf.clone(),
         });
         let session = Self {
             params,
             inbox,
             orders,
             problem,
+            shelf,
         };
         (session, remote)
     }
@@ -103,7 +108,14 @@ impl Session {
                 // This thread moves the hand. It gets the same priority as the tissue's thread, if
                 // the system grants it.
                 BEFORE_THE_BROWSER.ask("palpa-session");
-                let desk = Desk::new(self.params, self.orders, self.problem, publisher, workers);
+                let desk = Desk::new(
+                    self.params,
+                    self.orders,
+                    self.problem,
+                    publisher,
+                    workers,
+                    self.shelf,
+                );
                 run(desk, &self.inbox);
             })?;
         Ok(Handle {

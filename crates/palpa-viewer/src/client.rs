@@ -9,7 +9,9 @@
 
 use crate::{
     board::{Board, Controller, Picture, json},
-    control::{Envelope, Hello, Message, Notice, NoticeKind, NoticeLevel, Reply, Request},
+    control::{
+        Envelope, Hello, Message, Notice, NoticeKind, NoticeLevel, Reply, Request, UPLOAD_LIMITS,
+    },
     hub::Hub,
     limits::{
         CLOSE_WAIT, Gate, HEIR_WAIT, MAX_ANSWERS, MAX_MALFORMED, MAX_SMALL_MESSAGE, PING_EVERY,
@@ -220,9 +222,13 @@ pub(crate) fn understand(text: &str) -> Result<Envelope, Reply> {
         );
         refusal(id, error)
     })?;
-    if text.len() > MAX_SMALL_MESSAGE && !matches!(envelope.request, Request::LoadText { .. }) {
+    let is_scene = matches!(
+        envelope.request,
+        Request::LoadText { .. } | Request::LoadTable { .. }
+    );
+    if text.len() > MAX_SMALL_MESSAGE && !is_scene {
         let error = format!(
-            "a request of {} bytes; at most {MAX_SMALL_MESSAGE} but for load_text, which may have 1 MiB",
+            "a request of {} bytes; at most {MAX_SMALL_MESSAGE} but for load_text and load_table, which may have 1 MiB",
             text.len()
         );
         return Err(refusal(envelope.id, error));
@@ -278,6 +284,8 @@ async fn write(sink: &mut Sink, seat: &Seat, answers: &mut mpsc::Receiver<Utf8By
         palpa: env!("CARGO_PKG_VERSION").into(),
         snapshot_version: SNAPSHOT_VERSION,
         client: seat.client,
+        run: seat.hub.run.clone(),
+        upload_limits: UPLOAD_LIMITS,
     });
     if let Err(end) = out.text(json(&hello)).await {
         return end;

@@ -5,10 +5,11 @@
 //! the control API's document, and the page's TypeScript types are generated from it.
 
 mod engine;
+mod upload;
 
 use std::fmt;
 
-use palpa_scene::ContactShape;
+use palpa_scene::{ContactShape, LengthUnit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -16,6 +17,11 @@ use serde_json::Value;
 pub use self::engine::{
     BarProblem, DeviceTrouble, EngineFigures, ErrorBar, EventInfo, EventKind, ForceLimit,
     GrantedInfo, InjectedFault, LawFault, LostRecords, PriorityInfo, Spectrum, StepResult,
+};
+
+pub use self::upload::{
+    FindingInfo, FindingSeverity, SurfaceInfo, SurfaceVerdict, Template, TemplateInfo,
+    TemplateLayer, UPLOAD_LIMITS, UploadLimits, Uploaded, UploadedContent,
 };
 
 /// A point or a vector.
@@ -52,7 +58,48 @@ pub enum Request {
     LoadText {
         /// The scene file (TOML).
         text: String,
+        /// Numbers of uploaded files that the scene refers to by their names. If there are any, the
+        /// scene may refer to no other files.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        files: Vec<u32>,
     },
+    /// Load a scene given as JSON with the keys of a scene file, as in [`State::scene`]. It may
+    /// refer only to uploaded files, and to those of the scene that the program was started with.
+    LoadTable {
+        /// The scene.
+        scene: Value,
+        /// Key of the gallery scene that it is a changed version of.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        key: Option<String>,
+        /// Numbers of uploaded files that the scene refers to by their names.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        files: Vec<u32>,
+    },
+    /// Load a scene that was uploaded as a ZIP.
+    LoadUploaded {
+        /// Number of the uploaded file.
+        file: u32,
+    },
+    /// Grow a body from an uploaded surface, with the layers of a template.
+    Grow {
+        /// Number of the skin's file.
+        skin: u32,
+        /// Numbers of the bones' files, in the same frame and unit.
+        #[serde(default)]
+        bones: Vec<u32>,
+        /// Unit of the coordinates in these files.
+        unit: LengthUnit,
+        /// The layers.
+        template: Template,
+    },
+    /// Undo the last change of the scene.
+    Undo,
+    /// Redo the change of the scene that was undone last.
+    Redo,
+    /// Restore the scene as it was loaded.
+    ResetScene,
+    /// Keep the present body instead of the one that is being built.
+    CancelBuild,
     /// Change the scene. Either all edits apply or none.
     Edit {
         /// The edits, applied in order.
@@ -190,6 +237,10 @@ pub struct Hello {
     pub snapshot_version: u32,
     /// The number of this connection.
     pub client: u64,
+    /// Name of this run of the program: another one after a restart.
+    pub run: String,
+    /// Limits on a user's files.
+    pub upload_limits: UploadLimits,
 }
 
 /// The answer to a request.
@@ -304,6 +355,17 @@ pub struct State {
     pub gallery_key: Option<String>,
     /// The whole scene, with the keys of a scene file. During a game it has no lumps.
     pub scene: Value,
+    /// Number of the scene as it was loaded: edits keep it, and undoing a load brings back the
+    /// number before.
+    pub origin: u64,
+    /// Whether the scene was changed since it was loaded.
+    pub is_changed: bool,
+    /// Names of the files that the scene refers to.
+    pub files: Vec<String>,
+    /// Number of changes of the scene that can be undone.
+    pub n_undo: u32,
+    /// Number of changes of the scene that can be redone.
+    pub n_redo: u32,
     /// The layers, from the skin down.
     pub layers: Vec<LayerInfo>,
     /// The lumps at their places at rest; empty during a game.

@@ -1,6 +1,7 @@
 //! The interface between the server and the session behind it.
 
-use crate::control::Request;
+use crate::control::{Request, Uploaded};
+use palpa_scene::LengthUnit;
 
 /// The session, as the server calls it. No call may block, because the server has one thread for
 /// them. [`Host::file`] may: it has its own thread.
@@ -20,6 +21,21 @@ pub trait Host: Send + Sync + 'static {
     /// # Errors
     /// A text that says why the file cannot be made.
     fn file(&self, file: HostFile) -> Result<Option<Vec<u8>>, String>;
+
+    /// Takes a user's file: reads and checks it. This may take long; it runs on a thread of its own.
+    ///
+    /// # Errors
+    /// A text that says what is wrong with the file, where, and what to do.
+    fn upload(&self, name: &str, bytes: Vec<u8>) -> Result<Uploaded, String>;
+
+    /// Checks an uploaded surface again, with coordinates in `unit`. This may take long; it runs on
+    /// a thread of its own. `None` if there is no such surface.
+    fn check_uploaded(&self, id: u32, unit: LengthUnit) -> Option<Uploaded>;
+
+    /// An uploaded surface for the picture: a [`MeshSnapshot`](crate::wire::MeshSnapshot) of one
+    /// level in the unit of the file, with its middle at the origin. `None` if there is no such
+    /// surface.
+    fn uploaded_mesh(&self, id: u32) -> Option<Vec<u8>>;
 
     /// The reason why the session does not work, if it does not.
     fn problem(&self) -> Option<String>;
@@ -43,6 +59,8 @@ pub struct Clients {
 pub enum HostFile {
     /// The scene, as a scene file with every default written out.
     Scene,
+    /// The scene file with the files that it refers to (ZIP).
+    SceneArchive,
     /// The body in its present deformed state (VTU).
     Body,
     /// The palpation map on the skin (VTU).

@@ -5,9 +5,10 @@ use crate::{
     control::Request,
     guard::Guard,
     host::{Clients, Host},
-    limits::{Gate, MAX_CLIENTS, MAX_FILES},
+    limits::{Gate, MAX_CLIENTS, MAX_FILES, MAX_UPLOADS},
 };
 use std::{
+    hash::{BuildHasher, RandomState},
     sync::{Arc, Mutex, PoisonError},
     time::Instant,
 };
@@ -22,6 +23,10 @@ pub(crate) struct Hub {
     pub(crate) places: Arc<Semaphore>,
     /// One permit per file that is being made.
     pub(crate) files: Arc<Semaphore>,
+    /// One permit per file that a client sends.
+    pub(crate) uploads: Arc<Semaphore>,
+    /// Name of this run of the program, by which pages notice a restart.
+    pub(crate) run: String,
     /// True when the server shall end.
     pub(crate) closing: watch::Receiver<bool>,
     /// Rate limit for requests through `/api/control`, all programs together.
@@ -44,6 +49,9 @@ impl Hub {
             guard,
             places: Arc::new(Semaphore::new(MAX_CLIENTS)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
+            uploads: Arc::new(Semaphore::new(MAX_UPLOADS)),
+            // The keys of a hasher are random.
+            run: format!("{:016x}", RandomState::new().hash_one(0)),
             closing,
             programs: Mutex::new(Gate::new(Instant::now())),
             told: Mutex::default(),
@@ -87,7 +95,8 @@ impl Hub {
             .request(request, Box::new(move |outcome| once.call(outcome)));
     }
 
-    fn may_ask(&self, who: Controller) -> Result<(), &'static str> {
+    /// Refuses a client that may not make requests now.
+    pub(crate) fn may_ask(&self, who: Controller) -> Result<(), &'static str> {
         match (who, self.board.controller()) {
             (who, controller) if who == controller => Ok(()),
             // A program may act without control while nobody is in control: it disturbs nobody.

@@ -8,7 +8,9 @@
 //! page.
 //!
 //! ```
-//! use palpa_viewer::{Answer, Clients, Host, HostFile, Server, ServerParams, control::Request, wire::FrameSnapshot};
+//! use palpa_scene::LengthUnit;
+//! use palpa_viewer::{Answer, Clients, Host, HostFile, Server, ServerParams};
+//! use palpa_viewer::{control::{Request, Uploaded}, wire::FrameSnapshot};
 //! use std::{net::Ipv4Addr, sync::Arc};
 //!
 //! /// A session that says yes to all, and shows nothing.
@@ -20,6 +22,15 @@
 //!     fn clients(&self, _: Clients) {}
 //!     fn file(&self, _: HostFile) -> Result<Option<Vec<u8>>, String> {
 //!         Ok(None)
+//!     }
+//!     fn upload(&self, _: &str, _: Vec<u8>) -> Result<Uploaded, String> {
+//!         Err("this session takes no files".to_owned())
+//!     }
+//!     fn check_uploaded(&self, _: u32, _: LengthUnit) -> Option<Uploaded> {
+//!         None
+//!     }
+//!     fn uploaded_mesh(&self, _: u32) -> Option<Vec<u8>> {
+//!         None
 //!     }
 //!     fn problem(&self) -> Option<String> {
 //!         None
@@ -47,6 +58,7 @@ pub mod openapi;
 mod page;
 mod routes;
 mod server;
+mod upload;
 pub mod wire;
 
 pub use board::Publisher;

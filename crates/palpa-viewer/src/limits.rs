@@ -13,8 +13,15 @@ pub(crate) const IDLE: Duration = Duration::from_mins(2);
 pub(crate) const MAX_FILES: usize = 4;
 /// Longest message of a client, bytes. A scene with all tissues written out is many times shorter.
 pub(crate) const MAX_MESSAGE: usize = 1 << 20;
-/// Longest message that is not the text of a scene, bytes.
+/// Longest message that is not a scene, bytes.
 pub(crate) const MAX_SMALL_MESSAGE: usize = 64 << 10;
+/// Time that a client may take to send a file.
+pub(crate) const UPLOAD_WAIT: Duration = Duration::from_mins(2);
+/// Largest number of files that are received and checked at once. Each may need some hundred
+/// megabytes of memory while it is read.
+pub(crate) const MAX_UPLOADS: usize = 1;
+/// Longest name of a file that a client sends, bytes.
+pub(crate) const MAX_NAME: usize = 255;
 /// Malformed messages in a row after which the connection is closed: the client uses another
 /// protocol.
 pub(crate) const MAX_MALFORMED: u32 = 20;

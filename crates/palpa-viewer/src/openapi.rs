@@ -1,6 +1,8 @@
 //! The control API's document (OpenAPI 3.1), generated from the types.
 
-use crate::control::{EngineFigures, Envelope, Message, RecordingCurve, Reply, Spectrum, State};
+use crate::control::{
+    EngineFigures, Envelope, Message, RecordingCurve, Reply, Spectrum, State, Uploaded,
+};
 use schemars::Schema;
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
@@ -39,6 +41,11 @@ pub fn document() -> Value {
         &mut generator,
         "The answer. A refusal has status 409.",
         SchemaGenerator::subschema_for::<Reply>,
+    );
+    let uploaded = body(
+        &mut generator,
+        "The file, its number and, of a surface, the findings of its check.",
+        SchemaGenerator::subschema_for::<Uploaded>,
     );
     let envelope = generator.subschema_for::<Envelope>();
     generator.subschema_for::<Message>();
@@ -82,6 +89,42 @@ pub fn document() -> Value {
             } },
             "/api/state": { "get": { "summary": "The state", "responses": { "200": state, "503": { "description": "The engine is starting." } } } },
             "/api/engine": { "get": { "summary": "The engine's figures", "responses": { "200": engine, "503": { "description": "The engine is starting." } } } },
+            "/api/upload": { "post": {
+                "summary": "Upload a user's file",
+                "description": "A surface (STL, PLY, OBJ, OFF, GLB), a ZIP of a scene with its files, or a table of thicknesses (CSV). Nothing \
+                    changes until a request names the file: `grow`, `load_uploaded`, `load_text` or `load_table`. The same rules as for \
+                    `/api/control` say who may upload. Files are kept in a temporary folder of the program, which removes it when it ends. \
+                    At most 64 MiB and 500,000 triangles.",
+                "parameters": [
+                    { "name": "name", "in": "query", "required": true, "schema": { "type": "string" }, "description": "Name of the file; its ending helps where the content leaves the format open." },
+                    { "name": "client", "in": "query", "schema": { "type": "integer" }, "description": "Number of the connection of the page that sends it." },
+                ],
+                "requestBody": { "required": true, "content": { "application/octet-stream": {} } },
+                "responses": {
+                    "200": uploaded.clone(),
+                    "400": { "description": "The query cannot be parsed, or the name is empty or too long." },
+                    "409": { "description": "The client is not in control." },
+                    "408": { "description": "The file was not there within 2 minutes." },
+                    "413": { "description": "The file is too large." },
+                    "415": { "description": "The content type is not application/octet-stream." },
+                    "422": { "description": "The file cannot be used. The text says why, where, and what to do." },
+                    "503": { "description": "Another file is being checked." },
+                },
+            } },
+            "/api/upload/check": { "get": {
+                "summary": "Check an uploaded surface in another unit",
+                "parameters": [
+                    { "name": "id", "in": "query", "required": true, "schema": { "type": "integer" } },
+                    { "name": "unit", "in": "query", "required": true, "schema": { "enum": ["m", "cm", "mm", "in"] } },
+                ],
+                "responses": { "200": uploaded, "400": { "description": "The query cannot be parsed." }, "404": { "description": "There is no such surface." }, "503": { "description": "Another file is being checked." } },
+            } },
+            "/api/upload/mesh": { "get": {
+                "summary": "An uploaded surface as a mesh snapshot of one level",
+                "parameters": [{ "name": "id", "in": "query", "required": true, "schema": { "type": "integer" } }],
+                "responses": { "200": { "description": "`crates/palpa-viewer/src/wire.rs` defines the layout.", "content": { "application/octet-stream": {} } }, "400": { "description": "The query cannot be parsed." }, "404": { "description": "There is no such surface." } },
+            } },
+            "/api/scene.zip": file("The scene with its files", "application/zip", "The scene file and the files that it refers to. Unpacked, `palpa view scene.toml` shows it."),
             "/api/scene.toml": file("The scene file", "application/toml", "The scene with all defaults written out."),
             "/api/body.vtu": file("The deformed body", "application/xml", "For ParaView and other readers of VTK files."),
             "/api/map.vtu": file("The palpation map", "application/xml", "The skin at rest with the stiffness that was felt, for ParaView and other readers of VTK files."),

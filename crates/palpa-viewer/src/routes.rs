@@ -9,7 +9,7 @@ use crate::{
     host::HostFile,
     hub::Hub,
     limits::{ANSWER_WAIT, MAX_CLIENTS, MAX_MESSAGE, Verdict},
-    metrics, openapi, page,
+    metrics, openapi, page, upload,
 };
 use axum::{
     Json, Router,
@@ -61,6 +61,13 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
             get(|hub| file(hub, HostFile::RecordingCurve)),
         )
         .route("/api/spectrum", get(|hub| file(hub, HostFile::Spectrum)))
+        .route(
+            "/api/scene.zip",
+            get(|hub| file(hub, HostFile::SceneArchive)),
+        )
+        .route("/api/upload", post(upload::take))
+        .route("/api/upload/check", get(upload::check))
+        .route("/api/upload/mesh", get(upload::mesh))
         .route("/metrics", get(figures))
         .layer(DefaultBodyLimit::max(MAX_MESSAGE))
         .route_layer(from_fn_with_state(Arc::clone(hub), guard::token));
@@ -203,6 +210,7 @@ fn json(text: Option<String>, missing: &'static str) -> Response {
 async fn file(State(hub): Shared, file: HostFile) -> Response {
     let (kind, name) = match file {
         HostFile::Scene => ("application/toml", "scene.toml"),
+        HostFile::SceneArchive => ("application/zip", "scene.zip"),
         HostFile::Body => ("application/xml", "body.vtu"),
         HostFile::Map => ("application/xml", "palpation-map.vtu"),
         HostFile::MapCsv => ("text/csv; charset=utf-8", "palpation-map.csv"),

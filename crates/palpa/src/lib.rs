@@ -51,6 +51,7 @@
 pub mod accuracy;
 pub mod audit;
 pub mod build;
+pub mod check;
 pub mod continuum;
 mod error;
 pub mod live;

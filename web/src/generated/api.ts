@@ -533,6 +533,63 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scene.zip": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The scene with its files */
+        get: {
+            parameters: {
+                query?: never;
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description The scene file and the files that it refers to. Unpacked, `palpa view scene.toml` shows it. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/zip": unknown;
+                    };
+                };
+                /** @description There is no such file yet. */
+                404: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The file cannot be made. The text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/spectrum": {
         parameters: {
             query?: never;
@@ -611,6 +668,215 @@ export interface paths {
                 };
                 /** @description The engine is starting. */
                 503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/upload": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Upload a user's file
+         * @description A surface (STL, PLY, OBJ, OFF, GLB), a ZIP of a scene with its files, or a table of thicknesses (CSV). Nothing changes until a request names the file: `grow`, `load_uploaded`, `load_text` or `load_table`. The same rules as for `/api/control` say who may upload. Files are kept in a temporary folder of the program, which removes it when it ends. At most 64 MiB and 500,000 triangles.
+         */
+        post: {
+            parameters: {
+                query: {
+                    /** @description Name of the file; its ending helps where the content leaves the format open. */
+                    name: string;
+                    /** @description Number of the connection of the page that sends it. */
+                    client?: number;
+                };
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody: {
+                content: {
+                    "application/octet-stream": unknown;
+                };
+            };
+            responses: {
+                /** @description The file, its number and, of a surface, the findings of its check. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/json": components["schemas"]["Uploaded"];
+                    };
+                };
+                /** @description The query cannot be parsed, or the name is empty or too long. */
+                400: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The file was not there within 2 minutes. */
+                408: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The client is not in control. */
+                409: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The file is too large. */
+                413: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The content type is not application/octet-stream. */
+                415: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The file cannot be used. The text says why, where, and what to do. */
+                422: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Another file is being checked. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/upload/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Check an uploaded surface in another unit */
+        get: {
+            parameters: {
+                query: {
+                    id: number;
+                    unit: "m" | "cm" | "mm" | "in";
+                };
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description The file, its number and, of a surface, the findings of its check. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/json": components["schemas"]["Uploaded"];
+                    };
+                };
+                /** @description The query cannot be parsed. */
+                400: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description There is no such surface. */
+                404: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Another file is being checked. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/upload/mesh": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** An uploaded surface as a mesh snapshot of one level */
+        get: {
+            parameters: {
+                query: {
+                    id: number;
+                };
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description `crates/palpa-viewer/src/wire.rs` defines the layout. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "application/octet-stream": unknown;
+                    };
+                };
+                /** @description The query cannot be parsed. */
+                400: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description There is no such surface. */
+                404: {
                     headers: {
                         [name: string]: unknown;
                     };
@@ -989,10 +1255,61 @@ export interface components {
             /** @constant */
             type: "load_scene";
         } | {
+            /**
+             * @description Numbers of uploaded files that the scene refers to by their names. If there are any, the
+             *     scene may refer to no other files.
+             */
+            files?: number[];
             /** @description The scene file (TOML). */
             text: string;
             /** @constant */
             type: "load_text";
+        } | {
+            /** @description Numbers of uploaded files that the scene refers to by their names. */
+            files?: number[];
+            /** @description Key of the gallery scene that it is a changed version of. */
+            key?: string | null;
+            /** @description The scene. */
+            scene: unknown;
+            /** @constant */
+            type: "load_table";
+        } | {
+            /**
+             * Format: uint32
+             * @description Number of the uploaded file.
+             */
+            file: number;
+            /** @constant */
+            type: "load_uploaded";
+        } | {
+            /**
+             * @description Numbers of the bones' files, in the same frame and unit.
+             * @default []
+             */
+            bones: number[];
+            /**
+             * Format: uint32
+             * @description Number of the skin's file.
+             */
+            skin: number;
+            /** @description The layers. */
+            template: components["schemas"]["Template"];
+            /** @constant */
+            type: "grow";
+            /** @description Unit of the coordinates in these files. */
+            unit: components["schemas"]["LengthUnit"];
+        } | {
+            /** @constant */
+            type: "undo";
+        } | {
+            /** @constant */
+            type: "redo";
+        } | {
+            /** @constant */
+            type: "reset_scene";
+        } | {
+            /** @constant */
+            type: "cancel_build";
         } | {
             /** @description The edits, applied in order. */
             edits: components["schemas"]["Edit"][];
@@ -1282,6 +1599,28 @@ export interface components {
         FaultKind: "tissue_panic" | "spoilt_patch" | "tissue_pause";
         /** @description A field over the nodes, computed by the engine because it is too costly for a page. */
         Field: "none" | "von_mises" | "pressure" | "stretch";
+        /** @description One kind of finding in a surface. */
+        FindingInfo: {
+            /** @description Advice in English. */
+            advice: string;
+            /**
+             * Format: uint32
+             * @description How often it occurs.
+             */
+            count: number;
+            /** @description Whether counting stopped at `count`. */
+            is_at_least: boolean;
+            /** @description Kind of finding. Pages have a text for each kind in each of their languages. */
+            kind: string;
+            /** @description The first places where it occurs, m, in the frame of the file. */
+            places: number[][];
+            /** @description How severe it is. */
+            severity: components["schemas"]["FindingSeverity"];
+            /** @description The finding in English. */
+            text: string;
+        };
+        /** @description How severe a finding is. */
+        FindingSeverity: "note" | "repairable" | "unrepairable";
         /** @description A limit that a force met. */
         ForceLimit: "force" | "torque" | "slew" | "ramp" | "energy" | "stiffness" | "transfer" | "sweeps";
         /** @description A lump and the mark that belongs to it. */
@@ -1394,11 +1733,15 @@ export interface components {
             client: number;
             /** @description Version of the program. */
             palpa: string;
+            /** @description Name of this run of the program: another one after a restart. */
+            run: string;
             /**
              * Format: uint32
              * @description Version of the snapshot format. A page with another version must be reloaded.
              */
             snapshot_version: number;
+            /** @description Limits on a user's files. */
+            upload_limits: components["schemas"]["UploadLimits"];
         };
         /** @description A fault that was caused on purpose. */
         InjectedFault: "tissue_panics" | "job_panics" | "patch_with_nan" | "patch_late" | "tissue_pauses" | "tissue_goes_on" | "loop_late";
@@ -1421,6 +1764,8 @@ export interface components {
              */
             thickness: number;
         };
+        /** @description Unit of the lengths in a file. */
+        LengthUnit: "m" | "cm" | "mm" | "in";
         /** @description Records that were lost because a ring was full. */
         LostRecords: "ticks" | "steps" | "events";
         /** @description The shape of a lump. Lengths in m. */
@@ -1651,6 +1996,8 @@ export interface components {
             controller?: number | null;
             /** @description The field that frames carry. */
             field: components["schemas"]["Field"];
+            /** @description Names of the files that the scene refers to. */
+            files: string[];
             /** @description Scenes of the gallery. */
             gallery: components["schemas"]["GalleryEntry"][];
             /** @description Key of the loaded gallery scene; null for a scene from another source. */
@@ -1664,6 +2011,8 @@ export interface components {
             greatest_depth: number;
             /** @description Pose of the hand over the place that the scene presses. */
             home: components["schemas"]["Hand"];
+            /** @description Whether the scene was changed since it was loaded. */
+            is_changed: boolean;
             /** @description Whether the scene's motion runs. */
             is_motion_running: boolean;
             /** @description The layers, from the skin down. */
@@ -1687,8 +2036,24 @@ export interface components {
              * @description Number of nodes of the body.
              */
             n_nodes: number;
+            /**
+             * Format: uint32
+             * @description Number of changes of the scene that can be redone.
+             */
+            n_redo: number;
+            /**
+             * Format: uint32
+             * @description Number of changes of the scene that can be undone.
+             */
+            n_undo: number;
             /** @description Remarks on the scene for the user. */
             notes: components["schemas"]["Note"][];
+            /**
+             * Format: uint64
+             * @description Number of the scene as it was loaded: edits keep it, and undoing a load brings back the
+             *     number before.
+             */
+            origin: number;
             /** @description Phase of the engine. */
             phase: components["schemas"]["Phase"];
             /** @description Reason why the last scene could not be built, or why the engine stopped. */
@@ -1712,6 +2077,65 @@ export interface components {
         };
         /** @description Result of a step of the tissue. */
         StepResult: "converged" | "unfinished" | "behind" | "settling" | "failed";
+        /** @description A surface and the findings of its check. */
+        SurfaceInfo: {
+            /** @description The findings, the most severe first. */
+            findings: components["schemas"]["FindingInfo"][];
+            /** @description Format of the content, such as "STL". */
+            format: string;
+            /** @description Whether the largest part is closed. */
+            is_closed: boolean;
+            /** @description Middle of the bounding box in the unit of the file. The mesh for the picture is moved by it. */
+            middle: number[];
+            /**
+             * Format: uint32
+             * @description Number of parts that are not connected.
+             */
+            n_parts: number;
+            /**
+             * Format: uint32
+             * @description Number of triangles.
+             */
+            n_triangles: number;
+            /**
+             * Format: uint32
+             * @description Number of vertices, after those at the same place are merged.
+             */
+            n_vertices: number;
+            /** @description The reader's remarks. */
+            notes: components["schemas"]["Note"][];
+            /** @description The unit that is probable for a body of this size. */
+            probable_unit: components["schemas"]["LengthUnit"];
+            /** @description Size along x, y and z in the unit of the file. */
+            size: number[];
+            /** @description Layers of each template for a body of this size. */
+            templates: components["schemas"]["TemplateInfo"][];
+            /** @description The unit of the coordinates that this check assumes. */
+            unit: components["schemas"]["LengthUnit"];
+            /** @description Whether the surface can be used. */
+            verdict: components["schemas"]["SurfaceVerdict"];
+        };
+        /** @description Whether a surface can be used. */
+        SurfaceVerdict: "good" | "repairable" | "bad";
+        /** @description Layers for a body of one's own. */
+        Template: "limb" | "thin" | "fat" | "phantom";
+        /** @description The layers of a template. */
+        TemplateInfo: {
+            /** @description The layers, from the skin down. With bones, the last one reaches down to them. */
+            layers: components["schemas"]["TemplateLayer"][];
+            /** @description The template. */
+            template: components["schemas"]["Template"];
+        };
+        /** @description A layer of a template. */
+        TemplateLayer: {
+            /**
+             * Format: double
+             * @description Its thickness in a body without bones, m.
+             */
+            thickness: number;
+            /** @description Name of its tissue. */
+            tissue: string;
+        };
         /** @description The tool. In its own frame the tip is the origin, and z points out of the tissue. */
         ToolInfo: {
             /**
@@ -1721,6 +2145,49 @@ export interface components {
             friction: number;
             /** @description Its shape; null if the tool holds a single node. */
             shape?: components["schemas"]["ContactShape"] | null;
+        };
+        /** @description Limits on a user's files. */
+        UploadLimits: {
+            /**
+             * Format: uint64
+             * @description Largest file, bytes.
+             */
+            bytes: number;
+            /**
+             * Format: uint32
+             * @description Largest number of files that a scene can have.
+             */
+            files: number;
+            /**
+             * Format: uint32
+             * @description Largest number of triangles of a surface.
+             */
+            triangles: number;
+        };
+        /** @description A file that was uploaded. It is kept until the session ends or newer files take its place. */
+        Uploaded: {
+            /** @description Its content. */
+            content: components["schemas"]["UploadedContent"];
+            /**
+             * Format: uint32
+             * @description Number of the file, for requests.
+             */
+            id: number;
+            /** @description Its name. */
+            name: string;
+        };
+        /** @description The content of a file that was uploaded. */
+        UploadedContent: (components["schemas"]["SurfaceInfo"] & {
+            /** @constant */
+            kind: "surface";
+        }) | {
+            /** @description Names of the files that the scene refers to. */
+            files: string[];
+            /** @constant */
+            kind: "scene";
+        } | {
+            /** @constant */
+            kind: "other";
         };
     };
     responses: never;
@@ -1740,6 +2207,8 @@ export type EventInfo = components['schemas']['EventInfo'];
 export type EventKind = components['schemas']['EventKind'];
 export type FaultKind = components['schemas']['FaultKind'];
 export type Field = components['schemas']['Field'];
+export type FindingInfo = components['schemas']['FindingInfo'];
+export type FindingSeverity = components['schemas']['FindingSeverity'];
 export type ForceLimit = components['schemas']['ForceLimit'];
 export type FoundLump = components['schemas']['FoundLump'];
 export type GalleryEntry = components['schemas']['GalleryEntry'];
@@ -1751,6 +2220,7 @@ export type Hello = components['schemas']['Hello'];
 export type InjectedFault = components['schemas']['InjectedFault'];
 export type LawFault = components['schemas']['LawFault'];
 export type LayerInfo = components['schemas']['LayerInfo'];
+export type LengthUnit = components['schemas']['LengthUnit'];
 export type LostRecords = components['schemas']['LostRecords'];
 export type LumpForm = components['schemas']['LumpForm'];
 export type LumpInfo = components['schemas']['LumpInfo'];
@@ -1769,6 +2239,14 @@ export type Reply = components['schemas']['Reply'];
 export type Spectrum = components['schemas']['Spectrum'];
 export type State = components['schemas']['State'];
 export type StepResult = components['schemas']['StepResult'];
+export type SurfaceInfo = components['schemas']['SurfaceInfo'];
+export type SurfaceVerdict = components['schemas']['SurfaceVerdict'];
+export type Template = components['schemas']['Template'];
+export type TemplateInfo = components['schemas']['TemplateInfo'];
+export type TemplateLayer = components['schemas']['TemplateLayer'];
 export type ToolInfo = components['schemas']['ToolInfo'];
+export type UploadLimits = components['schemas']['UploadLimits'];
+export type Uploaded = components['schemas']['Uploaded'];
+export type UploadedContent = components['schemas']['UploadedContent'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

@@ -12,6 +12,8 @@ const percent = (share: number) => `${Math.round(100 * share)} %`;
 const exact = (share: number) => `${Number((100 * share).toPrecision(3))} %`;
 const place = (at: readonly number[]) => `(${at.map((x) => (x * 1e3).toFixed(1)).join(', ')}) mm`;
 const mm = inMillimetres;
+/** A layer by the name of its tissue. */
+const tissue = (name: string, names: Dictionary): string => (names as Record<string, string>)[`tissue.${name}`] ?? name;
 
 /** The repairs that were made, with their counts. */
 function repairs(note: Of<Note, 'repaired'>, names: readonly string[]): string {
@@ -70,7 +72,7 @@ const en: Words<Note> = {
   repaired: (note) => `${note.file} was repaired: ${repairs(note, ['vertices welded:', 'triangles without area dropped:', 'double triangles dropped:', 'unused vertices dropped:', 'triangles turned outward:'])}`,
   skin_coarsened: ({ n_given, n_vertices, deviation }) => `The skin was coarsened from ${n_given} to ${n_vertices} vertices where it is finer than needed. It is at most ${mm(deviation, 2)} from the given skin. Set [mesh] coarsen = false to keep all vertices.`,
   base_overlaps: ({ n_pairs }) => `The base of the body passes through itself (${n_pairs} pairs of triangles). Look at the cutaway before you trust forces near there.`,
-  layers_moved: ({ share, layer, asked, thickness, at }) => `Layers are more than 1 % thicker or thinner than asked under ${(100 * share).toFixed(2)} % of the skin's area, to keep the mesh valid. Worst under the skin at ${place(at)}: layer “${layer}” is ${mm(thickness, 2)} instead of ${mm(asked, 2)} thick.`,
+  layers_moved: ({ share, layer, asked, thickness, at }) => `Layers are more than 1 % thicker or thinner than asked under ${(100 * share).toFixed(2)} % of the skin's area, to keep the mesh valid. Worst under the skin at ${place(at)}: layer “${tissue(layer, enNames)}” is ${mm(thickness, 2)} instead of ${mm(asked, 2)} thick.`,
   cutout_near: ({ radius, enough }) => `The cut-out has a radius of ${mm(radius, 0)}. With less than ${mm(enough, 0)}, its free rim may change the force.`,
   oblique_press: ({ angle }) => `The press direction is ${Math.round((angle * 180) / Math.PI)}° from the skin's normal: the tool drags more than it presses.`,
   press_on_cut_face: () => 'The place that is pressed lies on a cut face. The force there is that of a free edge.',
@@ -89,11 +91,11 @@ const en: Words<Note> = {
   coarse_under_tool: ({ edge, radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of its radius of ${mm(radius)}: the force depends on the mesh. Refine it with [mesh] near_tool.`,
   coarse_at_edge: ({ edge, edge_radius }) => `Skin edges near the tool are ${mm(edge)} long, more than a third of the radius of its edge, ${mm(edge_radius)}: the force depends on the steps. Make the edge rounder or the mesh finer.`,
   accuracy_too_fine: ({ accuracy, asked, made }) => `In real time, edges and levels near the tool are ${percent(made)} smaller for an accuracy of ${exact(accuracy)} than by default, not ${percent(asked)}: finer ones make steps late, which costs more force than they gain. Expect more error than asked for.`,
-  tension_lost: ({ layer }) => `The cut faces are free and let go of most of the tension of “${layer}”. Set cut_faces = "fixed" or "symmetric" to keep it.`,
+  tension_lost: ({ layer }) => `The cut faces are free and let go of most of the tension of “${tissue(layer, enNames)}”. Set cut_faces = "fixed" or "symmetric" to keep it.`,
   few_under_disc: ({ n_vertices, radius, edge }) => `Only ${n_vertices} skin vertices lie under the tool of radius ${mm(radius)}, with edges of ${mm(edge)} there: the force depends on the mesh.`,
   tension_left_out: () => 'Bars have no tension at rest; “prestress” was left out.',
   first_speed_only: () => 'Forces of bars do not depend on time: only the first of “speeds” was run.',
-  bar_aspects: ({ layers, least, most }) => `Height of levels over length of skin edges: ${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join(', ')}. Outside ${least} to ${most} bars are too stiff across or too soft in shear.`,
+  bar_aspects: ({ layers, least, most }) => `Height of levels over length of skin edges: ${layers.map(({ name, aspect }) => `${tissue(name, enNames)} ${aspect.toFixed(2)}`).join(', ')}. Outside ${least} to ${most} bars are too stiff across or too soft in shear.`,
   motion_off_skin: ({ far, length }) => `${mm(far, 0)} along its motion the tool is off the skin, where nothing is felt. Shorten the motion (now ${mm(length, 0)}).`,
   tool_replaced: ({ tool, by }) => `A hand presses by contact: the scene's ${enTool(tool)} was replaced by a ${enTool(by)}.`,
   coarser_for_touch: ({ edge }) => `Skin edges under the tool are ${mm(edge)} long, so that the body can follow a hand. [mesh] near_tool makes them finer.`,
@@ -133,7 +135,7 @@ const ja: Words<Note> = {
   repaired: (note) => `${note.file} を修復しました：${repairs(note, ['結合した頂点', '面積のない三角形の削除', '重複した三角形の削除', '未使用の頂点の削除', '外向きに直した三角形'])}`,
   skin_coarsened: ({ n_given, n_vertices, deviation }) => `必要以上に細かい皮膚のメッシュを ${n_given} 頂点から ${n_vertices} 頂点に粗くしました。元の皮膚との距離は最大 ${mm(deviation, 2)} です。すべての頂点を残すには [mesh] coarsen = false を指定してください。`,
   base_overlaps: ({ n_pairs }) => `体の底面が自分自身と交差しています（三角形 ${n_pairs} 組）。その付近の力を使う前に断面を確認してください。`,
-  layers_moved: ({ share, layer, asked, thickness, at }) => `メッシュを有効に保つため、皮膚面積の ${(100 * share).toFixed(2)} % で層の厚さが指定から 1 % を超えてずれています。最大のずれは ${place(at)} の皮膚の下で、層「${layer}」の厚さは ${mm(asked, 2)} ではなく ${mm(thickness, 2)} です。`,
+  layers_moved: ({ share, layer, asked, thickness, at }) => `メッシュを有効に保つため、皮膚面積の ${(100 * share).toFixed(2)} % で層の厚さが指定から 1 % を超えてずれています。最大のずれは ${place(at)} の皮膚の下で、層「${tissue(layer, jaNames)}」の厚さは ${mm(asked, 2)} ではなく ${mm(thickness, 2)} です。`,
   cutout_near: ({ radius, enough }) => `切り出しの半径は ${mm(radius, 0)} です。${mm(enough, 0)} 未満では縁の影響を感じることがあります。`,
   oblique_press: ({ angle }) => `押す方向が皮膚の法線から ${Math.round((angle * 180) / Math.PI)}° ずれています。押すよりも引きずる動きになります。`,
   press_on_cut_face: () => '押す位置が切断面の上にあります。そこでの力は自由端の力です。',
@@ -152,11 +154,11 @@ const ja: Words<Note> = {
   coarse_under_tool: ({ edge, radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の半径 ${mm(radius)} の 3 分の 1 を超えています。力がメッシュに依存します。[mesh] near_tool で細かくしてください。`,
   coarse_at_edge: ({ edge, edge_radius }) => `圧子付近の皮膚の辺の長さは ${mm(edge)} で、圧子の縁の半径 ${mm(edge_radius)} の 3 分の 1 を超えています。力がステップに依存します。縁を丸くするか、メッシュを細かくしてください。`,
   accuracy_too_fine: ({ accuracy, asked, made }) => `リアルタイムでは、精度 ${exact(accuracy)} の指定に対して、圧子付近の辺と段の大きさを既定より ${percent(asked)} ではなく ${percent(made)} だけ小さくしました。それ以上細かくすると計算が手の動きに遅れ、かえって力の誤差が増えるためです。誤差は指定より大きくなります。`,
-  tension_lost: ({ layer }) => `切断面が自由なため、「${layer}」の張力の大部分が失われます。保つには cut_faces を "fixed" か "symmetric" にしてください。`,
+  tension_lost: ({ layer }) => `切断面が自由なため、「${tissue(layer, jaNames)}」の張力の大部分が失われます。保つには cut_faces を "fixed" か "symmetric" にしてください。`,
   few_under_disc: ({ n_vertices, radius, edge }) => `半径 ${mm(radius)} の圧子の下にある皮膚の頂点は ${n_vertices} 個だけです（辺の長さ ${mm(edge)}）。力がメッシュに依存します。`,
   tension_left_out: () => '棒には初期張力がないため、prestress は使われません。',
   first_speed_only: () => '棒には時間の効果がないため、speeds の最初の値だけを使いました。',
-  bar_aspects: ({ layers, least, most }) => `層の高さと皮膚の辺の長さの比：${layers.map(({ name, aspect }) => `${name} ${aspect.toFixed(2)}`).join('、')}。${least}〜${most} の範囲外では、棒の硬さが正しくありません。`,
+  bar_aspects: ({ layers, least, most }) => `層の高さと皮膚の辺の長さの比：${layers.map(({ name, aspect }) => `${tissue(name, jaNames)} ${aspect.toFixed(2)}`).join('、')}。${least}〜${most} の範囲外では、棒の硬さが正しくありません。`,
   motion_off_skin: ({ far, length }) => `動作の ${mm(far, 0)} の位置で圧子が皮膚から外れ、力を感じません。動作の長さ（現在 ${mm(length, 0)}）を短くしてください。`,
   tool_replaced: ({ tool, by }) => `手は接触で押します。シーンの圧子（${jaTool(tool)}）を別の圧子（${jaTool(by)}）に置き換えました。`,
   coarser_for_touch: ({ edge }) => `手の動きに追従できるよう、圧子の下の皮膚の辺の長さを ${mm(edge)} にしました。[mesh] near_tool で細かくできます。`,

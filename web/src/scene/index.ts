@@ -4,4 +4,5 @@ export { BodyView } from './view';
 export { DEFAULT_OPTIONS, NoWebGL2 } from './options';
 export type { MapKind } from './palpation';
 export type { Legend, MapLegend, Picked, SectionArea, Vec3, ViewOptions } from './options';
+export type { CameraPose } from './rig';
 export { COLOURINGS, quantityOf, type ColourBy } from './quantities';

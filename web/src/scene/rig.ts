@@ -2,6 +2,17 @@
 
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
 
+/** A camera relative to a body, so that it suits other bodies too. */
+export interface CameraPose {
+  /** rad. */
+  azimuth: number;
+  elevation: number;
+  /** As a share of the distance from which the whole body is seen. */
+  distance: number;
+  /** The point looked at, from the middle of the body, in its radii. */
+  target: [number, number, number];
+}
+
 const FIELD_OF_VIEW = 28;
 const TURN_MS = 450;
 
@@ -71,6 +82,22 @@ export class CameraRig {
       distance = Math.max(distance, near + Math.abs(p.dot(right)) / tx, near + Math.abs(p.dot(up)) / ty);
     }
     return 1.12 * distance;
+  }
+
+  /** The pose relative to a body with this middle; during a turn, the pose at its end. */
+  pose(middle: Vector3): CameraPose {
+    const [azimuth, elevation, distance, target] = this.turn?.to ?? [this.azimuth, this.elevation, this.distance, this.target];
+    const from = target.clone().sub(middle).divideScalar(this.radius);
+    return { azimuth, elevation, distance: distance / this.fitted, target: from.toArray() };
+  }
+
+  setPose({ azimuth, elevation, distance, target }: CameraPose, middle: Vector3): void {
+    this.turn = null;
+    this.azimuth = azimuth;
+    this.elevation = MathUtils.clamp(elevation, -Math.PI / 2 + 0.002, Math.PI / 2 - 0.002);
+    this.distance = this.fitted * MathUtils.clamp(distance, 0.08, 3);
+    this.target.fromArray(target).clampScalar(-3, 3).multiplyScalar(this.radius).add(middle);
+    this.place();
   }
 
   /** Rotates by a drag of so many pixels in a picture `height` pixels high. */

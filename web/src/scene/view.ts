@@ -21,7 +21,7 @@ import { PalpationVolume } from './palpation';
 import { nearestOnSkin, pickNearest, pickSkin } from './picking';
 import { pictureOf } from './picture';
 import { Quality, type Detail } from './quality';
-import { CameraRig, SIDES } from './rig';
+import { CameraRig, SIDES, type CameraPose } from './rig';
 import { Stage } from './stage';
 import { Surfaces, type Materials } from './surfaces';
 import { ToolView } from './tool';
@@ -192,6 +192,15 @@ export class BodyView {
 
   viewFrom(side: 'home' | 'top' | 'front' | 'side'): void {
     this.look(side === 'home' ? this.homeSide() : SIDES[side]);
+  }
+
+  /** The camera relative to the body; null while there is none. */
+  get camera(): CameraPose | null {
+    return this.body && this.rig.pose(this.body.centre);
+  }
+
+  set camera(pose: CameraPose | null) {
+    if (this.body && pose) this.rig.setPose(pose, this.body.centre);
   }
 
   /** The view as a PNG, with the scale bar. */

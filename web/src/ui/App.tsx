@@ -4,6 +4,8 @@ import { useEffect } from 'preact/hooks';
 import { t } from '../i18n';
 import { hello, isVersionOther } from '../store';
 import { SNAPSHOT_VERSION } from '../generated/wire';
+import { Drop } from '../own/Drop';
+import { OwnDialog } from '../own/OwnDialog';
 import { Banner } from './Banner';
 import { Button } from './controls';
 import { Notices } from './Notices';
@@ -31,6 +33,8 @@ export function App() {
       <Stage />
       <Readout />
       <Notices />
+      <OwnDialog />
+      <Drop />
     </div>
   );
 }

@@ -1,6 +1,7 @@
 // The banner over everything when the connection is lost.
 
 import { t } from '../i18n';
+import { RestoreBar } from './RestoreBar';
 import { isRefused, status, wasOpen } from '../store';
 
 export function Banner() {
@@ -14,6 +15,7 @@ export function Banner() {
           {t(isRefused.value ? 'connection.token_banner' : isLost ? 'connection.lost_banner' : 'connection.none_banner')}
         </div>
       )}
+      {!isLost && <RestoreBar />}
     </div>
   );
 }

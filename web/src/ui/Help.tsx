@@ -3,6 +3,7 @@
 import { useEffect, useRef } from 'preact/hooks';
 import { t, type Key } from '../i18n';
 import { hello } from '../store';
+import { boundWords } from '../own/upload';
 import { Button } from './controls';
 
 const MOUSE: Key[] = ['press', 'stroke', 'wheel', 'shift', 'orbit', 'zoom', 'touch'].map((name) => `help.mouse_${name}` as Key);
@@ -13,6 +14,12 @@ const KEYS: [keys: string, what: Key][] = [
   ['Space', 'help.key_space'],
   ['Esc', 'help.key_escape'],
   ['Tab', 'help.key_tab'],
+];
+const EVERYWHERE: [keys: string, what: Key][] = [
+  ['Ctrl + Z', 'help.key_undo'],
+  ['Ctrl + Shift + Z, Ctrl + Y', 'help.key_redo'],
+  ['Enter', 'help.key_enter'],
+  ['↑ ↓ Home End', 'help.key_tabs'],
 ];
 const PAD: Key[] = ['help.pad_stick', 'help.pad_trigger'];
 
@@ -41,6 +48,12 @@ export function Help({ onClose }: { onClose: () => void }) {
         <dl class="keys">
           {KEYS.map(([keys, what]) => [<dt key={`t${keys}`}><kbd>{keys}</kbd></dt>, <dd key={`d${keys}`}>{t(what)}</dd>])}
         </dl>
+        <p class="hint">{t('help.keys_everywhere')}</p>
+        <dl class="keys">
+          {EVERYWHERE.map(([keys, what]) => [<dt key={`t${keys}`}><kbd>{keys}</kbd></dt>, <dd key={`d${keys}`}>{t(what)}</dd>])}
+        </dl>
+        <h3>{t('help.files')}</h3>
+        <p>{t('own.drop_kinds')} {boundWords()}</p>
         <h3>{t('help.pad')}</h3>
         <ul>{PAD.map((key) => <li key={key}>{t(key)}</li>)}</ul>
         <p class="hint">{hello.value === null ? 'Palpa' : `Palpa ${hello.value.palpa}`}</p>

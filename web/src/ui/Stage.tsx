@@ -10,6 +10,7 @@ import {
   ask, askAloud, edit, homeKey, isController, isReplaying, isWatching, notify, onFrame, onMap, onMesh, scene, send, state,
 } from '../store';
 import { bodyView, firstBodyMs, legend, mapLegend, section, yields } from './body';
+import { Building } from './Building';
 import { Button, Segmented } from './controls';
 import { GameBar } from './GameBar';
 import { Icon } from './icons';
@@ -18,6 +19,7 @@ import { MapBox } from './MapBox';
 import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
+import { inPageWords } from './words';
 import { handMode, isDeepest, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
 
 /** Whether nothing else moves the hand, so that it may follow the pointer. */
@@ -213,13 +215,13 @@ function Phase() {
   const now = state.value;
   if (now === null) return <p class="chip building" role="status">{t('phase.waiting')}</p>;
   if (now.phase === 'building') {
-    return <p class="chip building" role="status" data-testid="building"><span class="spinner" aria-hidden="true" />{t('phase.building_long')}</p>;
+    return <Building />;
   }
   if (now.phase !== 'stopped' && (now.problem == null || JSON.stringify(now.problem) === dismissed.value)) return null;
   return (
     <div class={`problem ${now.phase}`} role="alert" data-testid="problem">
       <strong>{t(now.phase === 'stopped' ? 'phase.stopped_long' : 'phase.not_built')}</strong>
-      {now.problem != null && <p>{problemWords(now.problem, language.value)}</p>}
+      {now.problem != null && <p>{inPageWords(problemWords(now.problem, language.value), scene.value)}</p>}
       {now.phase === 'running' && (
         <Button onClick={() => (dismissed.value = JSON.stringify(now.problem))}>{t('notices.dismiss')}</Button>
       )}

@@ -9,6 +9,7 @@ import { Icon } from './icons';
 import { NoticeButton } from './Notices';
 import { formatNumber } from './quantity';
 import { themeChoice, type ThemeChoice } from './settings';
+import { Undo } from './Undo';
 
 const OWN = '';
 
@@ -21,6 +22,7 @@ export function TopBar() {
         Palpa
       </h1>
       <ScenePicker />
+      <Undo />
       <div class="top-states">
         <ConnectionState />
         <ControllerState />
@@ -70,7 +72,10 @@ function ScenePicker() {
       disabled={!isController.value}
       options={[
         ...(now?.gallery_key == null ? [{ value: OWN, label: t('scene.own_picked') }] : []),
-        ...(now?.gallery ?? []).map(({ key, name }) => ({ value: key, label: named('gallery', key, name) })),
+        ...(now?.gallery ?? []).map(({ key, name }) => ({
+          value: key,
+          label: named('gallery', key, name) + (key === now?.gallery_key && now.is_changed ? ` (${t('scene.changed')})` : ''),
+        })),
       ]}
       onChange={(key) => key !== OWN && void askAloud({ type: 'load_scene', key })}
       testid="scene-picker"

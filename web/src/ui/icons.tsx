@@ -2,7 +2,7 @@
 
 import type { Tab } from './settings';
 
-const PATHS: Record<Tab | 'play' | 'pause' | 'close' | 'help' | 'bell' | 'speak' | 'camera', string> = {
+const PATHS: Record<Tab | 'play' | 'pause' | 'close' | 'help' | 'bell' | 'speak' | 'camera' | 'undo' | 'redo', string> = {
   scene: 'M3 12c4-5 10-5 14 0M3 15.5c4-5 10-5 14 0M3 8.500c4-5 10-5 14 0',
   view: 'M2 10s3-5 8-5 8 5 8 5-3 5-8 5-8-5-8-5zM10 12.200a2.200 2.200 0 1 0 0-4.400 2.200 2.200 0 0 0 0 4.400z',
   tissues: 'M10 3l7 3.500-7 3.500-7-3.500zM3 10l7 3.500 7-3.500M3 13.500l7 3.500 7-3.500',
@@ -19,6 +19,8 @@ const PATHS: Record<Tab | 'play' | 'pause' | 'close' | 'help' | 'bell' | 'speak'
   help: 'M7.300 7.400a2.700 2.700 0 1 1 3.900 2.400c-.9.500-1.200 1-1.200 2M10 14.700v.1M10 18a8 8 0 1 0 0-16 8 8 0 0 0 0 16z',
   bell: 'M5 13.500V9a5 5 0 0 1 10 0v4.500l1.300 1.500H3.700zM8.500 17.200h3',
   speak: 'M3 8v4h3l4 3.500v-11L6 8zM13 7.500a3.500 3.500 0 0 1 0 5M15.300 5.200a6.800 6.800 0 0 1 0 9.600',
+  undo: 'M7.500 4L3.500 8l4 4M4 8h7.500a4.500 4.500 0 0 1 0 9H8',
+  redo: 'M12.500 4l4 4-4 4M16 8H8.500a4.500 4.500 0 0 0 0 9H12',
   camera: 'M3 6.500h3.200l1.300-2h5l1.300 2H17v9H3zM10 13.500a2.700 2.700 0 1 0 0-5.400 2.700 2.700 0 0 0 0 5.400z',
 };
 

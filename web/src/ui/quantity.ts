@@ -68,7 +68,9 @@ export function withUnit(text: string, dimension: Dimension): string {
  * 0.00030000000000000003 m. */
 export function tidied(text: string, dimension: Dimension): string {
   const value = parseQuantity(text, dimension);
-  if (value === null || (value !== 0 && text.length <= 9)) return text;
+  // A length below a metre is read in millimetres.
+  const isInMetres = dimension === 'length' && /[\d\s]m\s*$/.test(text) && Math.abs(value ?? 0) < 1;
+  if (value === null || (value !== 0 && text.length <= 9 && !isInMetres)) return text;
   return formatQuantity(value, dimension, 5);
 }
 

@@ -9,7 +9,7 @@ import type { Field } from '../generated/api';
 const PREFIX = 'palpa.';
 
 /** A signal whose value the browser keeps, unless it forbids storage. */
-function remembered<T>(name: string, initial: T, isValid: (value: unknown) => boolean): Signal<T> {
+export function remembered<T>(name: string, initial: T, isValid: (value: unknown) => boolean): Signal<T> {
   let value = initial;
   try {
     const written = localStorage.getItem(PREFIX + name);
@@ -101,6 +101,9 @@ export const pressDepth = computed(() => {
   const usual = state.value?.usual_depth ?? 0.004;
   return Math.min(chosenDepth.value ?? usual, state.value?.greatest_depth ?? Infinity);
 });
+
+/** Seed of the next round of the game, as it is typed; empty for a random one. */
+export const wantedSeed = signal('');
 
 /** The purpose of the next click on the body. */
 export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };

@@ -4,17 +4,17 @@ mod report;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail, ensure};
-use palpa_mesh::check::{Examination, Severity};
+use anyhow::{bail, ensure};
+use palpa_mesh::check::Examination;
 use palpa_mesh::growth::GrowthReport;
-use palpa_mesh::read::FileCounts;
-use palpa_mesh::{Format, RepairOptions, SurfaceFile, Verdict, read_surface, write_surface};
-use palpa_scene::{LengthUnit, Scene, Skin};
+use palpa_mesh::{RepairOptions, Verdict, write_surface};
+use palpa_scene::{LengthUnit, Scene};
 use serde::Serialize;
 
 use crate::cli::Context;
 use crate::commands::Outcome;
 use palpa::build::build;
+use palpa::check::{SurfaceCheck, is_scene, surfaces_in};
 use palpa::one_paragraph;
 
 /// Check surfaces and scenes: what is wrong, where, and what to do
@@ -80,21 +80,11 @@ struct FileResult {
 /// The result for one surface.
 #[derive(Debug, Serialize)]
 struct SurfaceResult {
-    file: PathBuf,
-    format: Format,
-    counts: FileCounts,
-    notes: Vec<NoteResult>,
     #[serde(flatten)]
-    examination: Examination,
+    check: SurfaceCheck,
     /// Path of the repaired copy.
     #[serde(skip_serializing_if = "Option::is_none")]
     written: Option<PathBuf>,
-}
-
-#[derive(Debug, Serialize)]
-struct NoteResult {
-    severity: Severity,
-    message: String,
 }
 
 /// Checks all files and reports on each.
@@ -147,7 +137,7 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         body: None,
         refusal: None,
     };
-    let surfaces = match surfaces_of(file, args.unit) {
+    let surfaces = match surfaces_in(file, args.unit) {
         Ok(surfaces) => surfaces,
         Err(error) => {
             result.error = Some(one_paragraph(&error));
@@ -155,31 +145,15 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         }
     };
     let mut verdict = Verdict::Good;
-    for Named {
-        path,
-        surface,
-        unit,
-    } in surfaces
-    {
+    for (path, surface, unit) in surfaces {
         let options = RepairOptions {
             weld_tolerance: args.weld,
             recentre: args.recentre,
         };
-        let examination = surface.examine(unit.metres(), &options);
-        verdict = verdict.max(examination.verdict);
-        let notes = surface.notes.iter().map(|note| NoteResult {
-            severity: note.severity(),
-            message: note.to_string(),
-        });
-        let written = write_repaired(&path, &examination, args, context)?;
-        result.surfaces.push(SurfaceResult {
-            format: surface.format,
-            counts: surface.counts,
-            notes: notes.collect(),
-            examination,
-            written,
-            file: path,
-        });
+        let check = SurfaceCheck::of(path, &surface, unit, &options);
+        verdict = verdict.max(check.examination.verdict);
+        let written = write_repaired(&check.file, &check.examination, args, context)?;
+        result.surfaces.push(SurfaceResult { check, written });
     }
     if is_scene(file) && verdict < Verdict::Bad {
         match build(&Scene::load(file)?) {
@@ -192,43 +166,6 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
     }
     result.verdict = Some(verdict);
     Ok(result)
-}
-
-fn is_scene(file: &Path) -> bool {
-    file.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-}
-
-/// A surface that was read, with the data needed to interpret its coordinates.
-struct Named {
-    path: PathBuf,
-    surface: SurfaceFile,
-    unit: LengthUnit,
-}
-
-/// The surface of a file, or the surfaces that a scene names.
-fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
-    let read = |path: &Path, unit: LengthUnit| -> anyhow::Result<Named> {
-        Ok(Named {
-            surface: read_surface(path)?,
-            path: path.into(),
-            unit,
-        })
-    };
-    if !is_scene(file) {
-        return Ok(vec![read(file, unit)?]);
-    }
-    let scene = Scene::load(file)?;
-    let skin = match &scene.body.skin {
-        Skin::File(path) => Some(path),
-        Skin::Generated(_) => None,
-    };
-    skin.into_iter()
-        .chain(&scene.body.bones)
-        .map(|path| {
-            read(path, scene.body.unit).with_context(|| format!("scene {}", file.display()))
-        })
-        .collect()
 }
 
 /// Writes the repaired copy, if one was requested and it is not empty. Returns its path.

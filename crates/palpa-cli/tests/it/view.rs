@@ -1,6 +1,8 @@
 //! `palpa view` as a process, asked over HTTP as a program would. The page in a browser is tested
 //! in `web/e2e`.
 
+mod own;
+
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::process::{Child, Stdio};
@@ -38,9 +40,13 @@ impl Viewer {
     fn start(more: &[&str]) -> Self {
         let bench = palpa();
         bench.file("gel.toml", gel());
+        // Of its own, so that a test sees what is left in it.
+        let tmp = bench.path("tmp");
+        fs::create_dir(&tmp).unwrap();
         let args = ["view", "--no-open", "--port", "0", "--json", "gel.toml"];
         let mut process = bench
             .command(&[&args, more].concat())
+            .env("TMPDIR", tmp)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

@@ -244,14 +244,30 @@ impl Fault {
 /// format, or has no faces.
 pub fn read_surface(path: &Path) -> Result<SurfaceFile, ReadError> {
     let bytes = load(path, MAX_FILE_BYTES)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    read_as(path, &bytes, Some(folder))
+}
+
+/// Reads a surface from the bytes of a file, like [`read_surface`] from the file itself. Of the path,
+/// only the name counts: it is named in errors, and its extension matters if the content leaves the
+/// format open.
+///
+/// A glTF with buffers in other files cannot be read this way.
+///
+/// # Errors
+/// When the bytes have an unknown format, break the rules of their format, or hold no faces.
+pub fn read_surface_named(path: &Path, bytes: &[u8]) -> Result<SurfaceFile, ReadError> {
+    read_as(path, bytes, None)
+}
+
+fn read_as(path: &Path, bytes: &[u8], folder: Option<&Path>) -> Result<SurfaceFile, ReadError> {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let Some(format) = Format::of(&bytes, extension.as_deref()) else {
+    let Some(format) = Format::of(bytes, extension.as_deref()) else {
         return Err(ReadError::UnknownFormat { path: path.into() });
     };
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut file = parse(&bytes, format, Some(folder)).map_err(|source| ReadError::Content {
+    let mut file = parse(bytes, format, folder).map_err(|source| ReadError::Content {
         path: path.into(),
         source,
     })?;

@@ -9,6 +9,8 @@ use palpa_viewer::control::{
     State,
 };
 
+use crate::history::Wanted;
+use crate::own;
 use crate::veil::Veil;
 use crate::world::World;
 use crate::{edit, gallery};
@@ -24,6 +26,10 @@ pub(crate) struct Told {
     pub(crate) recording: RecordingInfo,
     /// The game, if one is on.
     pub(crate) game: Option<GameInfo>,
+    /// Number of changes of the scene that can be undone.
+    pub(crate) n_undo: u32,
+    /// Number of changes of the scene that can be redone.
+    pub(crate) n_redo: u32,
 }
 
 /// The state as last sent to pages.
@@ -70,19 +76,17 @@ impl Status {
         self.is_changed = true;
     }
 
-    /// Key of the scene that pages see, if it is of the gallery.
-    pub(crate) fn gallery_key(&self) -> Option<&str> {
-        self.state.gallery_key.as_deref()
-    }
-
-    /// Describes the present body in the state.
-    pub(crate) fn describe(&mut self, world: &World, key: Option<&str>, veil: Veil<'_>) {
+    /// Describes the present body in the state. `wanted` is its scene, without the lumps of a game.
+    pub(crate) fn describe(&mut self, world: &World, wanted: &Wanted, veil: Veil<'_>) {
         self.is_changed = true;
         let scene: Scene = veil.scene(&world.scene);
         let state = &mut self.state;
         // A scene that was read can also be written.
         state.scene = edit::to_json(&scene).unwrap_or_default();
-        state.gallery_key = key.map(str::to_owned);
+        state.gallery_key.clone_from(&wanted.key);
+        state.origin = wanted.origin.number;
+        state.is_changed = wanted.is_changed();
+        state.files = own::names_of(&wanted.scene);
         state.layers.clone_from(&world.layers);
         state.lumps = veil.lumps(&world.lumps);
         state.tool = world.tool.clone();
@@ -143,6 +147,8 @@ impl Status {
             is_motion_running,
             recording,
             game,
+            n_undo,
+            n_redo,
         } = told();
         let state = &mut self.state;
         state.revision += 1;
@@ -150,6 +156,7 @@ impl Status {
         state.is_motion_running = is_motion_running;
         state.recording = recording;
         state.game = game;
+        (state.n_undo, state.n_redo) = (n_undo, n_redo);
         self.publisher.state(state.clone());
     }
 }

@@ -98,7 +98,14 @@ async fn scenes_may_be_long_and_other_requests_not() {
     let (_session, server) = Session::start(None);
     let mut page = Page::open(&server).await;
     let text = "x".repeat(900_000);
-    assert_eq!(page.ask(Request::LoadText { text }).await, None);
+    assert_eq!(
+        page.ask(Request::LoadText {
+            text,
+            files: vec![]
+        })
+        .await,
+        None
+    );
     let key = "x".repeat(100_000);
     let why = page.ask(Request::LoadScene { key }).await.unwrap();
     assert!(why.contains("at most 65536"), "{why}");

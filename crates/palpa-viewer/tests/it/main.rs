@@ -16,3 +16,4 @@ mod page;
 mod session;
 mod snapshots;
 mod start;
+mod upload;

@@ -1,12 +1,12 @@
 //! A little session: a block of one layer under a punch, which is a spring. It has a state, meshes,
 //! frames and files as the real one has, so that what the server does with them can be seen.
 
-use palpa_scene::ContactShape;
+use palpa_scene::{ContactShape, LengthUnit};
 use palpa_viewer::{
     Answer, Clients, Host, HostFile, Publisher, Server, ServerParams,
     control::{
         Field, Hand, LayerInfo, Method, Phase, Problem, RecordingCurve, RecordingInfo, Request,
-        State, ToolInfo,
+        State, ToolInfo, Uploaded, UploadedContent,
     },
     wire::{FrameSnapshot, MeshSnapshot},
 };
@@ -167,7 +167,7 @@ impl Inner {
                     self.edit(&edit.path, &edit.value)?;
                 }
             }
-            Request::LoadText { text } if text.len() < 10 => return Err("no scene".into()),
+            Request::LoadText { text, .. } if text.len() < 10 => return Err("no scene".into()),
             Request::StartRecording => {
                 self.rows = "force\n".into();
                 self.recording.is_recording = true;
@@ -190,6 +190,11 @@ impl Inner {
             gallery: vec![],
             gallery_key: None,
             scene: self.scene(),
+            origin: 1,
+            is_changed: false,
+            files: vec![],
+            n_undo: 0,
+            n_redo: 0,
             layers: vec![LayerInfo {
                 name: "fat".into(),
                 law: "neo-Hooke".into(),
@@ -256,6 +261,7 @@ impl Host for Session {
         let inner = self.inner.lock().unwrap();
         match file {
             HostFile::Scene => Ok(Some(inner.scene().to_string().into_bytes())),
+            HostFile::SceneArchive => Ok(Some(b"PK".to_vec())),
             HostFile::Body => Err("the disk is full".into()),
             HostFile::Map | HostFile::MapCsv | HostFile::RecordingLog | HostFile::Spectrum => {
                 Ok(None)
@@ -273,6 +279,29 @@ impl Host for Session {
                 Ok(there.then(|| inner.rows.clone().into_bytes()))
             }
         }
+    }
+
+    fn upload(&self, name: &str, bytes: Vec<u8>) -> Result<Uploaded, String> {
+        if bytes.is_empty() {
+            return Err(format!("{name} is empty"));
+        }
+        Ok(Uploaded {
+            id: 7,
+            name: format!("{name}, {} bytes", bytes.len()),
+            content: UploadedContent::Other,
+        })
+    }
+
+    fn check_uploaded(&self, id: u32, unit: LengthUnit) -> Option<Uploaded> {
+        (id == 7).then(|| Uploaded {
+            id,
+            name: format!("{unit:?}"),
+            content: UploadedContent::Other,
+        })
+    }
+
+    fn uploaded_mesh(&self, id: u32) -> Option<Vec<u8>> {
+        (id == 7).then(|| mesh_of(7).encode())
     }
 
     fn problem(&self) -> Option<String> {

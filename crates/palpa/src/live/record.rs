@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use palpa_rt::Header;
-use palpa_scene::{LumpShape, Scene, Skin, Thickness};
+use palpa_scene::Scene;
 
 const BASE: &str = "scene_dir";
 const FILE: &str = "file ";
@@ -27,8 +27,8 @@ pub struct FileState {
 pub fn notes_of(scene: &Scene) -> anyhow::Result<BTreeMap<String, String>> {
     let base = std::path::absolute(&scene.base_dir).unwrap_or_else(|_| scene.base_dir.clone());
     let mut notes = BTreeMap::from([(BASE.to_owned(), base.display().to_string())]);
-    for path in files(scene) {
-        notes.insert(format!("{FILE}{}", path.display()), fingerprint(&path)?);
+    for path in scene.files() {
+        notes.insert(format!("{FILE}{}", path.display()), fingerprint(path)?);
     }
     Ok(notes)
 }
@@ -50,37 +50,18 @@ pub fn scene_of(header: &Header) -> anyhow::Result<Scene> {
 /// The files that have changed since the log was made.
 pub fn changed_files(header: &Header, scene: &Scene) -> Vec<FileState> {
     let mut changed = Vec::new();
-    for path in files(scene) {
+    for path in scene.files() {
         let was = header.notes.get(&format!("{FILE}{}", path.display()));
-        let problem = match (was, fingerprint(&path)) {
+        let problem = match (was, fingerprint(path)) {
             (_, Err(error)) => format!("{error:#}"),
             (None, _) => "the log says nothing of it".to_owned(),
             (Some(was), Ok(is)) if *was != is => "it has changed since the log was made".to_owned(),
             _ => continue,
         };
+        let path = path.to_owned();
         changed.push(FileState { path, problem });
     }
     changed
-}
-
-/// All files that a scene refers to.
-fn files(scene: &Scene) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    if let Skin::File(path) = &scene.body.skin {
-        files.push(path.clone());
-    }
-    files.extend(scene.body.bones.iter().cloned());
-    for layer in &scene.layers {
-        if let Some(Thickness::File(path)) = &layer.thickness {
-            files.push(path.clone());
-        }
-    }
-    for lump in &scene.lumps {
-        if let LumpShape::Mesh(path) = &lump.shape {
-            files.push(path.clone());
-        }
-    }
-    files
 }
 
 /// Length and a hash (FNV-1a) of a file: protects against mix-ups, not against manipulation.

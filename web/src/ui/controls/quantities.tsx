@@ -79,6 +79,7 @@ export function QuantityField(props: {
           }
         }}
         onBlur={() => draft !== null && draft !== committed.current && void commit(draft)}
+        data-draft={draft === null || draft === committed.current ? 'no' : 'yes'}
         data-testid={props.testid}
       />
       {props.range !== undefined && (

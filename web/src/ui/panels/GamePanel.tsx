@@ -7,10 +7,9 @@ import { askAloud, state } from '../../store';
 import type { GameInfo, GameResult } from '../../generated/api';
 import { Button, Controlled, Section, Segmented, Toggle } from '../controls';
 import { formatNumber } from '../quantity';
-import { picking, show, view } from '../settings';
+import { picking, show, view, wantedSeed } from '../settings';
 
 const wantedLumps = signal<'1' | '2' | '3'>('1');
-const wantedSeed = signal('');
 
 function startGame(n_lumps: number, seed: number | null): void {
   picking.value = null;

@@ -8,6 +8,7 @@ import { bodyView, legend, section } from '../body';
 import { parseQuantity, formatNumber } from '../quantity';
 import { showsLumps, neededField, show, view, wanted } from '../settings';
 import { saveImage } from '../save';
+import { SavedViews } from '../SavedViews';
 import { useId, useState } from 'preact/hooks';
 
 export function ViewPanel() {
@@ -70,6 +71,7 @@ export function ViewPanel() {
             {t('view.save_png')}
           </Button>
         </div>
+        <SavedViews />
       </Section>
     </>
   );

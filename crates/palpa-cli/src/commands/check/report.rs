@@ -20,9 +20,10 @@ pub(super) fn say(result: &FileResult, context: &Context) -> anyhow::Result<()> 
         in_words(verdict)
     ))?;
     for surface in &result.surfaces {
-        if surface.file != result.file {
-            let verdict = in_words(surface.examination.verdict);
-            context.say(format_args!("  {}: {verdict}", surface.file.display()))?;
+        let check = &surface.check;
+        if check.file != result.file {
+            let verdict = in_words(check.examination.verdict);
+            context.say(format_args!("  {}: {verdict}", check.file.display()))?;
         }
         say_surface(surface, context)?;
     }
@@ -52,11 +53,12 @@ fn in_words(verdict: Verdict) -> &'static str {
 }
 
 fn say_surface(result: &SurfaceResult, context: &Context) -> anyhow::Result<()> {
-    let (counts, examination) = (&result.counts, &result.examination);
+    let check = &result.check;
+    let (counts, examination) = (&check.counts, &check.examination);
     let report = &examination.report;
     context.say(format_args!(
         "  {}: {} vertices, {} faces ({} of them polygons), {} object(s); welded: {} vertices, {} triangles",
-        result.format,
+        check.format,
         counts.n_points,
         counts.n_faces,
         counts.n_polygons,
@@ -65,7 +67,7 @@ fn say_surface(result: &SurfaceResult, context: &Context) -> anyhow::Result<()> 
         report.n_triangles
     ))?;
     say_shape(report, context)?;
-    for note in &result.notes {
+    for note in &check.notes {
         context.say(format_args!("  {}: {}", label(note.severity), note.message))?;
     }
     for finding in &report.findings {
