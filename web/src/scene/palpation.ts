@@ -106,7 +106,7 @@ export class PalpationVolume {
 
 function rangeOf(values: Float32Array, kind: MapKind): [number, number] {
   const known = Float32Array.from(values).filter((value) => Number.isFinite(value)).sort();
-  if (known.length === 0) return [0, 1];
+  if (known.length === 0) return [0, LEAST_SHARE];
   if (kind === 'surroundings') {
     const most = known[Math.min(known.length - 1, Math.floor((1 - 0.5 * TAIL) * known.length))];
     return [0, Math.max(LEAST_SHARE, Math.ceil(most * 50) / 50)];
