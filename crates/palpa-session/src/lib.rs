@@ -20,7 +20,7 @@ mod builder;
 mod desk;
 mod drill;
 mod edit;
-pub mod gallery;
+mod gallery;
 mod game;
 mod hand;
 mod publish;

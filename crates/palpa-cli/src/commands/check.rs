@@ -2,6 +2,7 @@
 
 mod report;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
@@ -14,8 +15,12 @@ use serde::Serialize;
 
 use crate::cli::Context;
 use crate::commands::Outcome;
-use palpa::build::build;
-use palpa::one_paragraph;
+use crate::named_scene;
+use palpa::build::{BuiltBody, build};
+use palpa::{Note, one_paragraph};
+
+/// Extensions of the files that can be checked, for similar names.
+const KINDS: [&str; 7] = ["obj", "stl", "ply", "off", "glb", "gltf", "toml"];
 
 /// Check surfaces and scenes: what is wrong, where, and what to do
 ///
@@ -24,7 +29,7 @@ use palpa::one_paragraph;
 /// defects; the report says whether a repair removes them. 2: cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Surfaces, or scenes (.toml)
+    /// Surfaces, scenes (.toml), or names of built-in scenes; see `palpa scenes`
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Unit of the coordinates of surfaces: m, cm, mm or in. Scenes state their own unit
@@ -72,6 +77,9 @@ struct FileResult {
     /// The body that grows from a scene; `None` if none grows.
     #[serde(skip_serializing_if = "Option::is_none")]
     body: Option<GrowthReport>,
+    /// Remarks on that body.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
     /// Why no body grows, although each surface of the scene is sound.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
@@ -145,10 +153,11 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         error: None,
         surfaces: vec![],
         body: None,
+        notes: vec![],
         refusal: None,
     };
-    let surfaces = match surfaces_of(file, args.unit) {
-        Ok(surfaces) => surfaces,
+    let (scene, surfaces) = match parts_of(file, args.unit) {
+        Ok(parts) => parts,
         Err(error) => {
             result.error = Some(one_paragraph(&error));
             return Ok(result);
@@ -181,9 +190,12 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
             file: path,
         });
     }
-    if is_scene(file) && verdict < Verdict::Bad {
-        match build(&Scene::load(file)?) {
-            Ok(built) => result.body = Some(built.growth.report),
+    if let Some(scene) = scene.filter(|_| verdict < Verdict::Bad) {
+        match build(&scene) {
+            Ok(built) => {
+                result.notes = notes_on(&built);
+                result.body = Some(built.growth.report);
+            }
             Err(error) => {
                 result.refusal = Some(one_paragraph(&error));
                 verdict = Verdict::Bad;
@@ -194,9 +206,21 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
     Ok(result)
 }
 
+/// The notes on a body that are not about the surfaces: those have their own reports.
+fn notes_on(built: &BuiltBody) -> Vec<String> {
+    let is_of_body = |note: &&Note| {
+        !matches!(
+            note,
+            Note::FileRead { .. } | Note::UnusualSize { .. } | Note::Repaired { .. }
+        )
+    };
+    let notes = built.notes.iter().filter(is_of_body);
+    notes.map(ToString::to_string).collect()
+}
+
 fn is_scene(file: &Path) -> bool {
-    file.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    let is_toml = |e: &OsStr| e.eq_ignore_ascii_case("toml");
+    file.extension().is_some_and(is_toml) || named_scene::built_in(file).is_some()
 }
 
 /// A surface that was read, with the data needed to interpret its coordinates.
@@ -206,8 +230,8 @@ struct Named {
     unit: LengthUnit,
 }
 
-/// The surface of a file, or the surfaces that a scene names.
-fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
+/// The surface of a file; or a scene, and the surfaces that it names.
+fn parts_of(file: &Path, unit: LengthUnit) -> anyhow::Result<(Option<Scene>, Vec<Named>)> {
     let read = |path: &Path, unit: LengthUnit| -> anyhow::Result<Named> {
         Ok(Named {
             surface: read_surface(path)?,
@@ -216,19 +240,28 @@ fn surfaces_of(file: &Path, unit: LengthUnit) -> anyhow::Result<Vec<Named>> {
         })
     };
     if !is_scene(file) {
-        return Ok(vec![read(file, unit)?]);
+        if !file.exists()
+            && let Some(meant) = named_scene::meant(file, &KINDS)
+        {
+            bail!(
+                "cannot read {}: there is no such file; did you mean \"{meant}\"?",
+                file.display()
+            );
+        }
+        return Ok((None, vec![read(file, unit)?]));
     }
-    let scene = Scene::load(file)?;
+    let scene = named_scene::load(file)?.scene;
     let skin = match &scene.body.skin {
         Skin::File(path) => Some(path),
         Skin::Generated(_) => None,
     };
-    skin.into_iter()
-        .chain(&scene.body.bones)
+    let surfaces = skin.into_iter().chain(&scene.body.bones);
+    let surfaces = surfaces
         .map(|path| {
             read(path, scene.body.unit).with_context(|| format!("scene {}", file.display()))
         })
-        .collect()
+        .collect::<anyhow::Result<_>>()?;
+    Ok((Some(scene), surfaces))
 }
 
 /// Writes the repaired copy, if one was requested and it is not empty. Returns its path.
@@ -243,7 +276,7 @@ fn write_repaired(
     };
     let target = match &args.repaired {
         Some(target) => target.clone(),
-        None if context.is_out_given() => context.out_dir()?.path().join(name_of_copy(path)),
+        None if context.given_out().is_some() => context.out_dir()?.path().join(name_of_copy(path)),
         None => return Ok(None),
     };
     if repaired.surface.triangles.is_empty() {

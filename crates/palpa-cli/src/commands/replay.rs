@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use palpa_rt::{Ending, Log, ReplayParams, ReplayReport, Table, Tissue, Verdict, replay_watched};
-use palpa_scene::{ModelKind, Scene};
+use palpa_scene::ModelKind;
 use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
+use crate::named_scene;
 use palpa::live::{FileState, LiveScene, SpringScene, changed_files, machine, scene_of};
 
 /// Run a log again and compare the forces, or export it as tables
@@ -22,7 +23,8 @@ use palpa::live::{FileState, LiveScene, SpringScene, changed_files, machine, sce
 pub struct Args {
     /// The log (MCAP), as `palpa loop-report` writes it
     log: PathBuf,
-    /// Build the body from this scene instead of the one in the log
+    /// Build the body from this scene instead of the one in the log: a file, or the name of a
+    /// built-in scene
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Write the log as tables to the output folder; do not run it again
@@ -108,7 +110,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let log = Log::open(&args.log)?;
     note_ending(&log.ending, context);
     let scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
+        Some(argument) => named_scene::load(argument)?.scene,
         None => scene_of(&log.header)?,
     };
     let changed = match args.scene {
