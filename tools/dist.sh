@@ -10,7 +10,6 @@ rm -rf "$folder"
 mkdir -p "$folder"
 strip -o "$folder/palpa" "$target/release/palpa"
 cp README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
-cp -r scenes "$folder/scenes"
 tar -C "$target/dist" -czf "$target/dist/$name.tar.gz" "$name"
 
 # It is no good if it does not bring its page.

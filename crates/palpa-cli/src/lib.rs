@@ -6,4 +6,5 @@
 
 pub mod cli;
 pub mod commands;
+pub mod named_scene;
 pub mod table;

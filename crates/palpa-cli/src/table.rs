@@ -13,7 +13,8 @@ use std::fmt;
 pub struct Table<const N: usize> {
     header: [String; N],
     rows: Vec<[String; N]>,
-    is_first_left: bool,
+    /// Number of columns that are aligned at the left, from the first.
+    n_left: usize,
 }
 
 impl<const N: usize> Table<N> {
@@ -22,14 +23,21 @@ impl<const N: usize> Table<N> {
         Self {
             header: header.map(str::to_owned),
             rows: Vec::new(),
-            is_first_left: false,
+            n_left: 0,
         }
     }
 
     /// Aligns the first column at the left, for words.
     #[must_use]
     pub fn with_left_names(mut self) -> Self {
-        self.is_first_left = true;
+        self.n_left = 1;
+        self
+    }
+
+    /// Aligns all columns at the left, for words.
+    #[must_use]
+    pub fn with_left_columns(mut self) -> Self {
+        self.n_left = N;
         self
     }
 
@@ -54,9 +62,13 @@ impl<const N: usize> fmt::Display for Table<N> {
             }
             for (column, cell) in line.iter().enumerate() {
                 let gap = if column == 0 { "" } else { "  " };
-                let pad = width[column] - cell.chars().count();
-                if column == 0 && self.is_first_left {
-                    write!(f, "{cell}{:pad$}", "")?;
+                let mut pad = width[column] - cell.chars().count();
+                if column < self.n_left {
+                    // Nothing follows the last column.
+                    if column + 1 == N {
+                        pad = 0;
+                    }
+                    write!(f, "{gap}{cell}{:pad$}", "")?;
                 } else {
                     write!(f, "{gap}{:pad$}{cell}", "")?;
                 }

@@ -205,6 +205,16 @@ impl Canvas {
         );
     }
 
+    /// Fills closed rings that lie side by side with one colour, without seams between them. All
+    /// must run the same way round.
+    pub(crate) fn patches(&mut self, rings: &[Vec<[f64; 2]>], fill: Color) {
+        let d: String = rings.iter().map(|ring| path(ring, true)).collect();
+        put!(
+            self,
+            r#"<path d="{d}" fill="{fill}" stroke="{fill}" stroke-width="0.6" stroke-linejoin="round"/>"#
+        );
+    }
+
     /// Fills a closed ring with a translucent colour.
     pub(crate) fn veil(&mut self, ring: &[[f64; 2]], fill: Color, opacity: f64) {
         let d = path(ring, true);

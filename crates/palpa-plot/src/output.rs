@@ -69,6 +69,21 @@ impl OutDir {
         Ok(path)
     }
 
+    /// Like [`write`](Self::write), but never replaces a file.
+    ///
+    /// # Errors
+    /// When there is a file of that name, or it cannot be written.
+    pub fn write_new(&self, name: &str, bytes: &[u8]) -> anyhow::Result<PathBuf> {
+        let path = self.path.join(name);
+        let write = || {
+            let mut file = temporary_for(&path)?;
+            file.write_all(bytes)?;
+            file.persist_noclobber(&path).map_err(|e| e.error)
+        };
+        write().with_context(|| cannot_write(&path))?;
+        Ok(path)
+    }
+
     /// Writes `value` as JSON.
     ///
     /// # Errors

@@ -11,8 +11,12 @@ use std::collections::BTreeMap;
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 
 mod draw;
+mod means;
+mod shades;
 
-pub use draw::{Panel, Shades, ToolOutline, draw};
+pub use draw::{Panel, ToolOutline, draw};
+pub use means::{CornerMeans, tissue_means};
+pub use shades::{Scale, Shades, SkinShades};
 
 /// A point in the plane, in metres along its axes.
 pub type Point2 = [f64; 2];
@@ -60,15 +64,43 @@ impl Plane {
     }
 }
 
+/// A cut prism.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Index of its layer.
+    pub layer: usize,
+    /// The prism: that of triangle t in interval i is `t (n_levels − 1) + i`.
+    pub prism: usize,
+    /// Its outline. The corners may run either way round.
+    pub outline: Vec<Point2>,
+    /// For each corner, its place in the mesh.
+    pub places: Vec<EdgePlace>,
+}
+
+/// A place on an edge of the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgePlace {
+    /// The nodes of the edge, the smaller one first.
+    pub nodes: [usize; 2],
+    /// Share of the way from the first node to the second, 0 to 1.
+    pub share: f64,
+}
+
+impl EdgePlace {
+    /// The value here of a field that is linear along the edge, from its value at a node.
+    pub fn value(&self, at_node: impl Fn(usize) -> f64) -> f64 {
+        let [a, b] = self.nodes.map(at_node);
+        a + (b - a) * self.share
+    }
+}
+
 /// The section of a body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Section {
-    /// The outlines of the cut prisms, each with the index of its layer. Their vertices may run
-    /// either way round.
-    pub cells: Vec<(usize, Vec<Point2>)>,
-    /// For each outline, the prism it is cut from: the prism of triangle t in interval i is
-    /// `t (n_levels − 1) + i`.
-    pub prisms: Vec<usize>,
+    /// The cut prisms.
+    pub cells: Vec<Cell>,
+    /// Number of nodes in a column of the body.
+    pub n_levels: usize,
     /// The lines where the section meets the skin and the borders between layers. In a closed line,
     /// the last point equals the first.
     pub borders: Vec<Vec<Point2>>,
@@ -88,7 +120,7 @@ type Edge = [usize; 2];
 pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Section {
     assert_eq!(positions.len(), body.n_nodes(), "one position per node");
     let cut = Cut::new(positions, plane);
-    let (mut cells, mut prisms) = (Vec::new(), Vec::new());
+    let mut cells = Vec::new();
     let mut border_segments = Vec::new();
     let mut base_segments = Vec::new();
     let n_intervals = body.n_levels - 1;
@@ -113,18 +145,18 @@ pub fn cut_body(body: &LayeredBody, positions: &[Vec3], plane: &Plane) -> Sectio
             for [p, q] in [[a, b], [b, c], [c, a]] {
                 cut.face(&[q, p, p + 1, q + 1], &mut segments);
             }
-            cells.extend(
-                chains(&segments)
-                    .into_iter()
-                    .filter(|chain| chain.is_closed)
-                    .map(|chain| (layer, cut.points(&chain.edges))),
-            );
-            prisms.resize(cells.len(), t * n_intervals + i);
+            let outlines = chains(&segments).into_iter().filter(|c| c.is_closed);
+            cells.extend(outlines.map(|chain| Cell {
+                layer,
+                prism: t * n_intervals + i,
+                outline: cut.points(&chain.edges),
+                places: chain.edges.iter().map(|&edge| cut.place(edge)).collect(),
+            }));
         }
     }
     Section {
         cells,
-        prisms,
+        n_levels: body.n_levels,
         borders: cut.lines(&border_segments),
         base: cut.lines(&base_segments),
         layer_names: body.layer_names.clone(),
@@ -211,9 +243,16 @@ impl<'a> Cut<'a> {
         chains(segments).into_iter().map(line).collect()
     }
 
-    fn point(&self, [a, b]: Edge) -> Point2 {
+    fn place(&self, [a, b]: Edge) -> EdgePlace {
         let [h_a, h_b] = [self.heights[a], self.heights[b]];
-        let share = h_a / (h_a - h_b);
+        EdgePlace {
+            nodes: [a, b],
+            share: h_a / (h_a - h_b),
+        }
+    }
+
+    fn point(&self, [a, b]: Edge) -> Point2 {
+        let share = self.place([a, b]).share;
         self.plane
             .project(&(self.points[a] + (self.points[b] - self.points[a]) * share))
     }

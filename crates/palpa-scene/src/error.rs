@@ -9,6 +9,9 @@ use toml::de::{DeTable, DeValue};
 use crate::limits::Limits;
 use crate::units::shortened;
 
+/// Two words are alike from this Jaro–Winkler similarity on.
+const LEAST_LIKENESS: f64 = 0.75;
+
 /// The reason why a scene file is refused. Every message names the place, the text found and the
 /// remedy.
 #[derive(Debug, thiserror::Error)]
@@ -248,12 +251,7 @@ fn plain(message: &str) -> String {
 }
 
 fn unknown(place: Place, what: &'static str, found: String, allowed: Vec<String>) -> SceneError {
-    let nearest = allowed
-        .iter()
-        .map(|name| (strsim::jaro_winkler(&found, name), name))
-        .filter(|&(likeness, _)| likeness > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, name)| name.clone());
+    let nearest = nearest(&found, allowed.iter().map(String::as_str)).map(str::to_owned);
     SceneError::Unknown {
         place: place.into(),
         what,
@@ -261,6 +259,15 @@ fn unknown(place: Place, what: &'static str, found: String, allowed: Vec<String>
         nearest,
         allowed,
     }
+}
+
+/// The known word that `found` is most alike, for "did you mean"; `None` if it is like none of them.
+pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    (known.into_iter())
+        .map(|name| (strsim::jaro_winkler(found, name), name))
+        .filter(|&(likeness, _)| likeness > LEAST_LIKENESS)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
 }
 
 impl Site<'_> {

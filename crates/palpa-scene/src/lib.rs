@@ -21,6 +21,7 @@
 //! # Ok::<(), palpa_scene::SceneError>(())
 //! ```
 
+pub mod built_in;
 pub mod units;
 
 mod catalogue;
@@ -44,9 +45,10 @@ mod tissue;
 mod tool;
 mod write;
 
+pub use built_in::BuiltIn;
 pub use catalogue::catalogue;
 pub use elastic::{Elastic, Resistance, Stiffness, Volume};
-pub use error::{Place, SceneError};
+pub use error::{Place, SceneError, nearest};
 pub use law::{Energy, OgdenTerm};
 pub use lump::{Lump, LumpPlace, LumpShape};
 pub use model::{BelowFirst, Damping, Dynamics, Mesh, Model, ModelKind};

@@ -5,14 +5,12 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::built_in::{BuiltIn, PRESSED};
 use crate::{
     Device, Lump, LumpShape, MaterialStatus, Mesh, Model, Motion, SceneError, Status, Thickness,
     Tissue, Tool, resolve,
     write::{self, Names},
 };
-
-/// The scene that is used when none is named: a forearm.
-const EMBEDDED: &str = include_str!("../scenes/forearm.toml");
 
 /// The body, its layers, and the way it is pressed. Lengths in metres, everything in SI units.
 ///
@@ -262,17 +260,14 @@ impl Scene {
         resolve::parse(text, base_dir, None)
     }
 
-    /// The embedded scene: a forearm of skin, fat and muscle, pressed on its dorsal side.
+    /// The built-in scene [`PRESSED`](crate::built_in::PRESSED): a forearm of skin, fat and muscle,
+    /// pressed with a ball on its dorsal side.
     ///
     /// # Panics
-    /// Never: the embedded text is valid, which a test checks.
+    /// Never: the file is valid, which a test checks.
     pub fn embedded() -> Self {
-        Self::parse(EMBEDDED, Path::new("")).expect("the embedded scene is valid")
-    }
-
-    /// The text of the embedded scene, with comments: a template for new scenes.
-    pub fn embedded_toml() -> &'static str {
-        EMBEDDED
+        (BuiltIn::find(PRESSED).and_then(|built_in| built_in.scene().ok()))
+            .expect("the built-in scene is valid")
     }
 
     /// The scene as a scene file, with every default written out and paths relative to `base_dir`.

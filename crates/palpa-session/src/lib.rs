@@ -22,7 +22,7 @@ mod builder;
 mod desk;
 mod drill;
 mod edit;
-pub mod gallery;
+mod gallery;
 mod game;
 mod hand;
 mod history;

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use palpa_mesh::generate;
-use palpa_mesh::growth::{MAX_NODES, ScatteredThickness, Thickness as ThicknessField, grown_part};
+use palpa_mesh::growth::{
+    GrowthReport, MAX_NODES, ScatteredThickness, Thickness as ThicknessField, grown_part,
+};
 use palpa_mesh::{
     Growth, GrowthError, GrowthParams, LayerSpec, RepairOptions, Surface, SurfaceIndex, Vec3, grow,
     read_surface, repair,
@@ -19,6 +21,12 @@ use crate::press::mesh::coarsening;
 /// A place further from the skin than this share of the body's size is refused: its frame or unit
 /// is probably wrong.
 const FAR_FROM_SKIN: f64 = 0.25;
+
+/// Layers that are thinned under more than this share of the skin's area get a note.
+const MOST_OF_THE_SKIN: f64 = 0.5;
+/// Unless half of them keep more than this factor of their thickness: the thicknesses of a body are
+/// not known to a hundredth.
+const ALMOST_AS_ASKED: f64 = 0.99;
 
 /// Sizes of surfaces that need no note, from a fingertip to a person, m.
 const USUAL_SIZE: std::ops::Range<f64> = 0.003..4.0;
@@ -135,6 +143,7 @@ pub fn build_for(
             n_pairs: n_overlaps,
         });
     }
+    notes.extend(layers_thinned(&growth.report));
     if let Some(worst) = &growth.report.worst_moved {
         notes.push(Note::LayersMoved {
             share: growth.report.moved_share,
@@ -163,6 +172,18 @@ pub fn build_for(
         press_at,
         lump_places,
         notes,
+    })
+}
+
+/// A note if there is too little room for the layers under most of the skin.
+fn layers_thinned(report: &GrowthReport) -> Option<Note> {
+    let (worst, median) = (report.worst_thinning.as_ref()?, report.median_thinning?);
+    let is_much = report.thinned_share > MOST_OF_THE_SKIN && median < ALMOST_AS_ASKED;
+    is_much.then_some(Note::LayersThinned {
+        share: report.thinned_share,
+        median,
+        least: worst.value,
+        at: worst.at,
     })
 }
 

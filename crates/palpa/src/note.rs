@@ -68,6 +68,19 @@ pub enum Note {
         /// Number of pairs of triangles.
         n_pairs: usize,
     },
+    /// Layers are thinner than asked under most of the skin, because there is too little room for
+    /// them.
+    LayersThinned {
+        /// Share of the skin's area below which layers are thinner, 0 to 1.
+        share: f64,
+        /// Under half of that area, the layer that is thinned most has at most this share of its
+        /// thickness, 0 to 1.
+        median: f64,
+        /// The same share at the worst place.
+        least: f64,
+        /// The skin above the worst place, m.
+        at: [f64; 3],
+    },
     /// Layers are thicker or thinner than asked although there is room for them, because the mesh
     /// would not be valid otherwise.
     LayersMoved {
@@ -358,6 +371,22 @@ impl fmt::Display for Note {
                 f,
                 "the base of the body passes through itself ({n_pairs} pairs of triangles): look at section.png or the VTU \
                  before you trust forces near there"
+            ),
+            Self::LayersThinned {
+                share,
+                median,
+                least,
+                at,
+            } => write!(
+                f,
+                "layers are thinner than asked under {:.0} % of the skin's area, because there is too little room for them: \
+                 usually {:.0} % of the asked thickness, at worst {:.0} %, under the skin at ({}) mm. Forces are those of \
+                 the thinner layers; give the layers less thickness, or check the unit of the surfaces and the place of \
+                 the bones",
+                100.0 * share,
+                100.0 * median,
+                100.0 * least,
+                Mm(*at)
             ),
             Self::LayersMoved {
                 share,

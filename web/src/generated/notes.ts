@@ -82,6 +82,31 @@ export interface components {
              */
             n_pairs: number;
         } | {
+            /** @description The skin above the worst place, m. */
+            at: [
+                number,
+                number,
+                number
+            ];
+            /** @constant */
+            kind: "layers_thinned";
+            /**
+             * Format: double
+             * @description The same share at the worst place.
+             */
+            least: number;
+            /**
+             * Format: double
+             * @description Under half of that area, the layer that is thinned most has at most this share of its
+             *     thickness, 0 to 1.
+             */
+            median: number;
+            /**
+             * Format: double
+             * @description Share of the skin's area below which layers are thinner, 0 to 1.
+             */
+            share: number;
+        } | {
             /**
              * Format: double
              * @description The thickness that it asks for, m.

@@ -47,9 +47,9 @@ impl Context {
         self.is_json
     }
 
-    /// Whether `--out` was given: for commands that write files only when asked to.
-    pub fn is_out_given(&self) -> bool {
-        self.out.is_some()
+    /// The path of `--out`, if it was given: for commands that write files only when asked to.
+    pub fn given_out(&self) -> Option<&Path> {
+        self.out.as_deref()
     }
 
     /// The output folder; created if it does not exist. Call this before the long work, so that an

@@ -2,20 +2,25 @@
 
 mod report;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::{Context as _, bail, ensure};
 use palpa_mesh::check::Examination;
 use palpa_mesh::growth::GrowthReport;
-use palpa_mesh::{RepairOptions, Verdict, write_surface};
+use palpa_mesh::{RepairOptions, SurfaceFile, Verdict, read_surface, write_surface};
 use palpa_scene::{LengthUnit, Scene};
 use serde::Serialize;
 
 use crate::cli::Context;
 use crate::commands::Outcome;
-use palpa::build::build;
-use palpa::check::{SurfaceCheck, is_scene, surfaces_in};
-use palpa::one_paragraph;
+use crate::named_scene;
+use palpa::build::{BuiltBody, build};
+use palpa::check::{SurfaceCheck, surfaces_of};
+use palpa::{Note, one_paragraph};
+
+/// Extensions of the files that can be checked, for similar names.
+const KINDS: [&str; 7] = ["obj", "stl", "ply", "off", "glb", "gltf", "toml"];
 
 /// Check surfaces and scenes: what is wrong, where, and what to do
 ///
@@ -24,7 +29,7 @@ use palpa::one_paragraph;
 /// defects; the report says whether a repair removes them. 2: cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Surfaces, or scenes (.toml)
+    /// Surfaces, scenes (.toml), or names of built-in scenes; see `palpa scenes`
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Unit of the coordinates of surfaces: m, cm, mm or in. Scenes state their own unit
@@ -72,6 +77,9 @@ struct FileResult {
     /// The body that grows from a scene; `None` if none grows.
     #[serde(skip_serializing_if = "Option::is_none")]
     body: Option<GrowthReport>,
+    /// Remarks on that body.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
     /// Why no body grows, although each surface of the scene is sound.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
@@ -135,10 +143,11 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         error: None,
         surfaces: vec![],
         body: None,
+        notes: vec![],
         refusal: None,
     };
-    let surfaces = match surfaces_in(file, args.unit) {
-        Ok(surfaces) => surfaces,
+    let (scene, surfaces) = match parts_of(file, args.unit) {
+        Ok(parts) => parts,
         Err(error) => {
             result.error = Some(one_paragraph(&error));
             return Ok(result);
@@ -155,9 +164,12 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
         let written = write_repaired(&check.file, &check.examination, args, context)?;
         result.surfaces.push(SurfaceResult { check, written });
     }
-    if is_scene(file) && verdict < Verdict::Bad {
-        match build(&Scene::load(file)?) {
-            Ok(built) => result.body = Some(built.growth.report),
+    if let Some(scene) = scene.filter(|_| verdict < Verdict::Bad) {
+        match build(&scene) {
+            Ok(built) => {
+                result.notes = notes_on(&built);
+                result.body = Some(built.growth.report);
+            }
             Err(error) => {
                 result.refusal = Some(one_paragraph(&error));
                 verdict = Verdict::Bad;
@@ -166,6 +178,48 @@ fn check_file(file: &Path, args: &Args, context: &Context) -> anyhow::Result<Fil
     }
     result.verdict = Some(verdict);
     Ok(result)
+}
+
+/// The notes on a body that are not about the surfaces: those have their own reports.
+fn notes_on(built: &BuiltBody) -> Vec<String> {
+    let is_of_body = |note: &&Note| {
+        !matches!(
+            note,
+            Note::FileRead { .. } | Note::UnusualSize { .. } | Note::Repaired { .. }
+        )
+    };
+    let notes = built.notes.iter().filter(is_of_body);
+    notes.map(ToString::to_string).collect()
+}
+
+fn is_scene(file: &Path) -> bool {
+    let is_toml = |e: &OsStr| e.eq_ignore_ascii_case("toml");
+    file.extension().is_some_and(is_toml) || named_scene::built_in(file).is_some()
+}
+
+/// A surface that was read, the file that it is from, and the unit of its coordinates.
+type Named = (PathBuf, SurfaceFile, LengthUnit);
+
+/// The surface of a file; or a scene, and the surfaces that it names.
+fn parts_of(file: &Path, unit: LengthUnit) -> anyhow::Result<(Option<Scene>, Vec<Named>)> {
+    if !is_scene(file) {
+        if !file.exists()
+            && let Some(meant) = named_scene::meant(file, &KINDS)
+        {
+            bail!(
+                "cannot read {}: there is no such file; did you mean \"{meant}\"?",
+                file.display()
+            );
+        }
+        return Ok((None, vec![(file.into(), read_surface(file)?, unit)]));
+    }
+    let scene = named_scene::load(file)?.scene;
+    let surfaces = surfaces_of(&scene).with_context(|| format!("scene {}", file.display()))?;
+    let unit = scene.body.unit;
+    let named = surfaces
+        .into_iter()
+        .map(|(path, surface)| (path, surface, unit));
+    Ok((Some(scene), named.collect()))
 }
 
 /// Writes the repaired copy, if one was requested and it is not empty. Returns its path.
@@ -180,7 +234,7 @@ fn write_repaired(
     };
     let target = match &args.repaired {
         Some(target) => target.clone(),
-        None if context.is_out_given() => context.out_dir()?.path().join(name_of_copy(path)),
+        None if context.given_out().is_some() => context.out_dir()?.path().join(name_of_copy(path)),
         None => return Ok(None),
     };
     if repaired.surface.triangles.is_empty() {

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use palpa_scene::Scene;
+use palpa_scene::built_in::PRESSED_BONDED;
 use palpa_scene::units::Length;
 use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
+use crate::named_scene::{self, NamedScene};
 use palpa::build::in_mm;
 use palpa::press::Place;
 use palpa::press::mesh::PressedBody;
@@ -17,12 +19,13 @@ use palpa_lab::export::{self, Deck, DeckNote, Export, Section};
 
 /// Write a scene as an input deck for CalculiX, to check its forces with another solver
 ///
-/// Without a SCENE, exports the built-in forearm. Mesh, patch and steps are those of `palpa press`.
+/// Without a SCENE, exports a forearm under a disc that is bonded to the skin. Mesh, patch and steps are those of `palpa press`.
 /// Writes body.inp, in millimetres, newtons and megapascals. Run it with `ccx body` in its folder:
 /// CalculiX then writes the forces of the loading to body.dat and the deformed body to body.frd.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML); the built-in forearm if none is given
+    /// Scene file (TOML), or the name of a built-in scene; see `palpa scenes` [default:
+    /// `forearm_disc`]
     scene: Option<PathBuf>,
     /// Element type for the prisms
     #[arg(long, value_enum, default_value_t)]
@@ -80,17 +83,13 @@ impl From<Element> for export::Element {
 /// If the scene or body is bad, if CalculiX lacks a feature of the scene, or if the deck cannot be
 /// written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let scene = scene_of(args)?;
+    let (scene, scene_name) = scene_of(args)?;
     let out = context.out_dir()?;
     let spinner = context.progress(0, "growing the body");
     let prepared = Prepared::build(&scene)?;
     drop(spinner);
     let (body, place) = (&prepared.mesh.body, prepared.place());
     let patch = patch(&prepared.mesh);
-    let scene_name = args
-        .scene
-        .as_deref()
-        .map_or("embedded forearm".to_owned(), |p| p.display().to_string());
     let title = title(&scene, place, &scene_name);
     let deck = Deck::build(&Export {
         body,
@@ -133,12 +132,11 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The scene with the options applied.
-fn scene_of(args: &Args) -> anyhow::Result<Scene> {
-    let mut scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
-        None => Scene::embedded(),
-    };
+/// The scene with the options applied, and its name.
+fn scene_of(args: &Args) -> anyhow::Result<(Scene, String)> {
+    let NamedScene {
+        mut scene, name, ..
+    } = named_scene::load_or(args.scene.as_deref(), PRESSED_BONDED)?;
     if let Some(depth) = args.depth {
         scene.press.step *= depth.si() / scene.press.depth;
         scene.press.depth = depth.si();
@@ -153,7 +151,7 @@ fn scene_of(args: &Args) -> anyhow::Result<Scene> {
             scene.tool
         );
     }
-    Ok(scene)
+    Ok((scene, name))
 }
 
 /// The two lines at the head of the deck.

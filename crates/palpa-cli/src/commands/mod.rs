@@ -15,6 +15,7 @@ pub mod loop_report;
 pub mod press;
 pub mod replay;
 pub mod reproduce;
+pub mod scenes;
 pub mod schema;
 pub mod verify;
 pub mod view;
@@ -44,6 +45,7 @@ pub enum Command {
     Press(press::Args),
     Replay(replay::Args),
     Reproduce(reproduce::Args),
+    Scenes(scenes::Args),
     Schema(schema::Args),
     Verify(verify::Args),
     View(view::Args),
@@ -64,6 +66,7 @@ impl Command {
             Self::Press(args) => press::run(args, context),
             Self::Replay(args) => replay::run(args, context),
             Self::Reproduce(args) => reproduce::run(args, context),
+            Self::Scenes(args) => scenes::run(args, context),
             Self::Schema(args) => schema::run(args, context),
             Self::Verify(args) => verify::run(args, context),
             Self::View(args) => view::run(args, context),

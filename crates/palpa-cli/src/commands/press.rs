@@ -10,24 +10,24 @@ mod words;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Error, bail};
+use palpa_scene::built_in::{PRESSED, PRESSED_BONDED};
 use palpa_scene::units::{Length, Share, Time, Velocity};
-use palpa_scene::{Generator, ModelKind, Scene, Skin, Target};
+use palpa_scene::{ModelKind, Scene, Target};
 
 use super::Outcome;
 use crate::cli::Context;
+use crate::named_scene::{self, NamedScene};
 use palpa_plot::output::OutDir;
-
-/// Vertex spacing of the skin from which the embedded forearm grows for the continuum, m.
-const COARSE_SPACING: f64 = 10e-3;
 
 /// Press a body along a script and record the force
 ///
-/// Without a SCENE, presses the built-in forearm. Writes the table (press.csv, press.json), force
+/// Without a SCENE, presses a forearm with a ball. Writes the table (press.csv, press.json), force
 /// against depth and time (SVG and PNG), a cross-section, and the deformed body as a VTU/PVD series
 /// for ParaView.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML); the built-in forearm if none is given
+    /// Scene file (TOML), or the name of a built-in scene; see `palpa scenes` [default:
+    /// `forearm_press`; with --model reference: `forearm_disc`]
     scene: Option<PathBuf>,
     /// Model of the body [default: the scene's, or tissue]
     #[arg(long, value_enum)]
@@ -86,12 +86,8 @@ enum Model {
 /// # Errors
 /// If the scene or body is bad, or a result cannot be written.
 pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
-    let scene = adjusted_scene(args)?;
+    let (scene, scene_name) = adjusted_scene(args)?;
     let out = context.out_dir()?;
-    let scene_name = args
-        .scene
-        .as_deref()
-        .map_or("embedded forearm".to_owned(), |p| p.display().to_string());
     let job = Job {
         args,
         context,
@@ -115,25 +111,28 @@ struct Job<'a> {
     scene_name: &'a str,
 }
 
-/// The scene with the changes of the command line.
-fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
-    let mut scene = match &args.scene {
-        Some(path) if is_surface(path) => bail!(
-            "\"{}\" is a surface, not a scene; look at it with `palpa check`, or name it as `surface` in a scene (see \
-             scenes/own_mesh.toml)",
+/// The scene with the changes of the command line, and its name.
+fn adjusted_scene(args: &Args) -> anyhow::Result<(Scene, String)> {
+    if let Some(path) = args.scene.as_ref().filter(|path| is_surface(path)) {
+        bail!(
+            "\"{}\" is a surface, not a scene; look at it with `palpa check`, or name it as `surface` in a scene \
+             (`palpa scenes --write own_mesh` writes a start for one)",
             path.display()
-        ),
-        Some(path) => Scene::load(path)?,
-        None => Scene::embedded(),
+        );
+    }
+    // Bars have no contact: the tool of their scene is bonded to the skin.
+    let default = match args.model {
+        Some(Model::Reference) => PRESSED_BONDED,
+        Some(Model::Tissue) | None => PRESSED,
     };
+    let NamedScene {
+        mut scene, name, ..
+    } = named_scene::load_or(args.scene.as_deref(), default)?;
     if let Some(model) = args.model {
         scene.model.kind = match model {
             Model::Tissue => ModelKind::Tissue,
             Model::Reference => ModelKind::Reference,
         };
-    }
-    if args.scene.is_none() && args.vertex.is_none() && scene.model.kind == ModelKind::Tissue {
-        coarsen(&mut scene);
     }
     let press = &mut scene.press;
     if let Some(text) = &args.at {
@@ -163,7 +162,7 @@ fn adjusted_scene(args: &Args) -> anyhow::Result<Scene> {
     if let Err(problem) = press.check() {
         bail!("{problem}; see --depth, --step, --speed and --hold");
     }
-    Ok(scene)
+    Ok((scene, name))
 }
 
 /// Sets accuracy and time limit from the command line.
@@ -194,15 +193,6 @@ fn set_accuracy(scene: &mut Scene, args: &Args) -> anyhow::Result<()> {
         );
     }
     Ok(())
-}
-
-/// Lets the embedded forearm grow from a coarser skin than in its scene. Bars need fine triangles
-/// everywhere, but the continuum is refined where it is pressed. Its force changes by less than one
-/// per cent, and the press takes a third of the time.
-fn coarsen(scene: &mut Scene) {
-    if let Skin::Generated(Generator::Forearm { spacing, .. }) = &mut scene.body.skin {
-        *spacing = COARSE_SPACING;
-    }
 }
 
 fn is_surface(path: &Path) -> bool {

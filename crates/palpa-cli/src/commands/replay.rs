@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
+use crate::named_scene;
 use palpa::live::{FileState, LiveScene, Ruler, SpringScene, changed_files, machine, scene_of};
 use palpa::one_paragraph;
 
@@ -25,7 +26,8 @@ use palpa::one_paragraph;
 pub struct Args {
     /// The log (MCAP), as `palpa loop-report` writes it
     log: PathBuf,
-    /// Build the body from this scene instead of the one in the log
+    /// Build the body from this scene instead of the one in the log: a file, or the name of a
+    /// built-in scene
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Write the log as tables to the output folder; do not run it again
@@ -111,7 +113,7 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
     let log = Log::open(&args.log)?;
     note_ending(&log.ending, context);
     let scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
+        Some(argument) => named_scene::load(argument)?.scene,
         None => scene_of(&log.header)?,
     };
     let changed = match args.scene {

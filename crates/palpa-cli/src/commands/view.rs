@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use palpa_scene::Scene;
+use palpa_scene::built_in::VIEWED;
 use palpa_viewer::{Host as _, Server, ServerParams};
 use serde::Serialize;
 
 use super::Outcome;
 use crate::cli::Context;
-use palpa_session::{Session, SessionParams, gallery};
+use crate::named_scene;
+use palpa_session::{Session, SessionParams};
 
 /// Touch a body in a browser: see it deform and read the force
 ///
@@ -19,8 +21,7 @@ use palpa_session::{Session, SessionParams, gallery};
 /// offers more scenes. Recordings go to the output folder.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML), or the name of a scene of the gallery: forearm, `forearm_lump`, limb,
-    /// block, `patch_bars`, `patch_tissue`
+    /// Scene file (TOML), or the name of a built-in scene; see `palpa scenes` [default: forearm]
     scene: Option<PathBuf>,
     /// Do not open a browser
     #[arg(long)]
@@ -145,18 +146,12 @@ fn outward(bind: IpAddr) -> Option<IpAddr> {
     (!ip.is_loopback()).then_some(ip)
 }
 
+/// The scene, and its key if it is of the gallery.
 fn scene_of(args: &Args) -> anyhow::Result<(Scene, Option<String>)> {
-    let Some(path) = &args.scene else {
-        return Ok((
-            gallery::scene(gallery::FIRST)?,
-            Some(gallery::FIRST.to_owned()),
-        ));
-    };
-    let key = path.to_string_lossy();
-    let is_key = !path.exists() && gallery::entries().iter().any(|entry| entry.key == key);
-    let is_word = path.extension().is_none() && path.components().count() == 1;
-    if is_key || !path.exists() && is_word {
-        return Ok((gallery::scene(&key)?, Some(key.into_owned())));
-    }
-    Ok((Scene::load(path)?, None))
+    let named = named_scene::load_or(args.scene.as_deref(), VIEWED)?;
+    let of_gallery = named.built_in.filter(|built_in| built_in.is_in_gallery);
+    Ok((
+        named.scene,
+        of_gallery.map(|built_in| built_in.key.to_owned()),
+    ))
 }

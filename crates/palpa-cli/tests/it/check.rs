@@ -164,3 +164,51 @@ fn a_scene_whose_parts_do_not_fit_is_not_good() {
         "{stdout}"
     );
 }
+
+#[test]
+fn layers_that_are_thinned_over_most_of_the_skin_are_noted() {
+    use palpa_mesh::generate::cylinder;
+    use palpa_mesh::write_surface;
+    let scene = "[body]\nsurface = \"skin.ply\"\nbones = [\"bone.ply\"]\n[[layer]]\ntissue = \"skin\"\nthickness = \"1.5 mm\"\n\
+                 [[layer]]\ntissue = \"fat\"\nthickness = \"4 mm\"\n[[layer]]\ntissue = \"muscle\"\n\
+                 [press]\ndepth = \"0.5 mm\"\nstep = \"0.5 mm\"\n";
+    let check = Check::new(&[("limb.toml", scene)]);
+    // A bone off the axis: on the other side of the limb there is room.
+    let with_bone = |radius: f64| {
+        let (skin, mut bone) = cylinder(0.1, 0.02, radius, 4e-3);
+        bone.points.iter_mut().for_each(|p| p.y += 0.003);
+        write_surface(&check.0.path("skin.ply"), &skin).unwrap();
+        write_surface(&check.0.path("bone.ply"), &bone).unwrap();
+    };
+    let is_noted = |text: &str| {
+        text.contains("layers are thinner than asked under")
+            && text.contains("give the layers less thickness")
+    };
+    with_bone(14.5e-3);
+    let (code, stdout, stderr) = check.run(&["limb.toml"]);
+    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
+    assert!(stdout.contains("note: ") && is_noted(&stdout), "{stdout}");
+    let (_, stdout, _) = check.run(&["limb.toml", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    assert!(is_noted(&report[0]["notes"].to_string()), "{report}");
+    let body = &report[0]["body"];
+    assert!(body["thinned_share"].as_f64().unwrap() > 0.5, "{body}");
+    let median = body["median_thinning"].as_f64().unwrap();
+    assert!((0.4..0.8).contains(&median), "{median}");
+    // A press says it too.
+    let args = [
+        "press",
+        "limb.toml",
+        "--json",
+        "--frames",
+        "0",
+        "--no-error-bar",
+    ];
+    let report = check.0.report(&args);
+    assert!(is_noted(&report["notes"].to_string()), "{report}");
+    // Thin on one side only: a figure, but no note.
+    with_bone(12e-3);
+    let (_, stdout, _) = check.run(&["limb.toml"]);
+    assert!(stdout.contains("layers thinned under"), "{stdout}");
+    assert!(!is_noted(&stdout), "{stdout}");
+}

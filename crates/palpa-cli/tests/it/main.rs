@@ -11,6 +11,7 @@ mod live;
 mod mesh_moves;
 mod press;
 mod press_tissue;
+mod scenes;
 mod verify;
 mod view;
 

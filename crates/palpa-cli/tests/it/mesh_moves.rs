@@ -7,7 +7,7 @@ use palpa::live::{LiveScene, RehearsalParams, RehearsalTick, rehearse};
 use palpa_device::{DeviceModel, Path as Way, Scripted, Vec3};
 use palpa_scene::Scene;
 
-const FOREARM: &str = include_str!("../../scenes/forearm_lump.toml");
+const FOREARM: &str = include_str!("../../../palpa-scene/scenes/forearm_loop.toml");
 /// The way: from above the skin down, along the limb over the lump, then still. m, m/s
 const ABOVE: f64 = 5e-3;
 const DEPTH: f64 = 4e-3;

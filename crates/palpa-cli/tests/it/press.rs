@@ -1,9 +1,9 @@
 //! `palpa press` with the reference method as a person runs it: results, refusals, Ctrl-C.
 
 use std::fs;
-use std::path::Path;
 use std::process::Stdio;
 
+use palpa_scene::BuiltIn;
 use palpa_testkit::{Bench, Layer, Scene, Value as Toml, without_system_errors};
 use serde_json::Value;
 
@@ -308,34 +308,26 @@ fn bad_input_is_refused_in_one_paragraph() {
 }
 
 #[test]
-fn the_shipped_scenes_can_be_read_and_those_without_files_pressed() {
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let (mut n_read, mut n_refused, mut n_pressed) = (0, 0, 0);
-    for entry in fs::read_dir(scenes).unwrap() {
-        let path = entry.unwrap().path();
-        let scene = palpa_scene::Scene::load(&path).unwrap();
-        n_read += 1;
-        if matches!(scene.body.skin, palpa_scene::Skin::Generated(_)) {
-            let built = palpa::build::build(&scene).unwrap();
-            let indentation = palpa::press::reference::BarIndentation::build(&scene, &built);
-            if !scene.tool.is_bonded() || !scene.lumps.is_empty() {
-                // Bars neither touch nor hold a lump.
-                let refusal = indentation.unwrap_err().to_string();
-                assert!(refusal.contains("the reference method"), "{refusal}");
-                n_refused += 1;
-                continue;
-            }
-            let indentation = indentation.unwrap();
-            let mut run = indentation.start(&built.growth.body);
-            let force = (0..2).filter_map(|_| run.advance()).last().unwrap().force_n;
-            assert!(force > 0.0, "{}: {force}", path.display());
-            n_pressed += 1;
+fn bars_press_the_built_in_scenes_whose_tool_is_bonded() {
+    let (mut n_refused, mut n_pressed) = (0, 0);
+    for built_in in BuiltIn::all().iter().filter(|b| !b.is_template) {
+        let scene = built_in.scene().unwrap();
+        let built = palpa::build::build(&scene).unwrap();
+        let indentation = palpa::press::reference::BarIndentation::build(&scene, &built);
+        if !scene.tool.is_bonded() || !scene.lumps.is_empty() {
+            // Bars neither touch nor hold a lump.
+            let refusal = indentation.unwrap_err().to_string();
+            assert!(refusal.contains("the reference method"), "{refusal}");
+            n_refused += 1;
+            continue;
         }
+        let indentation = indentation.unwrap();
+        let mut run = indentation.start(&built.growth.body);
+        let force = (0..2).filter_map(|_| run.advance()).last().unwrap().force_n;
+        assert!(force > 0.0, "{}: {force}", built_in.key);
+        n_pressed += 1;
     }
-    assert!(
-        n_read >= 5 && n_refused >= 1 && n_pressed >= 1,
-        "{n_read}, {n_refused}, {n_pressed}"
-    );
+    assert_eq!((n_refused, n_pressed), (9, 2));
 }
 
 #[test]

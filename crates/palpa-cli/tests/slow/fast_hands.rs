@@ -18,7 +18,9 @@ const MOST_LET_GO: f64 = 0.02;
 
 /// A case of the bench, by its name.
 fn shipped(name: &str) -> ShippedCase {
-    let lump_forearm = resolved(&include_str!("../../scenes/forearm_lump.toml"));
+    let lump_forearm = resolved(&include_str!(
+        "../../../palpa-scene/scenes/forearm_loop.toml"
+    ));
     let cases = shipped_cases(&lump_forearm, None).unwrap();
     cases.into_iter().find(|case| case.name == name).unwrap()
 }

@@ -108,6 +108,9 @@ pub struct GrowthReport {
     pub thinned_share: f64,
     /// The strongest thinning of that kind (smallest factor of the thickness), if any.
     pub worst_thinning: Option<Worst>,
+    /// The usual thinning of that kind: under half of the area with thinned layers, the layer that
+    /// was thinned most keeps at most this factor of its thickness. `None` if there is none.
+    pub median_thinning: Option<f64>,
     /// Share of the skin's area below which a layer is more than 1 % thicker or thinner than asked
     /// although there is room for it. There, the interface between two layers gave way to keep
     /// prisms valid.
@@ -204,6 +207,12 @@ pub(super) fn finish(
             .filter(|&v| !has_room[v])
             .min_by(|&a, &b| thinning[a].total_cmp(&thinning[b]))
             .map(|v| worst_at(v, thinning[v])),
+        median_thinning: median_by_area(
+            (0..body.n_vertices())
+                .filter(|&v| !has_room[v])
+                .map(|v| (thinning[v], vertex_areas[v]))
+                .collect(),
+        ),
         moved_share: share(&|v| moved[v].is_some()),
         worst_moved: worst_moved.cloned(),
         shortened_share: share(&|v| used[v].share < 1.0 - 1e-9),
@@ -218,6 +227,18 @@ pub(super) fn finish(
         stand_off,
         coarsened: None,
     }
+}
+
+/// The value that values on half of the area do not exceed, from `(value, area)`.
+fn median_by_area(mut values: Vec<(f64, f64)>) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * values.iter().map(|(_, area)| area).sum::<f64>();
+    let mut sum = 0.0;
+    let middle = values.iter().find(|(_, area)| {
+        sum += area;
+        sum >= half
+    });
+    middle.map(|(value, _)| *value)
 }
 
 /// Distance of the lower side of each layer from the skin. m, `[n_vertices × n_layers]`

@@ -193,6 +193,8 @@ fn without_room_all_layers_thin_in_proportion_and_none_is_dropped() {
         worst.at[1] > 0.035,
         "the worst place lies over the bone: {worst:?}"
     );
+    let median = report.median_thinning.unwrap();
+    assert!(median > worst.value && median < 1.0, "{median}");
     let body = &growth.body;
     let at = |l: usize| body.positions[body.node(worst.vertex as usize, l)];
     let (skin, fat, muscle) = (
@@ -208,6 +210,32 @@ fn without_room_all_layers_thin_in_proportion_and_none_is_dropped() {
         muscle > 2e-4 && (skin + fat + muscle - 3e-3).abs() < 3e-4,
         "{skin} {fat} {muscle}"
     );
+}
+
+#[test]
+fn the_usual_thinning_is_that_of_half_of_the_thinned_skin() {
+    // A bone of 14.5 mm, 3 mm off the axis of a limb of 20 mm. At the angle θ from that side the room
+    // is |20 mm e^{iθ} − 3 mm| − 14.5 mm, and 6.6 mm are asked for: 5.5 mm, and a fifth of it of muscle.
+    let (skin, mut bone) = cylinder(0.16, 0.02, 0.0145, 3e-3);
+    bone.points.iter_mut().for_each(|p| p.y += 0.003);
+    let growth = grow(&skin, &[bone], &params(limb_layers())).unwrap();
+    let report = &growth.report;
+    let room = |angle: f64| (20.0_f64.powi(2) + 9.0 - 120.0 * angle.cos()).sqrt() - 14.5;
+    let border = ((20.0_f64.powi(2) + 9.0 - 21.1_f64.powi(2)) / 120.0).acos();
+    let share = border / std::f64::consts::PI;
+    assert!(
+        (report.thinned_share - share).abs() < 0.06,
+        "{} for {share}",
+        report.thinned_share
+    );
+    let (median, expected) = (report.median_thinning.unwrap(), room(0.5 * border) / 6.6);
+    assert!(
+        (median / expected - 1.0).abs() < 0.08,
+        "{median} for {expected}"
+    );
+    let (plenty, bone) = cylinder(0.16, 0.04, 0.012, 4e-3);
+    let growth = grow(&plenty, &[bone], &params(limb_layers())).unwrap();
+    assert_eq!(growth.report.median_thinning, None);
 }
 
 #[test]

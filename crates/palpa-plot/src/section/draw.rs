@@ -3,6 +3,7 @@
 
 use palpa_mesh::Vec3;
 
+use super::shades::Shades;
 use super::{Plane, Point2, Section};
 use crate::canvas::{Anchor, Canvas, Font, INK, MUTED, Stroke, WHITE};
 use crate::{Color, Picture};
@@ -21,17 +22,7 @@ const BONE: Color = Color::rgb(0xd8, 0xd4, 0xc8);
 /// Colour of the rigid core where it is not bone.
 const CORE: Color = Color::rgb(0xf3, 0xf2, 0xee);
 const LUMP: Color = Color::rgb(0x3d, 0x6e, 0x8a);
-/// Colours from the least value to the largest: light to dark, in equal steps of lightness.
-const SHADES: [Color; 6] = [
-    Color::rgb(0xfc, 0xf7, 0xea),
-    Color::rgb(0xf8, 0xd5, 0x9c),
-    Color::rgb(0xf0, 0x9c, 0x5c),
-    Color::rgb(0xd1, 0x57, 0x4f),
-    Color::rgb(0x8c, 0x2a, 0x5c),
-    Color::rgb(0x3b, 0x12, 0x48),
-];
 const TOOL: Color = Color::rgb(0x33, 0x3f, 0x4d);
-
 const WIDTH: f64 = 960.0;
 const MARGIN: f64 = 24.0;
 const LEGEND: f64 = 150.0;
@@ -51,34 +42,11 @@ pub struct Panel<'a> {
     pub bones: &'a [Vec<Point2>],
     /// The cut lumps, in the same form.
     pub lumps: &'a [Vec<Point2>],
-    /// Values that shade the cells. If `None`, cells have the colours of their layers.
+    /// Values that shade the cells. If `None`, cells have the colours of their layers, and the edges
+    /// of the elements are drawn.
     pub shades: Option<Shades<'a>>,
     /// The outline of the tool, if there is one.
     pub tool: Option<ToolOutline>,
-}
-
-/// Values that shade the cells.
-#[derive(Debug, Clone, Copy)]
-pub struct Shades<'a> {
-    /// Name of the values, with their unit: "von Mises stress, kPa".
-    pub name: &'a str,
-    /// One value for each prism of the body.
-    pub values: &'a [f64],
-    /// The value that gets the darkest shade.
-    pub most: f64,
-}
-
-impl Shades<'_> {
-    fn color(&self, prism: usize) -> Color {
-        shade_of((self.values[prism] / self.most).clamp(0.0, 1.0))
-    }
-}
-
-/// The shade of a value, given as a share from 0 (least) to 1 (most).
-fn shade_of(share: f64) -> Color {
-    let at = share * (SHADES.len() - 1) as f64;
-    let first = (at as usize).min(SHADES.len() - 2);
-    SHADES[first].mixed(SHADES[first + 1], at - first as f64)
 }
 
 /// The outline of a tool in the plane.
@@ -205,15 +173,17 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
     for bone in &bones {
         canvas.polygon(&[bone], BONE, Some(Stroke::new(MUTED, 1.0)));
     }
-    for ((layer, cell), &prism) in panel.section.cells.iter().zip(&panel.section.prisms) {
-        let color = match &panel.shades {
-            Some(shades) => shades.color(prism),
-            None => LAYERS[layer % LAYERS.len()],
-        };
-        // The edge has a darker shade of the layer: it shows the elements and hides the seams
-        // between them.
-        let edge = Stroke::new(shade(color), 0.45);
-        canvas.polygon(&[&seen(cell)], color, Some(edge));
+    match &panel.shades {
+        Some(shades) => shades.fill(canvas, panel.section, view),
+        None => {
+            for cell in &panel.section.cells {
+                let color = LAYERS[cell.layer % LAYERS.len()];
+                // The edge has a darker shade of the layer: it shows the elements and hides the
+                // seams between them.
+                let edge = Stroke::new(shade(color), 0.45);
+                canvas.polygon(&[&seen(&cell.outline)], color, Some(edge));
+            }
+        }
     }
     for lump in panel.lumps.iter().map(|lump| seen(lump)) {
         if panel.shades.is_none() {
@@ -235,9 +205,18 @@ fn draw_panel(canvas: &mut Canvas, panel: &Panel<'_>, view: &dyn Fn(Point2) -> P
         Some(ToolOutline::Node(at)) => canvas.circle(view(*at), 5.0, TOOL, Stroke::new(WHITE, 1.5)),
         None => {}
     }
+    if let Some(shades) = &panel.shades {
+        shades.draw_on_skin(canvas, panel.section, view);
+    }
 }
 
 fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
+    let shades = panels
+        .iter()
+        .find_map(|panel| Some((panel.shades?, panel.section)));
+    if let Some((shades, section)) = shades {
+        y = shades.draw_scale(canvas, section, [x, y]);
+    }
     let swatch = |y: f64| {
         [
             [x, y - 7.0],
@@ -252,17 +231,7 @@ fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
         canvas.text([x + 22.0, y], text, name);
         y += 22.0;
     };
-    let shades = panels.iter().find_map(|panel| panel.shades);
-    if let Some(shades) = shades {
-        for i in (0..=5).rev() {
-            let share = f64::from(i) / 5.0;
-            let least = if i == 5 { "≥ " } else { "" };
-            entry(
-                shade_of(share),
-                &format!("{least}{}", rounded(share * shades.most)),
-            );
-        }
-    } else {
+    if shades.is_none() {
         let layers = panels.first().map_or(&[][..], |p| &p.section.layer_names);
         for (layer, name) in layers.iter().enumerate() {
             entry(LAYERS[layer % LAYERS.len()], name);
@@ -281,22 +250,6 @@ fn draw_legend(canvas: &mut Canvas, panels: &[Panel<'_>], [x, mut y]: Point2) {
     if panels.iter().any(|panel| panel.tool.is_some()) {
         entry(TOOL, "tool");
     }
-    if let Some(shades) = shades {
-        canvas.text(
-            [x, y + 4.0],
-            shades.name,
-            Font::new(11.5, MUTED, Anchor::Start),
-        );
-    }
-}
-
-/// A value with three significant digits.
-fn rounded(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.digits$}")
 }
 
 /// A scale bar of a round length, about a quarter of the section's width.
@@ -330,7 +283,7 @@ fn shade(color: Color) -> Color {
 /// Two opposite corners of the bounding box of all panels.
 fn bounds(panels: &[Panel<'_>]) -> (Point2, Point2) {
     let points = panels.iter().flat_map(|panel| {
-        let cells = panel.section.cells.iter().flat_map(|(_, cell)| cell);
+        let cells = panel.section.cells.iter().flat_map(|cell| &cell.outline);
         let bones = panel.bones.iter().flatten();
         let tool = panel.tool.iter().flat_map(ToolOutline::points);
         cells.chain(bones).chain(tool).copied().collect::<Vec<_>>()

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use palpa_mesh::{LayeredBody, Surface, Vec3};
 use palpa_plot::section::{
-    Panel, Plane, Section, ToolOutline, cut_body, cut_surface, draw, polygon_area,
+    Panel, Plane, Scale, Section, Shades, SkinShades, ToolOutline, cut_body, cut_surface, draw,
+    polygon_area, tissue_means,
 };
 use resvg::tiny_skia::Pixmap;
 
@@ -73,8 +74,8 @@ fn area(section: &Section, layer: Option<usize>) -> f64 {
     section
         .cells
         .iter()
-        .filter(|(l, _)| layer.is_none_or(|layer| *l == layer))
-        .map(|(_, cell)| polygon_area(cell))
+        .filter(|cell| layer.is_none_or(|layer| cell.layer == layer))
+        .map(|cell| polygon_area(&cell.outline))
         .sum()
 }
 
@@ -177,9 +178,9 @@ fn twisted_prisms_tile_their_outline() {
         let mut sides: Vec<[[i64; 2]; 2]> = Vec::new();
         let key = |p: [f64; 2]| p.map(|c| (c * 1e9).round() as i64);
         let mut outline = 0.0;
-        for (_, cell) in &section.cells {
-            for (i, &p) in cell.iter().enumerate() {
-                let q = cell[(i + 1) % cell.len()];
+        for cell in &section.cells {
+            for (i, &p) in cell.outline.iter().enumerate() {
+                let q = cell.outline[(i + 1) % cell.outline.len()];
                 outline += 0.5 * (p[0] * q[1] - p[1] * q[0]);
                 sides.push([key(p), key(q)]);
             }
@@ -205,7 +206,7 @@ fn twisted_prisms_tile_their_outline() {
 fn a_plane_beside_the_body_cuts_nothing() {
     let block = block();
     let plane = Plane::new(Vec3::new(0.2, 0.0, 0.0), Vec3::x(), Vec3::z()).unwrap();
-    assert_eq!(cut_body(&block, &block.positions, &plane).cells, []);
+    assert_eq!(cut_body(&block, &block.positions, &plane).cells, vec![]);
     assert_eq!(
         cut_surface(&block.skin, &plane),
         Vec::<Vec<[f64; 2]>>::new()
@@ -271,4 +272,102 @@ fn the_picture_shows_rest_and_pressed_side_by_side() {
         "{colored} of {}",
         pixels.pixels().len()
     );
+}
+
+#[test]
+fn means_are_those_of_one_tissue_and_jump_between_two() {
+    let block = block();
+    let n_intervals = block.n_levels - 1;
+    let layer = |p: usize| block.interval_layer[p % n_intervals];
+    let tissue: Vec<usize> = (0..block.n_prisms()).map(layer).collect();
+    // Even in each layer: the means are the values, and the layers differ at the same node.
+    let even: Vec<f64> = tissue.iter().map(|&l| [10.0, 1.0, 5.0][l]).collect();
+    let means = tissue_means(&block, &tissue, &even);
+    let plane = Plane::new(Vec3::new(0.033, 0.05, 0.0), Vec3::x(), Vec3::z()).unwrap();
+    let section = cut_body(&block, &block.positions, &plane);
+    for cell in &section.cells {
+        for place in &cell.places {
+            let found = means.at(cell.prism, place);
+            assert!((found - even[cell.prism]).abs() < 1e-12, "{found}");
+        }
+    }
+    // Linear across the block: at inner nodes the means are exact, and they are smooth inside a layer
+    // where the values of prisms are not.
+    let middle = |p: usize| -> f64 {
+        let nodes = block.prism(p / n_intervals, p % n_intervals);
+        nodes.iter().map(|&n| block.positions[n].y).sum::<f64>() / 6.0
+    };
+    let steps: Vec<f64> = (0..block.n_prisms()).map(middle).collect();
+    let means = tissue_means(&block, &tissue, &steps);
+    let mut n_inner = 0;
+    for cell in &section.cells {
+        for (place, [right, _]) in cell.places.iter().zip(&cell.outline) {
+            let y = place.value(|node| block.positions[node].y);
+            if (0.0101..0.0899).contains(&y) {
+                let found = means.at(cell.prism, place);
+                assert!((found - y).abs() < 1e-9, "{found} for {y} at {right}");
+                n_inner += 1;
+            }
+        }
+    }
+    assert!(n_inner > 100, "{n_inner}");
+}
+
+#[test]
+fn shaded_cells_cover_the_section_and_the_skin_has_its_band() {
+    let block = block();
+    let field: Vec<f64> = (0..block.n_prisms())
+        .map(|p| 1.0 + (p % 7) as f64)
+        .collect();
+    let means = tissue_means(&block, &vec![0; block.n_prisms()], &field);
+    let plane = Plane::new(Vec3::new(0.033, 0.05, 0.0), Vec3::x(), Vec3::z()).unwrap();
+    let section = cut_body(&block, &block.positions, &plane);
+    let pressure: Vec<f64> = (block.skin.points.iter())
+        .map(|p| 12.0 * (1.0 - (p.y - 0.05).abs() / 0.02).max(0.0))
+        .collect();
+    let picture = |on_skin| {
+        draw(
+            "Stress",
+            "in a block",
+            &[Panel {
+                title: "pressed",
+                section: &section,
+                bones: &[],
+                lumps: &[],
+                shades: Some(Shades {
+                    name: "stress, kPa",
+                    values: &means,
+                    scale: Scale::Linear(15.0),
+                    on_skin,
+                }),
+                tool: None,
+            }],
+        )
+    };
+    let with = picture(Some(SkinShades {
+        name: "contact pressure",
+        values: &pressure,
+        largest: 12.3,
+    }));
+    for text in [
+        ">15.0<",
+        ">3.00<",
+        "contact pressure (band):",
+        "largest 12.3",
+    ] {
+        assert!(with.svg().contains(text), "{text}");
+    }
+    let without = picture(None);
+    assert!(!without.svg().contains("largest"));
+    assert!(with.svg().matches("stroke-width=\"5\"").count() >= 20);
+    assert_eq!(without.svg().matches("stroke-width=\"5\"").count(), 0);
+    // No white between the cells: every pixel of a row inside the block is coloured.
+    let pixels = Pixmap::decode_png(&without.png().unwrap()).unwrap();
+    let (width, height) = (pixels.width(), pixels.height());
+    let row: Vec<bool> = (0..width)
+        .map(|x| pixels.pixel(x, height / 2).unwrap().blue() < 250)
+        .collect();
+    let first = row.iter().position(|&is_colored| is_colored).unwrap();
+    let n = row[first..].iter().take_while(|&&c| c).count();
+    assert!(n > 1000, "{n} of {width}");
 }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use palpa_scene::built_in::PRESSED_BONDED;
 use palpa_scene::{
-    ContactShape, ContactTool, Damping, Dynamics, Elastic, Energy, Lump, LumpPlace, LumpShape,
-    Mesh, ModelKind, Moduli, Scene, Status, Target, Tissue, Tool, Volume,
+    BuiltIn, ContactShape, ContactTool, Damping, Dynamics, Elastic, Energy, Lump, LumpPlace,
+    LumpShape, Mesh, ModelKind, Moduli, Scene, Status, Target, Tissue, Tool, Volume,
 };
 use proptest::prelude::*;
 
@@ -289,7 +290,7 @@ fn the_mesh_follows_what_is_smallest() {
 
 #[test]
 fn a_scene_of_old_has_the_defaults_of_the_continuum() {
-    let scene = Scene::embedded();
+    let scene = BuiltIn::find(PRESSED_BONDED).unwrap().scene().unwrap();
     assert_eq!(scene.model.kind, ModelKind::Tissue);
     assert_eq!(scene.model.dynamics, Dynamics::QuasiStatic);
     assert_eq!((scene.model.alpha(), scene.model.tolerance), (0.8, 1e-5));

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use palpa_scene::{Scene, SceneError};
+use palpa_scene::built_in::PRESSED;
+use palpa_scene::{BuiltIn, Scene, SceneError};
 use proptest::prelude::*;
 
 fn parse(text: &str) -> Result<Scene, SceneError> {
@@ -85,7 +86,7 @@ fn damaged_scenes() -> impl Strategy<Value = String> {
         include_str!("scenes/limb.toml"),
         include_str!("scenes/thesis.toml"),
         include_str!("scenes/everything.toml"),
-        Scene::embedded_toml(),
+        BuiltIn::find(PRESSED).unwrap().toml,
     ]);
     (texts, any::<prop::sample::Index>(), 0usize..12, ".{0,8}").prop_map(|(text, at, n, new)| {
         let mut chars: Vec<char> = text.chars().collect();

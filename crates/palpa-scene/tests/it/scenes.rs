@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use palpa_scene::built_in::{LOOPED, PRESSED, PRESSED_BONDED, VIEWED};
 use palpa_scene::{
-    Body, CutFaces, Cutout, Generator, InPlane, LengthUnit, Press, Scene, Skin, Solver, Status,
-    Target, Thickness, Tool,
+    Body, BuiltIn, CutFaces, Cutout, Generator, InPlane, LengthUnit, Press, Scene, Skin, Solver,
+    Status, Target, Thickness, Tool,
 };
 
 const MINIMAL: &str = include_str!("scenes/minimal.toml");
@@ -136,7 +137,7 @@ fn the_units_of_the_thesis_are_understood() {
 
 #[test]
 fn a_scene_survives_being_written_and_read() {
-    for text in [MINIMAL, LIMB, THESIS, Scene::embedded_toml()] {
+    for text in [MINIMAL, LIMB, THESIS, BuiltIn::find(PRESSED).unwrap().toml] {
         let scene = parse(text);
         let written = scene.to_toml();
         let again = Scene::parse(&written, Path::new("bodies"))
@@ -146,40 +147,72 @@ fn a_scene_survives_being_written_and_read() {
     }
 }
 
-/// The scenes that come with the program.
 #[test]
-fn the_example_scenes_are_valid() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
-        let again = Scene::parse(&scene.to_toml(), &scene.base_dir);
-        assert_eq!(again.unwrap(), scene, "{}", path.display());
-        names.push(path.file_stem().unwrap().to_owned());
-        if path.ends_with("forearm_with_lump.toml") {
-            // The lump alone makes the difference to the embedded forearm.
-            let without = Scene {
-                lumps: vec![],
-                base_dir: "".into(),
-                ..scene.clone()
-            };
-            assert_eq!(without, Scene::embedded());
-        }
-        if path.ends_with("forearm_five_tissues.toml") {
-            assert_eq!(scene.layers.len(), 5);
-            assert_eq!(scene.layers[0].thickness, Some(Thickness::Uniform(1e-4)));
-        }
+fn the_built_in_scenes_are_valid_and_each_has_its_own_name() {
+    let mut keys = std::collections::BTreeSet::new();
+    for built_in in BuiltIn::all() {
+        let key = built_in.key;
+        assert!(keys.insert(key), "{key} twice");
+        let scene = built_in.scene().unwrap_or_else(|e| panic!("{key}: {e}"));
+        let again = Scene::parse(&scene.to_toml(), Path::new(""));
+        assert_eq!(again.unwrap(), scene, "{key}");
+        assert!(
+            !built_in.name.is_empty() && !built_in.about.is_empty(),
+            "{key}"
+        );
+        // A template names files; the others need none.
+        let has_files = matches!(scene.body.skin, Skin::File(_));
+        assert_eq!(has_files, built_in.is_template, "{key}");
+        assert_eq!(BuiltIn::find(key), Some(built_in));
     }
-    for name in [
-        "block",
-        "forearm_five_tissues",
-        "forearm_with_lump",
-        "limb",
-        "own_mesh",
-    ] {
-        assert!(names.iter().any(|n| n == name), "{name} in {names:?}");
+    assert_eq!(keys.len(), 12);
+    let files = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")).unwrap();
+    assert_eq!(files.count(), keys.len(), "a file in scenes/ is not listed");
+    assert_eq!(BuiltIn::find("Forearm-Lump"), BuiltIn::find("forearm_lump"));
+    assert_eq!(BuiltIn::find("limbb"), None);
+    for used in [VIEWED, PRESSED, PRESSED_BONDED, LOOPED] {
+        assert!(keys.contains(used), "{used}");
     }
+}
+
+fn built_in(key: &str) -> Scene {
+    BuiltIn::find(key).unwrap().scene().unwrap()
+}
+
+#[test]
+fn the_forearms_that_are_pressed_differ_as_they_say() {
+    let forearm = Scene::embedded();
+    assert_eq!(forearm, built_in(PRESSED));
+    // The lump alone makes the difference.
+    let with_lump = built_in("forearm_press_lump");
+    assert_eq!(with_lump.lumps.len(), 1);
+    let without = Scene {
+        lumps: vec![],
+        ..with_lump
+    };
+    assert_eq!(without, forearm);
+    // Skin and tool make the difference.
+    let disc = built_in(PRESSED_BONDED);
+    assert!(disc.tool.is_bonded() && !forearm.tool.is_bonded());
+    let under_a_ball = Scene {
+        tool: forearm.tool,
+        body: forearm.body.clone(),
+        ..disc
+    };
+    assert_eq!(under_a_ball, forearm);
+    // Of the forearms to be touched, the lump and the motion make the difference.
+    let touched_lump = built_in("forearm_lump");
+    assert_eq!(touched_lump.lumps.len(), 1);
+    let touched = built_in("forearm");
+    let without = Scene {
+        lumps: vec![],
+        motion: touched.motion.clone(),
+        ..touched_lump
+    };
+    assert_eq!(without, touched);
+    let five = built_in("forearm_five_tissues");
+    assert_eq!(five.layers.len(), 5);
+    assert_eq!(five.layers[0].thickness, Some(Thickness::Uniform(1e-4)));
 }
 
 #[test]

@@ -3,17 +3,17 @@
 mod shipped;
 mod uniform;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use palpa_plot::output::OutDir;
-use palpa_scene::Scene;
+use palpa_scene::built_in::LOOPED;
 use palpa_scene::units::Share;
 use serde::Serialize;
 
 use super::Outcome;
-use super::loop_report::EMBEDDED;
 use crate::cli::Context;
+use crate::named_scene;
 use palpa_lab::bench::cases::{BenchCase, BenchShape, Tissue, cases};
 use palpa_lab::bench::shipped::{MeasureParams, ShippedCase, shipped_cases};
 use palpa_lab::bench::{BenchReport, BenchRow, growth, picture};
@@ -168,7 +168,7 @@ fn write_rows(rows: &[impl Serialize], name: &str, out: &OutDir) -> anyhow::Resu
 }
 
 fn chosen(args: &Args) -> anyhow::Result<Chosen> {
-    let lump_forearm = Scene::parse(EMBEDDED, Path::new("")).context("the embedded scene")?;
+    let lump_forearm = named_scene::load_or(None, LOOPED)?.scene;
     let mut shipped = shipped_cases(&lump_forearm, args.data.as_deref())?;
     if let Some(accuracy) = args.accuracy {
         for case in &mut shipped {

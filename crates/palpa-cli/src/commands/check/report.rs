@@ -38,6 +38,9 @@ pub(super) fn say(result: &FileResult, context: &Context) -> anyhow::Result<()> 
             100.0 * body.thinned_share
         ))?;
     }
+    for note in &result.notes {
+        context.say(format_args!("  note: {note}"))?;
+    }
     if let Some(refusal) = &result.refusal {
         context.say(format_args!("  grows into no body: {refusal}"))?;
     }

@@ -11,8 +11,8 @@ mod verdicts;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use palpa_rt::{Engine, EngineParams, Log, RecorderParams, Report};
+use palpa_scene::built_in::LOOPED;
 use palpa_scene::{Dynamics, ModelKind, Scene};
 
 use self::audit::Audit;
@@ -21,11 +21,10 @@ use self::figures::{Figures, Setup};
 use self::hand::still_spans;
 use super::Outcome;
 use crate::cli::Context;
+use crate::named_scene::{self, NamedScene};
 use palpa::live::{LiveScene, Watch, across, machine, notes_of, open_device, path, servo_params};
 use palpa_plot::output::OutDir;
 
-/// The scene that is used if none is given.
-pub(super) const EMBEDDED: &str = include_str!("../../../scenes/forearm_lump.toml");
 /// Shortest duration of a run, s. Shorter runs do not show rare ticks, and the RMS of the force
 /// needs two seconds.
 const LEAST_SECONDS: f64 = 5.0;
@@ -40,7 +39,8 @@ const MOST_SECONDS: f64 = 3600.0;
 /// (loop.json), histograms of the times of ticks, and force against time and depth (SVG and PNG).
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scene file (TOML); a forearm with a lump if none is given
+    /// Scene file (TOML), or the name of a built-in scene; see `palpa scenes` [default:
+    /// `forearm_loop`]
     scene: Option<PathBuf>,
     /// Duration in seconds, 5 to 3600
     #[arg(
@@ -87,14 +87,13 @@ pub fn run(args: &Args, context: &Context) -> anyhow::Result<Outcome> {
         "--spin-us {} is outside the allowed range 0 to 1000",
         args.spin_us
     );
-    let scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
-        None => Scene::parse(EMBEDDED, std::path::Path::new("")).context("the embedded scene")?,
-    };
+    let NamedScene {
+        scene, built_in, ..
+    } = named_scene::load_or(args.scene.as_deref(), LOOPED)?;
     if args.print_scene {
-        let text = match &args.scene {
-            Some(_) => scene.to_toml(),
-            None => EMBEDDED.to_owned(),
+        let text = match built_in {
+            Some(built_in) => built_in.toml.to_owned(),
+            None => scene.to_toml(),
         };
         context.say(text.trim_end())?;
         context.json(&serde_json::json!({ "scene": text }))?;

@@ -52,6 +52,8 @@ pub struct Deepest {
     pub level_forces: Vec<Vec3>,
     /// Von Mises stress of every prism, Pa. `[n_prisms]`
     pub von_mises: Vec<f64>,
+    /// Pressure of the tool on the skin, Pa. `[n_vertices]`
+    pub skin_pressure: Vec<f64>,
     /// Prisms with a corner turned inside out, if any.
     pub turned: Option<TurnedPrisms>,
 }
@@ -80,6 +82,7 @@ impl<'a> Record<'a> {
                 displacements: vec![Vec3::zeros(); indentation.model.n_nodes()],
                 level_forces: Vec::new(),
                 von_mises: vec![0.0; indentation.mesh().body.n_prisms()],
+                skin_pressure: vec![0.0; indentation.mesh().body.n_vertices()],
                 turned: None,
             },
         }
@@ -149,6 +152,7 @@ impl Deepest {
             displacements: state.displacements.clone(),
             level_forces: level_forces(model, state, ws),
             von_mises: run.fields.iter().map(PrismField::von_mises).collect(),
+            skin_pressure: run.indentation.skin_pressure(run),
             turned: turned(&run.indentation.mesh().body, &state.positions(model)),
         }
     }

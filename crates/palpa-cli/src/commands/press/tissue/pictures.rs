@@ -13,10 +13,15 @@ use palpa::build::in_mm;
 use palpa::press::Phase;
 use palpa::press::lump::Embedded;
 use palpa::press::tissue::{Indentation, Record, Sample};
-use palpa_plot::section::{Panel, Plane, Shades, ToolOutline, cut_body, draw};
+use palpa_plot::section::{
+    CornerMeans, Panel, Plane, Scale, Shades, SkinShades, ToolOutline, cut_body, draw, tissue_means,
+};
 use rayon::prelude::*;
 
 use palpa_plot::{Axis, Chart, PALETTE, Picture, Series};
+
+/// If the contact pressure is more than so many times the stress, small stresses get more colours.
+const WIDE: f64 = 4.0;
 
 pub(super) fn draw_pictures(
     job: &Job<'_>,
@@ -112,12 +117,24 @@ fn sections(
         in_mm(place.at)
     );
     let layers = draw("Section through the press point", &through, &panels);
-    let kpa: Vec<f64> = deepest.von_mises.iter().map(|s| s * 1e-3).collect();
-    let most = shown_most(&kpa, &pressed.prisms);
+    let stress = stress_means(indentation, &deepest.von_mises);
+    let pressure: Vec<f64> = deepest.skin_pressure.iter().map(|p| p * 1e-3).collect();
+    // The number of the table; a single node has no area and none.
+    let largest = recorded.samples.get(deepest.sample);
+    let largest = largest.and_then(|sample| sample.max_pressure_kpa);
     let shades = Shades {
         name: "von Mises stress, kPa",
-        values: &kpa,
-        most,
+        values: &stress,
+        scale: scale_of(
+            &stress.in_section(&pressed),
+            largest,
+            job.scene.tool.is_bonded(),
+        ),
+        on_skin: largest.map(|largest| SkinShades {
+            name: "contact pressure",
+            values: &pressure,
+            largest,
+        }),
     };
     let [_, panel] = panels;
     let stressed = Panel {
@@ -127,16 +144,41 @@ fn sections(
     Some([layers, draw("Stress under the tool", &through, &[stressed])])
 }
 
-/// Upper end of the colour scale. It is not the maximum, because a few prisms at a sharp edge would
-/// take the contrast from all others.
-fn shown_most(values: &[f64], prisms: &[usize]) -> f64 {
-    let mut cut: Vec<f64> = prisms
-        .iter()
-        .filter_map(|&p| values.get(p).copied())
-        .collect();
-    cut.sort_by(f64::total_cmp);
-    let most = cut.get((cut.len() * 98) / 100).copied().unwrap_or(0.0);
-    if most > 0.0 { most } else { 1.0 }
+/// Stress in kPa at the corners of the prisms. Means go over prisms of one tissue: stress jumps
+/// between layers, and at the border of a lump.
+fn stress_means(indentation: &Indentation, von_mises: &[f64]) -> CornerMeans {
+    let body = &indentation.mesh().body;
+    let kpa: Vec<f64> = von_mises.iter().map(|s| s * 1e-3).collect();
+    let n_intervals = body.n_levels - 1;
+    let lumps = indentation.prepared.lump_shares();
+    let tissue = |p: usize| {
+        let is_in_lump = lumps.get(p).is_some_and(|&share| share >= 0.5);
+        2 * body.interval_layer[p % n_intervals] + usize::from(is_in_lump)
+    };
+    let tissues: Vec<usize> = (0..body.n_prisms()).map(tissue).collect();
+    tissue_means(body, &tissues, &kpa)
+}
+
+/// Colours for the stresses in the section, kPa, and for a contact pressure up to `largest`. Under a
+/// bonded tool, the largest stress need not be in the range: at the sharp edge it has no limit on ever
+/// finer meshes, and would take the contrast from all other places.
+fn scale_of(stresses: &[f64], largest: Option<f64>, is_bonded: bool) -> Scale {
+    let mut sorted = stresses.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let usual = if is_bonded {
+        sorted.get((sorted.len() * 98) / 100)
+    } else {
+        sorted.last()
+    };
+    let usual = usual.copied().unwrap_or(0.0);
+    let most = usual.max(largest.unwrap_or(0.0));
+    if most <= 0.0 {
+        Scale::Linear(1.0)
+    } else if most > WIDE * usual {
+        Scale::Root(most)
+    } else {
+        Scale::Linear(most)
+    }
 }
 
 /// Outline of the tool at a depth, m.
@@ -310,4 +352,26 @@ fn layers(samples: &[&Sample], indentation: &Indentation) -> Chart {
         chart = chart.line(format!("{name}, {at_rest:.1} mm"), points);
     }
     chart
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_colour_scale_holds_the_contact_pressure() {
+        let stresses: Vec<f64> = (0..100).map(f64::from).collect();
+        // A tool that touches: the largest stress, or the contact pressure.
+        assert_eq!(scale_of(&stresses, Some(20.0), false), Scale::Linear(99.0));
+        assert_eq!(
+            scale_of(&stresses, Some(150.0), false),
+            Scale::Linear(150.0)
+        );
+        // A bonded one: not the stress at its edge, and small stresses stay apart.
+        assert_eq!(scale_of(&stresses, None, true), Scale::Linear(98.0));
+        assert_eq!(scale_of(&stresses, Some(500.0), true), Scale::Root(500.0));
+        // Nothing is pressed.
+        assert_eq!(scale_of(&[0.0; 9], Some(0.0), false), Scale::Linear(1.0));
+        assert_eq!(scale_of(&[], None, true), Scale::Linear(1.0));
+    }
 }
