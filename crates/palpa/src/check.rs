@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use palpa_mesh::check::{Examination, Severity};
 use palpa_mesh::read::FileCounts;
 use palpa_mesh::{Format, RepairOptions, Surface, SurfaceFile, read_surface};
@@ -113,26 +112,6 @@ pub fn size_of(surface: &Surface) -> f64 {
     };
     let (lo, hi) = points.fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
     (hi - lo).norm()
-}
-
-/// The surfaces of a file of the command line: of a scene those that it names, otherwise the file
-/// itself, in `unit`.
-///
-/// # Errors
-/// When the file, or a surface that it names, cannot be read.
-pub fn surfaces_in(
-    file: &Path,
-    unit: LengthUnit,
-) -> anyhow::Result<Vec<(PathBuf, SurfaceFile, LengthUnit)>> {
-    if !is_scene(file) {
-        return Ok(vec![(file.to_owned(), read_surface(file)?, unit)]);
-    }
-    let scene = Scene::load(file)?;
-    let surfaces = surfaces_of(&scene).with_context(|| format!("scene {}", file.display()))?;
-    let unit = scene.body.unit;
-    Ok((surfaces.into_iter())
-        .map(|(path, surface)| (path, surface, unit))
-        .collect())
 }
 
 /// Whether a file is a scene, by its name.

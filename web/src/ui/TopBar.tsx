@@ -93,7 +93,7 @@ function ConnectionState() {
       <span class="dot" aria-hidden="true" />
       {isOpen ? (phase === undefined ? t('connection.open') : t(`phase.${phase}`)) : t(`connection.${status.value}`)}
       {isOpen && phase === 'running' && rate !== null && (
-        <span class="rate" aria-hidden="true">{formatNumber(rate.tick_rate / 1000, 2)} kHz</span>
+        <span class="rate" aria-hidden="true">{formatNumber(Math.round(rate.tick_rate / 50) / 20, 2)} kHz</span>
       )}
     </span>
   );
