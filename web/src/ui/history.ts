@@ -7,8 +7,8 @@ import { Strokes } from './strokes';
 
 /** Longest window of the curves, s. */
 export const LONGEST = 60;
-/** A line is broken where frames are missing for this time, s, longer than between two of a body at rest, and for so many times the usual one between two
- * frames, which is long where the page draws slowly. */
+/** A line is broken where frames are missing for this time, s, which is longer than between two frames of a body at
+ * rest, and for so many times the usual one between two frames, which is long where the page draws slowly. */
 const GAP = 0.8;
 const GAP_PERIODS = 4;
 /** Longest time between two frames that counts as usual, s. */

@@ -42,6 +42,8 @@ export class Strokes {
   /** The way since touch, rest or turn; a stroke once it is long enough. */
   private now: Stroke | null = null;
   private isStroke = false;
+  /** Depth at the last moment, m. */
+  private depth = 0;
   /** The place at which the tool rests, until it moves. */
   private anchor: Moment | null = null;
   private felt = 0;
@@ -76,6 +78,8 @@ export class Strokes {
       this.begin(this.anchor);
     }
     const { places, times } = this.now!;
+    const sunk = Math.abs(moment.depth - this.depth);
+    this.depth = moment.depth;
     const way = distance(moment.place, places.at(-1)!);
     if (way < STEP) {
       if (way < RESTING && moment.time > times.at(-1)! + REST) {
@@ -84,6 +88,8 @@ export class Strokes {
       }
       return false;
     }
+    // A tool that is pressed in or lifted moves a little along the skin too: that is no stroke.
+    if (sunk > way) return false;
     this.add(moment, way);
     return this.isStroke;
   }
@@ -109,7 +115,8 @@ export class Strokes {
     this.end();
   }
 
-  private begin({ time, place, force }: Moment): void {
+  private begin({ time, place, force, depth }: Moment): void {
+    this.depth = depth;
     this.now = { body: this.body, times: [time], places: [place], ways: [0], forces: [force] };
     this.isStroke = false;
     this.farthest = 0;

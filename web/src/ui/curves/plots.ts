@@ -16,6 +16,8 @@ const FONT = '11px system-ui, sans-serif';
 const GHOSTS = [0.7, 0.5, 0.35];
 /** Force over the way: an axis that begins at zero would hide changes smaller than this share of the force. */
 const SMALL_CHANGE = 0.6;
+/** Room above the strokes for the key, as a share of their change. */
+const HEADROOM = 0.35;
 /** Frequencies that the Pacinian channel feels, Hz; it is most sensitive near 250 Hz. After Bolanowski et al.
  * (1988), "Four channels mediate the mechanical aspects of touch", J. Acoust. Soc. Am. 84, 1680–1694. */
 const FELT: [number, number] = [40, 800];
@@ -275,7 +277,8 @@ export class Plot {
     }
     const change = most - least;
     const pad = Math.max(0.08 * change, 0.005 * most);
-    this.strokeEnds = change > SMALL_CHANGE * most ? [0, most + pad] : [Math.max(0, least - pad), most + pad];
+    const low = change > SMALL_CHANGE * most ? 0 : Math.max(0, least - pad);
+    this.strokeEnds = [low, most + pad + HEADROOM * (most - low)];
   }
 
   // Looks
@@ -331,7 +334,7 @@ export class Plot {
       axes: [
         { ...axis, size: 20, space: 40, values: labels(xUnit) },
         kind === 'spectrum'
-          ? { ...axis, size: 54, space: 16, values: (_plot, splits) => splits.map(decade) }
+          ? { ...axis, size: 54, space: 16, values: (_plot, splits) => splits.map(decade), grid: { ...axis.grid, filter: decades }, ticks: { ...axis.ticks, filter: decades } }
           : { ...axis, size: 54, space: 24, values: labels(yUnit) },
       ],
       series: [{}, ...series],
@@ -491,6 +494,9 @@ function decade(value: number | null): string | null {
   if (Math.abs(power - Math.round(power)) > 1e-6) return null;
   return value < 0.9e-3 ? `${Math.round(value * 1e6)} µN` : value < 0.9 ? `${Math.round(value * 1e3)} mN` : `${Math.round(value)} N`;
 }
+
+/** Lines at powers of ten only. */
+const decades = (_plot: uPlot, splits: readonly number[]): (number | null)[] => splits.map((value) => (decade(value) === null ? null : value));
 
 /** Ghosts before the newest, of its body and of bodies before. */
 function kinds(all: readonly { body: string }[]): { n: number; earlier: number; before: number } {
