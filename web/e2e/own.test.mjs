@@ -8,7 +8,7 @@ import { drop, ellipsoid, glb, obj, scaled, stl, unzipped } from './meshes.mjs';
 import { PalpaPage } from './page.mjs';
 import { endShared, sharedBrowser, sharedPage } from './session.mjs';
 import { saveShot } from './shots.mjs';
-import { Viewer, sceneOf, until } from './viewer.mjs';
+import { Viewer, until } from './viewer.mjs';
 
 /** Half lengths of a limb, mm. */
 const LIMB = ellipsoid([110, 38, 34]);
@@ -72,7 +72,7 @@ test('a closed STL in millimetres is dropped, checked, grown, touched, changed, 
   t.diagnostic(`pressed with ${(await touched(palpa)).toFixed(2)} N`);
   await saveShot(palpa, 'own-grown');
   await palpa.tab('tissues');
-  await palpa.type('layer-1-thickness', '6 mm', (state) => sceneOf(state).layer?.[1].thickness === '6 mm' || sceneOf(state).layer?.[1].thickness === '0.006 m');
+  await palpa.type('layer-1-thickness', '6 mm', ({ layers }) => Math.abs(layers[1].thickness - 6e-3) < 3e-4);
 
   await palpa.tab('scene');
   const bytes = await saved(palpa, 'scene-save-zip');
@@ -151,7 +151,6 @@ test('a broken file is refused with its place, and one with defects shows them o
   await hole.getByRole('button').click();
   await hole.getByRole('button', { name: /Place 1 of/ }).waitFor();
   await saveShot(palpa, 'own-defects');
-  await palpa.by('language').selectOption('ja', { force: true }).catch(() => undefined);
   await palpa.by('own-close').click();
 
   // A scene without its meshes says what to do.
@@ -206,9 +205,9 @@ test('after a restart of the engine the page brings back the body that was dropp
     await palpa.by('restore').waitFor();
     await saveShot(palpa, 'restore');
     await palpa.by('restore-scene').click();
+    await palpa.by('restore').waitFor({ state: 'detached' }).catch(async () => assert.fail(await palpa.by('restore').innerText()));
     const state = await viewer.running('the body is back', ({ files }) => files.length === 1);
     assert.ok(Math.abs(state.layers[0].stiffness - 123e3) < 100, 'with its change');
-    await palpa.by('restore').waitFor({ state: 'detached' });
     await palpa.running();
     await touched(palpa);
 

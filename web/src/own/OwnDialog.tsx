@@ -94,15 +94,16 @@ function Body({ now, skin }: { now: Draft; skin: Part }) {
             <dt>{t('own.triangles')}</dt>
             <dd>{info.n_triangles.toLocaleString('en')}</dd>
             <dt>{t('own.size')}</dt>
-            <dd>{info.size.map((x) => (x * UNITS[now.unit] * 1e3).toFixed(x * UNITS[now.unit] < 0.1 ? 1 : 0)).join(' × ')} mm</dd>
+            <dd>{sizeWords(info.size.map((x) => x * UNITS[now.unit] * 1e3))}</dd>
           </dl>
           <Select<LengthUnit>
             label={t('own.unit')}
             value={now.unit}
-            options={(Object.keys(UNITS) as LengthUnit[]).map((unit) => ({ value: unit, label: unitWords(unit, info.size, unit === info.probable_unit) }))}
+            options={(Object.keys(UNITS) as LengthUnit[]).map((unit) => ({ value: unit, label: unitWords(unit, info.size) }))}
             onChange={(unit) => void chooseUnit(unit)}
             testid="own-unit"
           />
+          <p class="hint own-guess">{t(now.unit === info.probable_unit ? 'own.guessed' : 'own.not_guessed', { unit: info.probable_unit })}</p>
           <Findings now={now} skin={skin} chosen={chosen} onChoose={setChosen} />
           <Layers now={now} skin={skin} />
           <Bones now={now} />
@@ -120,9 +121,14 @@ function Body({ now, skin }: { now: Draft; skin: Part }) {
   );
 }
 
-function unitWords(unit: LengthUnit, size: readonly number[], isProbable: boolean): string {
-  const longest = Math.max(...size) * UNITS[unit];
-  return `${unit} (${t('own.long', { length: formatQuantity(longest, 'length') })}${isProbable ? `, ${t('own.probable')}` : ''})`;
+function unitWords(unit: LengthUnit, size: readonly number[]): string {
+  return `${unit} (${t('own.long', { length: formatQuantity(Math.max(...size) * UNITS[unit], 'length') })})`;
+}
+
+/** Three lengths, mm, with the digits that the largest of them needs. */
+function sizeWords(size: readonly number[]): string {
+  const decimals = Math.max(...size) < 100 ? 1 : 0;
+  return `${size.map((x) => x.toFixed(decimals)).join(' × ')} mm`;
 }
 
 function Picture(props: { skin: Part; bones: Part[]; chosen: { finding: number; place: number } | null }) {

@@ -58,10 +58,9 @@ export class Preview {
     const surface = geometryOf(skin);
     const isClear = bones.length > 0;
     const look = { transparent: isClear, opacity: isClear ? 0.45 : 1, depthWrite: !isClear };
-    this.body.add(
-      new Mesh(surface, new MeshLambertMaterial({ color: SKIN_IN_LIGHT, side: FrontSide, ...look })),
-      new Mesh(surface, new MeshLambertMaterial({ color: INSIDE, side: BackSide, ...look })),
-    );
+    this.body.add(new Mesh(surface, new MeshLambertMaterial({ color: SKIN_IN_LIGHT, side: FrontSide, ...look })));
+    // Through a clear skin one sees its other side from within, which is as it should be.
+    if (!isClear) this.body.add(new Mesh(surface, new MeshLambertMaterial({ color: INSIDE, side: BackSide })));
     if (skin.triangles.length / 3 <= MOST_EDGES) {
       const edges = new LineBasicMaterial({ color: THEMES[this.theme].wire, transparent: true, opacity: 0.22 });
       this.body.add(new LineSegments(new WireframeGeometry(surface), edges));

@@ -10,7 +10,7 @@ export function RestoreBar() {
   const [problem, setProblem] = useState<string | null>(null);
   const before = lost.value;
   if (before === null) return null;
-  const name = before.key === null ? t('scene.own_picked') : named('gallery', before.key);
+  const name = before.key === null ? (before.scene.body.surface ?? t('scene.own_picked')) : named('gallery', before.key);
   return (
     <div class="banner restore" data-testid="restore">
       <span>
