@@ -25,7 +25,9 @@ pub(crate) fn spectrum(ticks: &[LateTick]) -> Option<Spectrum> {
     let mut squares = vec![0.0; N / 2 + 1];
     for axis in 0..3 {
         let mut re: Vec<f64> = samples.iter().map(|force| force[axis]).collect();
-        let mean = re.iter().sum::<f64>() / N as f64;
+        // Weighted by the window, so that a vibration does not leak into the lowest amplitudes.
+        let weighted = re.iter().enumerate().map(|(k, value)| hann(k) * value);
+        let mean = weighted.sum::<f64>() / (0.5 * N as f64);
         for (k, value) in re.iter_mut().enumerate() {
             *value = (*value - mean) * hann(k);
         }

@@ -140,7 +140,7 @@ fn where_things_lie() {
         ..FrameSnapshot::default()
     };
     let bytes = frame.encode();
-    assert_eq!(bytes[..12], [3, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
+    assert_eq!(bytes[..12], [4, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
     // Version, kind, mesh, sequence, is_replay; then doubles from the next multiple of 8.
     assert_eq!(bytes[24..32], 1f64.to_le_bytes());
     // 2 + 19 + 3 doubles, 4 numbers, a double; the list's length and its items.
