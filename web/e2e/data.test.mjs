@@ -81,7 +81,8 @@ test('every awkward mesh gets findings with places, or a refusal in words', asyn
       assert.ok(problem.includes(name.replaceAll(/[^\w.-]/g, '_')), problem);
     } else if (verdict !== 'good') {
       nBad += 1;
-      assert.ok(marks > 0 || /unit|heap/.test(findings), `${name}: ${findings}`);
+      // A surface of infinite points only has no place to show.
+      assert.ok(marks > 0 || /no numbers/.test(findings), `${name}: ${findings}`);
     }
     await closed();
   }

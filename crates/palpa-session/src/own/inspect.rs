@@ -4,7 +4,7 @@ use std::path::Path;
 
 use palpa::Note;
 use palpa::check::{SurfaceCheck, probable_unit};
-use palpa::mesh::check::{Finding, Severity, SurfaceReport};
+use palpa::mesh::check::{Finding, Severity, Spot, SurfaceReport};
 use palpa::mesh::{RepairOptions, Surface, SurfaceFile, Vec3, Verdict};
 use palpa_scene::LengthUnit;
 use palpa_viewer::control::{FindingInfo, FindingSeverity, SurfaceInfo, SurfaceVerdict};
@@ -48,18 +48,20 @@ pub(super) fn inspected(
             Verdict::Bad => SurfaceVerdict::Bad,
         },
         notes: notes.collect(),
-        findings: report.findings.iter().map(finding).collect(),
+        findings: (report.findings.iter())
+            .map(|found| finding(found, &file.surface, unit))
+            .collect(),
         templates: template::infos(size),
     };
     (info, size.scaled(unit.metres().recip()))
 }
 
-fn finding(finding: &Finding) -> FindingInfo {
+fn finding(finding: &Finding, surface: &Surface, unit: LengthUnit) -> FindingInfo {
     let kind = match serde_json::to_value(finding.kind) {
         Ok(serde_json::Value::String(kind)) => kind,
         _ => String::new(),
     };
-    let is_finite = |point: &[f64; 3]| point.iter().all(|x| x.is_finite());
+    let places = (finding.spots.iter()).filter_map(|spot| place(spot, surface, unit));
     FindingInfo {
         kind,
         severity: match finding.severity {
@@ -69,12 +71,27 @@ fn finding(finding: &Finding) -> FindingInfo {
         },
         count: finding.count as u32,
         is_at_least: finding.is_at_least,
-        places: (finding.spots.iter().map(|spot| spot.point))
-            .filter(is_finite)
-            .collect(),
+        places: places.collect(),
         text: finding.message.clone(),
         advice: finding.advice.clone(),
     }
+}
+
+/// The place of a finding, m. A vertex whose coordinates are no numbers is shown at a neighbour.
+fn place(spot: &Spot, surface: &Surface, unit: LengthUnit) -> Option<[f64; 3]> {
+    let is_finite = |point: &[f64; 3]| point.iter().all(|x| x.is_finite());
+    if is_finite(&spot.point) {
+        return Some(spot.point);
+    }
+    let vertex = spot.vertices.first()?;
+    (surface
+        .triangles
+        .iter()
+        .filter(|t| t.contains(vertex))
+        .flatten())
+    .filter_map(|&v| surface.points.get(v as usize))
+    .map(|point| (point * unit.metres()).into())
+    .find(is_finite)
 }
 
 /// The dimensions by which a template chooses its layers, m.

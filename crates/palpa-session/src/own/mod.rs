@@ -330,6 +330,20 @@ mod tests {
     }
 
     #[test]
+    fn a_vertex_without_a_place_is_shown_at_a_neighbour() {
+        let shelf = Shelf::default();
+        let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\nnan 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+        let taken = shelf.take("skin.ply", ply.as_bytes()).unwrap();
+        let info = surface_of(&taken);
+        let found = info.findings.iter().find(|f| f.kind == "not-finite");
+        let places = &found.unwrap().places;
+        assert!(places.len() == 1 && places[0].iter().all(|x| x.is_finite()));
+        assert!(info.size.iter().all(|x| x.is_finite()));
+        let mesh = shelf.mesh(taken.id).unwrap();
+        assert_eq!(mesh.triangles.len(), 3, "only the whole triangle is drawn");
+    }
+
+    #[test]
     fn bad_files_are_refused_with_place_and_advice() {
         let shelf = Shelf::default();
         let why = |name: &str, bytes: &[u8]| {
