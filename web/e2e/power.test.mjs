@@ -146,6 +146,7 @@ test('a link carries the changed scene, the seed and the view, and opens them', 
   const state = await palpa.viewer.running('the scene of the link', (now) => now.gallery_key === 'block' && isYoung(37)(now));
   assert.ok(state.is_changed);
   await palpa.by('toast').filter({ hasText: 'The scene of the link is open' }).waitFor();
+  assert.equal(await palpa.by('toast').filter({ hasText: 'damaged' }).count(), 0);
   assert.equal(await palpa.by('game-seed').inputValue(), '4242');
   await palpa.tab('view');
   assert.ok(await palpa.by('cutaway-toggle').isChecked());

@@ -108,8 +108,9 @@ export function beginLinks(): void {
     if (!hash.startsWith(MARK)) return;
     // The address is free again: a reload shall not undo later work.
     window.history.replaceState(null, '', location.pathname + location.search);
-    waiting.value = await read(hash);
-    if (waiting.value === null) notify('error', t('share.unreadable'));
+    const content = await read(hash);
+    if (content === null) notify('error', t('share.unreadable'));
+    else waiting.value = content;
   };
   window.addEventListener('hashchange', () => void take());
   void take();
