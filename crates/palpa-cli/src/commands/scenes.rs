@@ -202,9 +202,10 @@ fn write(chosen: &[&'static BuiltIn], is_one: bool, context: &Context) -> anyhow
     } else {
         out
     };
-    let folder = match folder.as_os_str().is_empty() {
-        true => Path::new("."),
-        false => folder,
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
     };
     let target = |built_in: &BuiltIn| match out.file_name() {
         Some(name) if is_file => name.to_string_lossy().into_owned(),

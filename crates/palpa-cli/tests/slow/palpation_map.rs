@@ -7,8 +7,7 @@ use palpa::map::{PalpationMap, Touch};
 use palpa_device::{LiveTarget, Vec3};
 use palpa_mesh::SurfaceIndex;
 use palpa_rt::StepStatus;
-use palpa_scene::Scene;
-use palpa_session::gallery;
+use palpa_scene::{BuiltIn, Scene};
 
 const STEP_TIME: f64 = 4e-3;
 /// A touch of the map every so many ticks, as a session makes them.
@@ -130,7 +129,7 @@ fn map_of(scene: &Scene) -> PalpationMap {
 
 #[test]
 fn five_strokes_find_the_lump_and_nothing_without_it() {
-    let scene = gallery::scene("forearm_lump").unwrap();
+    let scene = BuiltIn::find("forearm_lump").unwrap().scene().unwrap();
     let live = LiveScene::build(&scene).unwrap();
     let lump = live.prepared.lumps()[0].pose().translation.vector;
     let above = {

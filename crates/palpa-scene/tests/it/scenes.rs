@@ -206,7 +206,7 @@ fn the_forearms_that_are_pressed_differ_as_they_say() {
     let touched = built_in("forearm");
     let without = Scene {
         lumps: vec![],
-        motion: touched.motion.clone(),
+        motion: touched.motion,
         ..touched_lump
     };
     assert_eq!(without, touched);

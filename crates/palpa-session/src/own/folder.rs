@@ -14,7 +14,7 @@ const LONGEST_NAME: usize = 80;
 /// A temporary folder with files, removed when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Folder {
-    folder: TempDir,
+    temporary: TempDir,
     /// Names of the files, relative to the folder, with `/`.
     names: Vec<String>,
     bytes: u64,
@@ -23,10 +23,10 @@ pub(crate) struct Folder {
 impl Folder {
     /// An empty folder.
     pub(super) fn new() -> anyhow::Result<Self> {
-        let folder = tempfile::Builder::new().prefix("palpa-").tempdir();
-        let folder = folder.context("no temporary folder can be made for the files")?;
+        let temporary = tempfile::Builder::new().prefix("palpa-").tempdir();
+        let temporary = temporary.context("no temporary folder can be made for the files")?;
         Ok(Self {
-            folder,
+            temporary,
             names: Vec::new(),
             bytes: 0,
         })
@@ -50,7 +50,7 @@ impl Folder {
 
     /// Adds a file. The name is relative, and checked by the caller.
     pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let path = self.folder.path().join(name);
+        let path = self.temporary.path().join(name);
         let written = path
             .parent()
             .map_or(Ok(()), fs::create_dir_all)
@@ -94,7 +94,7 @@ impl Folder {
 
     /// The folder.
     pub(crate) fn path(&self) -> &Path {
-        self.folder.path()
+        self.temporary.path()
     }
 
     /// Names of the files, relative to the folder, in the order in which they were added.
@@ -171,7 +171,8 @@ mod tests {
         }
         let long = format!("{}.stl", "x".repeat(300));
         let short = plain_name(&long);
-        assert!(short.chars().count() == LONGEST_NAME && short.ends_with(".stl"));
+        assert_eq!(short.chars().count(), LONGEST_NAME);
+        assert_eq!(Path::new(&short).extension(), Some("stl".as_ref()));
     }
 
     #[test]

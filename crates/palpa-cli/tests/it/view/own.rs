@@ -1,5 +1,7 @@
 //! A body of one's own, and changes of the scene undone: over HTTP, as a program does.
 
+use std::fmt::Write as _;
+
 use palpa_mesh::{Surface, generate, write_surface};
 
 use super::*;
@@ -117,13 +119,13 @@ fn what_cannot_be_grown_is_refused_with_place_and_reason_and_the_body_stays() {
         for side in [-0.02, 0.02] {
             let r = 0.1 + side * (u / 2.0).cos();
             let [x, y, z] = [r * u.cos(), r * u.sin(), side * (u / 2.0).sin()];
-            text += &format!("v {x} {y} {z}\n");
+            writeln!(text, "v {x} {y} {z}").unwrap();
         }
     }
     for i in 0..n {
         let [a, b] = [2 * i + 1, 2 * i + 2];
         let [c, d] = if i + 1 < n { [a + 2, b + 2] } else { [2, 1] };
-        text += &format!("f {a} {b} {c}\nf {b} {d} {c}\n");
+        writeln!(text, "f {a} {b} {c}\nf {b} {d} {c}").unwrap();
     }
     let (status, strip) = viewer.upload("strip.obj", text.as_bytes());
     assert_eq!(status, 200, "{strip}");
