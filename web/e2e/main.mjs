@@ -12,3 +12,4 @@ import './own.test.mjs';
 import './access.test.mjs';
 import './curves.test.mjs';
 import './connection.test.mjs';
+import './words.test.mjs';

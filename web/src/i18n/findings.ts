@@ -1,5 +1,5 @@
-// Words of the findings in a surface. The engine sends a kind and a count; a kind without an entry here is shown in the engine's
-// own English.
+// Words of the findings in a surface. The engine sends a kind and a count. A kind that an older page does not know is shown in the
+// engine's own English; e2e/words.test.mjs finds kinds that have no words here.
 
 import type { FindingInfo } from '../generated/api';
 import type { Language } from '.';
@@ -10,7 +10,7 @@ type Entry = [found: (n: string, isOne: boolean) => string, advice: string];
 const s = (isOne: boolean): string => (isOne ? '' : 's');
 const REPAIRED = 'Palpa mends this when the body grows.';
 
-const en: Record<string, Entry> = {
+const en = {
   empty: [() => 'There are no triangles.', 'Export the mesh itself, not its points.'],
   'out-of-range': [(n, one) => `${n} triangle${s(one)} with vertices that do not exist.`, 'Export the surface again.'],
   'not-finite': [(n, one) => `${n} vert${one ? 'ex' : 'ices'} with coordinates that are no numbers, infinite or far too large.`, 'Correct or delete these vertices in the program that made the mesh.'],
@@ -33,10 +33,12 @@ const en: Record<string, Entry> = {
   scale: [() => 'No body part has this size.', 'Choose another unit above.'],
   'far-from-origin': [() => 'It lies far from the origin of its coordinates.', 'Nothing is lost, unless the file is saved again in single precision (STL, GLB).'],
   'unclear-side': [(n, one) => `${n} open part${s(one)} of which the outside is not clear.`, 'Check in the picture that the violet side is inside.'],
-};
+} satisfies Record<string, Entry>;
+
+type FindingKind = keyof typeof en;
 
 const J = 'モデルの生成時に自動で修復します。';
-const ja: Record<string, Entry> = {
+const ja: Record<FindingKind, Entry> = {
   empty: [() => '三角形がありません。', '点だけでなくメッシュを書き出してください。'],
   'out-of-range': [(n) => `存在しない頂点を使う三角形が ${n} 個あります。`, '面を書き出し直してください。'],
   'not-finite': [(n) => `座標が数でない、無限大、または大きすぎる頂点が ${n} 個あります。`, 'メッシュを作ったソフトで、これらの頂点を修正または削除してください。'],
@@ -61,7 +63,7 @@ const ja: Record<string, Entry> = {
   'unclear-side': [(n) => `どちらが外側か分からない開いた部分が ${n} 個あります。`, '画面で紫の面が内側になっているか確認してください。'],
 };
 
-const WORDS: Record<Language, Record<string, Entry>> = { en, ja };
+const WORDS: Record<Language, Partial<Record<string, Entry>>> = { en, ja };
 const AT_LEAST: Record<Language, (n: number) => string> = { en: (n) => `at least ${n}`, ja: (n) => `${n} 以上の` };
 
 /** What was found, and what to do about it. */

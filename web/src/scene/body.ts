@@ -29,6 +29,7 @@ export class Body {
   readonly coreTriangles: Uint32Array;
   /** Number of core triangles under the skin; those after them close the rims. */
   readonly nCoreSides: number;
+  private ends: Uint32Array | null = null;
   readonly stiffness: Float32Array;
   readonly bonePositions: Float32Array;
   readonly boneTriangles: Uint32Array;
@@ -74,6 +75,17 @@ export class Body {
     this.radius = 0.5 * this.box.getSize(new Vector3()).length();
   }
 
+  /** The faces where the body was cut off, from the skin to the core: three nodes each. */
+  get endTriangles(): Uint32Array {
+    if (this.ends) return this.ends;
+    const walls = wallTriangles(this, 0, this.nLevels - 1);
+    const core = this.coreTriangles.subarray(3 * this.nCoreSides);
+    this.ends = new Uint32Array(walls.length + core.length);
+    this.ends.set(walls);
+    this.ends.set(core, walls.length);
+    return this.ends;
+  }
+
   /** Moves the nodes to their places in a frame. */
   deform(frame: Pick<FrameSnapshot, 'displacements' | 'displacement_unit'>): void {
     const { displacements, displacement_unit: unit } = frame;
@@ -107,6 +119,20 @@ export class Body {
       }
     }
   }
+}
+
+/** Two triangles for every interval between two levels at every open edge. */
+export function wallTriangles({ rimEdges, nLevels }: Pick<Body, 'rimEdges' | 'nLevels'>, from: number, to: number): Uint32Array {
+  const out = new Uint32Array((rimEdges.length / 2) * (to - from) * 6);
+  let n = 0;
+  for (let e = 0; e < rimEdges.length; e += 2) {
+    for (let l = from; l < to; l++) {
+      const a = rimEdges[e] * nLevels + l, b = rimEdges[e + 1] * nLevels + l;
+      out.set([a, a + 1, b, b, a + 1, b + 1], n);
+      n += 6;
+    }
+  }
+  return out;
 }
 
 /** The edges that belong to one triangle only. */

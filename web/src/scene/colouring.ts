@@ -3,7 +3,7 @@
 import type { LayerInfo } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
 import type { Body } from './body';
-import type { Legend } from './options';
+import type { Category, Legend } from './options';
 import { layerColours, mapOf } from './palette';
 import { QUANTITIES, type ColourBy, type Quantity } from './quantities';
 
@@ -85,11 +85,12 @@ export class Colouring {
     return this.isLog ? [Math.log10(this.min), Math.log10(this.max)] : [this.min, this.max];
   }
 
-  legend(by: ColourBy, layers: LayerInfo[], isCut: boolean, isReference: boolean): Legend | null {
+  /** `inside`: what else is seen of the inside, besides the layers. */
+  legend(by: ColourBy, layers: LayerInfo[], isOpen: boolean, inside: readonly Category[], isReference: boolean): Legend | null {
     if (!Colouring.isMap(by)) {
-      if (by === 'tissue' && !isCut) return null;
+      if (by === 'tissue' && !isOpen) return null;
       const colours = layerColours(layers);
-      return { title: by, unit: '', min: 0, max: 1, stops: colours, categories: layers.map(({ name }, i) => ({ name, colour: colours[i] })) };
+      return { title: by, unit: '', min: 0, max: 1, stops: colours, categories: [...layers.map(({ name }, i) => ({ name, colour: colours[i] })), ...inside] };
     }
     // The bars of the reference method have a stiffness of their own.
     const unit = by === 'stiffness' && isReference ? 'N/m' : QUANTITIES[by].unit;

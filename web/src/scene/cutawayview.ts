@@ -38,6 +38,8 @@ export class CutawayView {
   private readonly frame = new Lines(1.2);
   private cut: Cut | null = null;
   private areaKey = '';
+  /** Areas of the section; null while nothing is cut. */
+  area: SectionArea | null = null;
 
   constructor(shared: SharedUniforms, stage: Stage, private readonly rig: CameraRig, onMove: (position: number) => void) {
     this.section = new SectionView(shared);
@@ -71,6 +73,7 @@ export class CutawayView {
       this.cut = null;
       this.planes.length = 0;
       if (this.areaKey !== '') this.onArea(null);
+      this.area = null;
       this.areaKey = '';
       return;
     }
@@ -89,6 +92,7 @@ export class CutawayView {
     const key = JSON.stringify(area);
     if (key === this.areaKey) return;
     this.areaKey = key;
+    this.area = area;
     this.onArea(area);
   }
 

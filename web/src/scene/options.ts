@@ -53,6 +53,12 @@ export const DEFAULT_OPTIONS: ViewOptions = {
   reducedMotion: false,
 };
 
+/** A colour of a legend; `name` is that of a tissue. */
+export interface Category {
+  name: string;
+  colour: string;
+}
+
 export interface Legend {
   title: ColourBy;
   unit: string;
@@ -62,7 +68,7 @@ export interface Legend {
   stops: string[];
   /** Whether the stops are evenly spaced in the logarithm. */
   isLog?: boolean;
-  categories?: { name: string; colour: string }[];
+  categories?: Category[];
 }
 
 /** The legend of the palpation map. */

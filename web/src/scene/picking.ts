@@ -52,7 +52,11 @@ interface Pickable {
 }
 
 /** The nearest of skin, section and bones. */
-export function pickNearest(ray: Ray, body: Body, { section, bones, isKept }: Pickable): Picked | null {
+export function pickNearest(ray: Ray, body: Body, pickable: Pickable): Picked | null {
+  return nearestPart(ray, body, pickable).picked;
+}
+
+function nearestPart(ray: Ray, body: Body, { section, bones, isKept }: Pickable): { picked: Picked | null; distance: number } {
   const hits = [
     { part: 'skin' as const, hit: pickSkin(ray, body, false, isKept) },
     { part: 'section' as const, hit: section && pickSection(ray, section.section, section.plane) },
@@ -65,7 +69,19 @@ export function pickNearest(ray: Ray, body: Body, { section, bones, isKept }: Pi
     nearest = hit.distance;
     best = { point: hit.point, normal: hit.normal, part };
   }
-  return best;
+  return { picked: best, distance: nearest };
+}
+
+/** What is pressed in place of the skin: an end or side where the body was cut off, a section, a bone. */
+export type NoSkin = 'end' | 'section' | 'bone';
+
+/** The part under a ray that is nearer than the skin and is not skin; null beside the body. */
+export function pickNoSkin(ray: Ray, body: Body, pickable: Pickable): NoSkin | null {
+  const { isKept } = pickable;
+  const ends = cast(ray, body.rest, body.endTriangles, body.endTriangles.length, 1, true, isKept);
+  const { picked, distance } = nearestPart(ray, body, pickable);
+  if (ends && ends.distance < distance) return 'end';
+  return picked && picked.part !== 'skin' ? picked.part : null;
 }
 
 /** Picks the skin, deformed or at rest, outside the part that is cut away. */

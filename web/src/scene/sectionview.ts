@@ -1,11 +1,14 @@
 // Draws the section: polygons of tissue, lines between layers, filled core and bones.
 
-import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, Sphere, type IUniform, type Vector2 } from 'three';
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, Sphere, Vector3, type IUniform, type Vector2 } from 'three';
 import type { Body } from './body';
 import { contourLoops, fillLoops, type CutPlane } from './contour';
 import { Lines } from './lines';
 import { SectionMaterial, type SharedUniforms } from './materials';
 import { Section } from './section';
+
+/** The core between bones is seen if it is larger than they are by this factor. */
+const CORE_SEEN = 1.05;
 
 export class SectionView {
   readonly group = new Group();
@@ -19,6 +22,9 @@ export class SectionView {
   private readonly boneLine = new Lines(1.1);
   private capacity = 0;
   private filledFor = '';
+  private isCoreSeen = false;
+  /** Whether the core between bones is seen in the section. */
+  hasCore = false;
 
   constructor(shared: SharedUniforms) {
     this.material = new SectionMaterial(shared);
@@ -78,13 +84,17 @@ export class SectionView {
     const key = `${body.id} ${plane.normal.join()} ${plane.offset}`;
     if (key !== this.filledFor) {
       this.filledFor = key;
-      fill(this.core, fillLoops(contourLoops(body.rest, body.coreTriangles, plane), plane));
+      const core = fillLoops(contourLoops(body.rest, body.coreTriangles, plane), plane);
+      fill(this.core, core);
       const loops = contourLoops(body.bonePositions, body.boneTriangles, plane);
-      fill(this.bone, fillLoops(loops, plane));
+      const bone = fillLoops(loops, plane);
+      fill(this.bone, bone);
+      this.isCoreSeen = areaOf(core) > CORE_SEEN * areaOf(bone);
       const lines = loops.flatMap((loop) => loop.flatMap((_, i) => (i % 3 === 0 ? [...loop.slice(i, i + 3), ...at(loop, i + 3)] : [])));
       this.boneLine.show(Float32Array.from(lines), lines.length);
     }
     this.core.visible = bones;
+    this.hasCore = bones && this.isCoreSeen;
     this.bone.visible = this.boneLine.visible = bones && body.boneTriangles.length > 0;
   }
 
@@ -126,6 +136,19 @@ function fill(mesh: Mesh<BufferGeometry, MeshBasicMaterial>, positions: number[]
   mesh.geometry.dispose();
   mesh.geometry = new BufferGeometry();
   mesh.geometry.setAttribute('position', new BufferAttribute(Float32Array.from(positions), 3));
+}
+
+/** Area of triangles in a plane, m². */
+function areaOf(positions: number[]): number {
+  let sum = 0;
+  const [a, b, c] = [new Vector3(), new Vector3(), new Vector3()];
+  for (let i = 0; i + 8 < positions.length; i += 9) {
+    a.fromArray(positions, i);
+    b.fromArray(positions, i + 3).sub(a);
+    c.fromArray(positions, i + 6).sub(a);
+    sum += 0.5 * b.cross(c).length();
+  }
+  return sum;
 }
 
 /** A point of a closed loop. */

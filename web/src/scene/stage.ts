@@ -6,11 +6,14 @@ import {
   CanvasTexture, Color, DirectionalLight, Mesh, MeshBasicMaterial, PlaneGeometry, Scene, Vector3,
 } from 'three';
 import type { Body } from './body';
+import type { CutPlane } from './contour';
 import { THEMES, type Theme } from './palette';
 
 /** Direction to the key light: over the left shoulder, seen from home. */
 const LIGHT = new Vector3(-0.5, -0.55, 1.0).normalize();
 const BLOB = 128;
+/** Side of the ground, in radii of the body. */
+const SPREAD = 2.9;
 
 export class Stage {
   readonly scene = new Scene();
@@ -42,8 +45,7 @@ export class Stage {
     return theme;
   }
 
-  /** Sets light and shadow for a body. The ground's shadow is painted once, since a press does not
-   * change it visibly. */
+  /** Sets light and shadow for a body. */
   setBody(body: Body): void {
     const { centre, radius, box } = body;
     this.key.position.copy(LIGHT).multiplyScalar(4 * radius).add(centre);
@@ -58,31 +60,43 @@ export class Stage {
     this.key.shadow.bias = -0.0006;
     this.key.shadow.normalBias = 0.004 * radius;
 
-    // Meshes of one body differ by less than the shadow's softness.
-    const key = [...box.min.toArray(), ...box.max.toArray()].map((x) => Math.round(x * 250)).join();
+    const side = SPREAD * radius;
+    this.ground.scale.set(side, side, 1);
+    this.ground.position.set(centre.x, centre.y, box.min.z - 0.03 * radius);
+  }
+
+  /** Paints the shadow on the ground of what a cut leaves of a body at rest; a press does not change it visibly. */
+  paintGround(body: Body, cut: CutPlane | null): void {
+    const { centre, radius, box } = body;
+    // Meshes of one body, and neighbouring cuts, differ by less than the shadow's softness.
+    const shape = [...box.min.toArray(), ...box.max.toArray()].map((x) => Math.round(x * 250));
+    const plane = cut === null ? [] : [...cut.normal.map((x) => Math.round(x * 50)), Math.round(cut.offset * 1000)];
+    const key = [...shape, ...plane].join();
     if (key === this.drawnFor) return;
     this.drawnFor = key;
-    const side = 2.9 * radius;
+    const side = SPREAD * radius;
     const g = this.blob.getContext('2d')!;
     g.clearRect(0, 0, BLOB, BLOB);
-    g.fillStyle = '#fff';
     const shadow = document.createElement('canvas');
     shadow.width = shadow.height = BLOB;
     const s = shadow.getContext('2d')!;
     s.fillStyle = '#fff';
-    s.beginPath();
-    const px = (x: number) => (0.5 + x / side) * BLOB;
-    for (let t = 0; t < body.triangles.length; t += 3) {
-      const at = [0, 1, 2].map((k) => 3 * body.triangles[t + k] * body.nLevels);
-      const [x, y] = [at.map((i) => px(body.rest[i] - centre.x)), at.map((i) => px(centre.y - body.rest[i + 1]))];
-      // Only triangles that face upwards: with the others, the windings would cancel.
-      if ((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]) >= 0) continue;
-      s.moveTo(x[0], y[0]);
-      s.lineTo(x[1], y[1]);
-      s.lineTo(x[2], y[2]);
-      s.closePath();
+    // With both sides in one path the windings would cancel. What a cut leaves may have only one of them.
+    for (const facing of cut === null ? [-1] : [-1, 1]) {
+      s.beginPath();
+      for (let t = 0; t < body.triangles.length; t += 3) {
+        const at = [0, 1, 2].map((k) => 3 * body.triangles[t + k] * body.nLevels);
+        const corners = cut === null ? at.map((i) => [body.rest[i], body.rest[i + 1]]) : keptCorners(body.rest, at, cut);
+        if (corners.length < 3) continue;
+        const x = corners.map(([px]) => (0.5 + (px - centre.x) / side) * BLOB);
+        const y = corners.map(([, py]) => (0.5 + (centre.y - py) / side) * BLOB);
+        if (((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])) * facing <= 0) continue;
+        s.moveTo(x[0], y[0]);
+        for (let k = 1; k < x.length; k++) s.lineTo(x[k], y[k]);
+        s.closePath();
+      }
+      s.fill('nonzero');
     }
-    s.fill('nonzero');
     g.globalAlpha = 0.75;
     g.filter = `blur(${BLOB * 0.055}px)`;
     g.drawImage(shadow, 0, 0);
@@ -92,8 +106,6 @@ export class Stage {
     g.filter = 'none';
     g.globalAlpha = 1;
     this.ground.material.map!.needsUpdate = true;
-    this.ground.scale.set(side, side, 1);
-    this.ground.position.set(centre.x, centre.y, box.min.z - 0.03 * radius);
     this.ground.visible = true;
   }
 
@@ -107,4 +119,19 @@ export class Stage {
     this.ground.material.dispose();
     this.key.dispose();
   }
+}
+
+/** The part of a triangle that a cut leaves, seen from above. */
+function keptCorners(rest: Float32Array, at: number[], { normal, offset }: CutPlane): number[][] {
+  const height = at.map((i) => normal[0] * rest[i] + normal[1] * rest[i + 1] + normal[2] * rest[i + 2] - offset);
+  const out: number[][] = [];
+  for (let k = 0; k < 3; k++) {
+    const next = (k + 1) % 3;
+    const [a, b] = [at[k], at[next]];
+    if (height[k] >= 0) out.push([rest[a], rest[a + 1]]);
+    if (height[k] >= 0 === height[next] >= 0) continue;
+    const share = height[k] / (height[k] - height[next]);
+    out.push([0, 1].map((c) => rest[a + c] + share * (rest[b + c] - rest[a + c])));
+  }
+  return out;
 }

@@ -2,7 +2,7 @@
 // the core, the bones.
 
 import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, DynamicDrawUsage, Group, LineBasicMaterial, LineSegments, Mesh, Sphere, type Plane } from 'three';
-import type { Body } from './body';
+import { wallTriangles, type Body } from './body';
 import { SurfaceMaterial, type SharedUniforms, type SurfaceLook } from './materials';
 import { SKIN, SKIN_IN_LIGHT } from './palette';
 import type { Stage } from './stage';
@@ -177,20 +177,6 @@ export class Surfaces {
     this.wire.material.dispose();
     this.group.removeFromParent();
   }
-}
-
-/** Two triangles for every interval of a layer at every open edge. */
-function wallTriangles({ rimEdges, nLevels }: Body, from: number, to: number): Uint32Array {
-  const out = new Uint32Array((rimEdges.length / 2) * (to - from) * 6);
-  let n = 0;
-  for (let e = 0; e < rimEdges.length; e += 2) {
-    for (let l = from; l < to; l++) {
-      const a = rimEdges[e] * nLevels + l, b = rimEdges[e + 1] * nLevels + l;
-      out.set([a, a + 1, b, b, a + 1, b + 1], n);
-      n += 6;
-    }
-  }
-  return out;
 }
 
 /** Outer edges of prisms: those of the skin and of the walls. */

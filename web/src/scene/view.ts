@@ -14,11 +14,11 @@ import { DrawLoop } from './loop';
 import { LumpsView } from './lumps';
 import { MarksView } from './marks';
 import type { SharedUniforms } from './materials';
-import { DEFAULT_OPTIONS, NoWebGL2, type Legend, type MapLegend, type Picked, type SectionArea, type Vec3, type ViewOptions } from './options';
+import { DEFAULT_OPTIONS, NoWebGL2, type Category, type Legend, type MapLegend, type Picked, type SectionArea, type Vec3, type ViewOptions } from './options';
 import { Gizmo, ScaleBar } from './overlay';
 import { BONE, CORE, LUMP, mapOf, mapTextures, PALPATION_STOPS, palpationTexture, type Theme } from './palette';
 import { PalpationVolume } from './palpation';
-import { nearestOnSkin, pickNearest, pickSkin } from './picking';
+import { nearestOnSkin, pickNearest, pickNoSkin, pickSkin, type NoSkin } from './picking';
 import { pictureOf } from './picture';
 import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES, type CameraPose } from './rig';
@@ -213,10 +213,18 @@ export class BodyView {
 
   /** The nearest part of the body under a place of the picture, given in pixels of the window. */
   pick(clientX: number, clientY: number): Picked | null {
-    const { body, cutaway, options } = this;
-    if (!body) return null;
+    return this.body && pickNearest(this.rayAt(clientX, clientY), this.body, this.pickable());
+  }
+
+  /** The part under a place of the picture that is not skin; null if it is skin, or beside the body. */
+  pickNoSkin(clientX: number, clientY: number): NoSkin | null {
+    return this.body && pickNoSkin(this.rayAt(clientX, clientY), this.body, this.pickable());
+  }
+
+  private pickable() {
+    const { cutaway, options } = this;
     const section = cutaway.plane && { section: cutaway.section.section, plane: cutaway.plane };
-    return pickNearest(this.rayAt(clientX, clientY), body, { section, bones: options.bones, isKept: cutaway.isKept() });
+    return { section, bones: options.bones, isKept: cutaway.isKept() };
   }
 
   /** The skin at rest under a place of the picture: it stays where it is while
@@ -390,7 +398,11 @@ export class BodyView {
     if (isMoved) this.colour(body, surfaces);
     if (changed.style) this.style(body, surfaces);
     else if (changed.frame) surfaces.update();
-    if (isMoved || (changed.camera && options.cutaway.axis === 'view')) this.slice(body, surfaces);
+    if (isMoved || (changed.camera && options.cutaway.axis === 'view')) {
+      this.slice(body, surfaces);
+      this.stage.paintGround(body, this.cutaway.plane);
+      this.explain(body);
+    }
     if (isMoved) {
       this.lumps.update(body);
       this.marks.update(body);
@@ -400,7 +412,7 @@ export class BodyView {
   }
 
   private colour(body: Body, surfaces: Surfaces): void {
-    const { options, colouring, shared, state } = this;
+    const { options, colouring, shared } = this;
     const by = options.colourBy;
     if (Colouring.isMap(by)) {
       const values = surfaces.value.array as Float32Array;
@@ -411,12 +423,27 @@ export class BodyView {
       shared.range.value.set(...colouring.range);
       shared.isLog.value = colouring.isLog ? 1 : 0;
     }
-    const legend = colouring.legend(by, state?.layers ?? [], options.cutaway.on, state?.method === 'reference');
-    const key = JSON.stringify(legend);
-    if (key !== this.legendKey) {
-      this.legendKey = key;
-      this.onLegend(legend);
+  }
+
+  /** Says what the colours of the picture are. */
+  private explain(body: Body): void {
+    const { options, colouring, state, cutaway } = this;
+    const isSeenThrough = this.looks(body).some((l) => !l.visible || l.opacity < 1);
+    const isOpen = options.cutaway.on || isSeenThrough;
+    const inside: Category[] = [];
+    if (isOpen && options.bones) {
+      const hasBones = body.boneTriangles.length > 0;
+      inside.push({ name: hasBones ? 'bone' : 'base', colour: BONE });
+      // Bones that stand alone leave a core between them.
+      if (hasBones && options.cutaway.on && cutaway.section.hasCore) inside.push({ name: 'core', colour: CORE });
     }
+    const hasLump = knownLumps(state).length > 0 && (isSeenThrough || (cutaway.area?.lumps ?? 0) > 0);
+    if (options.lumps && hasLump) inside.push({ name: 'lump', colour: LUMP });
+    const legend = colouring.legend(options.colourBy, state?.layers ?? [], isOpen, inside, state?.method === 'reference');
+    const key = JSON.stringify(legend);
+    if (key === this.legendKey) return;
+    this.legendKey = key;
+    this.onLegend(legend);
   }
 
   private looks(body: Body): NamedLook[] {

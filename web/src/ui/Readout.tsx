@@ -178,7 +178,7 @@ function ForceNumber() {
         </span>
         <span ref={depth} class="depth-number" data-testid="depth-number">–</span>
       </p>
-      <p class="held-back" data-on={gain.value < 100 || undefined} role="status">{gain.value < 100 ? t('readout.held_back') : '\u00a0'}</p>
+      <p class="held-back" data-on={gain.value < 100 || undefined} role="status" title={gain.value < 100 ? t('readout.held_back_why') : undefined}>{gain.value < 100 ? t('readout.held_back') : '\u00a0'}</p>
       <p class="sr-only" role="status" aria-live="polite">{spoken}</p>
     </section>
   );

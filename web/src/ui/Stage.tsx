@@ -16,6 +16,7 @@ import { GameBar } from './GameBar';
 import { Icon } from './icons';
 import { LegendBox } from './LegendBox';
 import { MapBox } from './MapBox';
+import { Missed, watchMisses } from './Missed';
 import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
@@ -70,6 +71,7 @@ export function Stage() {
         void homeKey.value;
         hand.forget();
       }),
+      watchMisses(body),
       onMesh((mesh) => body.setMesh(mesh)),
       onMap((map) => body.setMap(map)),
       onFrame((frame) => {
@@ -98,10 +100,10 @@ export function Stage() {
         {isWatching.value && <p class="chip">{t(state.value?.controller == null ? 'control.nobody_chip' : 'control.watching_chip')}</p>}
       </div>
       <div class="stage-bottom">
-        {problem === 'none' && <LegendBox />}
-        {problem === 'none' && <MapBox />}
+        {problem === 'none' && <div class="stage-legends"><MapBox /><LegendBox /></div>}
         <ReplayBar />
       </div>
+      <Missed />
       <Phase />
     </main>
   );
