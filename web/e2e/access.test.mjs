@@ -63,7 +63,7 @@ test('every control can be reached by Tab', async () => {
       return at?.dataset.testid ?? at?.id ?? '';
     }));
   }
-  for (const id of ['scene-picker', 'theme', 'language', 'tab-view', 'colour-by', 'cutaway-toggle', 'body-canvas', 'press-depth']) {
+  for (const id of ['scene-picker', 'theme', 'language', 'tab-view', 'colour-by', 'cutaway-toggle', 'body-canvas', 'press-depth-slider']) {
     assert.ok(seen.has(id), `${id} among ${[...seen]}`);
   }
 });

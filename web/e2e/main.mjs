@@ -5,6 +5,8 @@ import './bars.test.mjs';
 import './cutaway.test.mjs';
 import './game.test.mjs';
 import './map.test.mjs';
+import './lens.test.mjs';
+import './goals.test.mjs';
 import './recording.test.mjs';
 import './scene.test.mjs';
 import './power.test.mjs';

@@ -5,10 +5,13 @@ import './style/controls.css';
 import './style/panels.css';
 import './style/stage.css';
 import './style/own.css';
+import './style/game.css';
 import { effect } from '@preact/signals';
 import { connect, isController, send, state } from './store';
 import { App } from './ui/App';
 import { beginFeedback } from './ui/feedback';
+import { beginGames } from './ui/game';
+import { beginGoals } from './ui/goals';
 import { beginRestoring } from './ui/restore';
 import { neededField, theme } from './ui/settings';
 import { beginLinks } from './ui/share';
@@ -23,6 +26,8 @@ effect(() => {
 
 render(<App />, document.getElementById('app')!);
 beginFeedback();
+beginGoals();
+beginGames();
 beginRestoring();
 beginLinks();
 connect();

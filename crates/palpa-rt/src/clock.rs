@@ -14,17 +14,40 @@ pub trait Clock: Clone + Send + 'static {
     fn now(&self) -> f64;
     /// Waits until a moment, s; returns at once if it has passed. Never returns early.
     fn wait_until(&self, moment: f64);
+    /// Stands still at this moment, s, until it is allowed to go on to a later one. Clocks that cannot stand
+    /// still ignore it.
+    fn stop_at(&self, _moment: f64) {}
+    /// Time for which it has stood still since the last call, s; from now on it goes on from there.
+    fn take_standstill(&self) -> f64 {
+        0.0
+    }
 }
 
 /// The machine's monotonic clock.
 ///
 /// A wait sleeps until `spin` seconds before the moment and spins for the rest. With 0 it never
 /// spins and leaves the core to other threads.
-#[derive(Debug, Clone, Copy)]
+///
+/// The clock can stand still ([`Clock::stop_at`]): then a loop without hardware does not miss the time for
+/// which the machine had no core for it.
+#[derive(Debug, Clone)]
 pub struct RealClock {
     origin: origin::Origin,
     spin: f64,
+    still: Arc<Standstill>,
 }
+
+/// What makes the clock stand still, as the bits of numbers.
+#[derive(Debug)]
+struct Standstill {
+    /// Moment at which it stands still, s.
+    at: AtomicU64,
+    /// Time for which it has stood still in all, s.
+    total: AtomicU64,
+}
+
+/// Between two looks at a clock that stands still, s.
+const STILL_LOOK: f64 = 5e-4;
 
 impl RealClock {
     /// A clock that starts now and spins for the last `spin` seconds of each wait.
@@ -32,14 +55,25 @@ impl RealClock {
         Self {
             origin: origin::Origin::now(),
             spin: spin.max(0.0),
+            still: Arc::new(Standstill {
+                at: AtomicU64::new(f64::INFINITY.to_bits()),
+                total: AtomicU64::new(0),
+            }),
         }
+    }
+
+    fn total_standstill(&self) -> f64 {
+        f64::from_bits(self.still.total.load(Ordering::Acquire))
     }
 }
 
 impl Clock for RealClock {
     #[inline]
     fn now(&self) -> f64 {
-        self.origin.elapsed()
+        // In this order: the moment is moved after the total, so that the clock never goes back.
+        let stops_at = f64::from_bits(self.still.at.load(Ordering::Acquire));
+        let total = self.total_standstill();
+        (self.origin.elapsed() - total).min(stops_at)
     }
 
     fn wait_until(&self, moment: f64) {
@@ -49,11 +83,34 @@ impl Clock for RealClock {
         }
         let asleep_until = moment - self.spin;
         while self.now() < asleep_until {
-            self.origin.sleep_until(asleep_until);
+            let total = self.total_standstill();
+            let stops_at = f64::from_bits(self.still.at.load(Ordering::Acquire));
+            // A clock that stands still is looked at again.
+            let is_still = self.origin.elapsed() - total >= stops_at;
+            let look = if is_still {
+                self.origin.elapsed() + STILL_LOOK
+            } else {
+                0.0
+            };
+            self.origin.sleep_until((asleep_until + total).max(look));
         }
         while self.now() < moment {
             std::hint::spin_loop();
         }
+    }
+
+    fn stop_at(&self, moment: f64) {
+        self.still.at.store(moment.to_bits(), Ordering::Release);
+    }
+
+    fn take_standstill(&self) -> f64 {
+        let stops_at = f64::from_bits(self.still.at.load(Ordering::Acquire));
+        let total = self.total_standstill();
+        let stood = (self.origin.elapsed() - total - stops_at).max(0.0);
+        self.still
+            .total
+            .store((total + stood).to_bits(), Ordering::Release);
+        stood
     }
 }
 
@@ -184,6 +241,29 @@ mod tests {
         }
         clock.wait_until(-1.0);
         clock.wait_until(f64::NAN);
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_goes_on_from_there_and_never_back() {
+        let clock = RealClock::new(0.0);
+        let start = clock.now();
+        clock.stop_at(start + 0.002);
+        RealClock::new(0.0).wait_until(0.02);
+        let still = clock.now();
+        assert!((still - start - 0.002).abs() < 1e-12, "{still}");
+        // Somebody who waits for later goes on waiting, and wakes once it goes on.
+        let other = clock.clone();
+        let waits = std::thread::spawn(move || {
+            other.wait_until(start + 0.004);
+            other.now()
+        });
+        let stood = clock.take_standstill();
+        assert!(stood > 0.015, "{stood}");
+        assert!(clock.now() >= still);
+        clock.stop_at(f64::INFINITY);
+        assert!(waits.join().unwrap() >= start + 0.004);
+        assert!((clock.total_standstill() - stood).abs() < 1e-12);
+        assert!(clock.take_standstill() == 0.0);
     }
 
     #[test]

@@ -88,9 +88,10 @@ impl Engine {
         recorder: &RecorderParams,
     ) -> Result<Self, StartError> {
         let (mut engine, mut servo_loop) = Self::start_driven(tissue, devices, params, recorder)?;
-        let (clock, period, faults) = (engine.clock, params.period, engine.faults.clone());
+        let (clock, faults) = (engine.clock.clone(), engine.faults.clone());
+        let (period, waits) = (params.period, params.time_waits);
         engine.spawn("palpa-servo", params.servo_wish, SMALL_STACK, move |stop| {
-            servo_loop.run(&clock, period, &faults, stop);
+            servo_loop.run(&clock, period, waits, &faults, stop);
         })?;
         Ok(engine)
     }
@@ -143,7 +144,7 @@ impl Engine {
         let (pose_writer, pose_reader) = mailbox([(); 3].map(|()| Box::new(PoseSample::none())));
         let tissue = TissueThread {
             tissue,
-            clock: engine.clock,
+            clock: engine.clock.clone(),
             params: params.tissue,
             poses: pose_reader,
             patches: patch_writer,

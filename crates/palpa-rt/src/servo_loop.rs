@@ -29,6 +29,8 @@ use std::{
 
 /// Largest number of ticks in which the forces ramp down before the devices are released.
 const LAST_TICKS: u32 = 200;
+/// Where time waits for the loop: the time after the moment at which a tick is due, in periods.
+const WAITS_AFTER: f64 = 2.0;
 /// Smallest time between two events about missed deadlines, s.
 const SAY_EVERY: f64 = 0.1;
 
@@ -59,6 +61,15 @@ pub struct ServoLoop {
     pub(crate) speaker: Speaker,
     pub(crate) stats: Arc<LoopStats>,
     pub(crate) now: Now,
+}
+
+/// Lets a clock go on when the loop ends, however it ends.
+struct GoesOn<'a, C: Clock>(&'a C);
+
+impl<C: Clock> Drop for GoesOn<'_, C> {
+    fn drop(&mut self) {
+        self.0.stop_at(f64::INFINITY);
+    }
 }
 
 /// State from tick to tick.
@@ -159,14 +170,17 @@ impl ServoLoop {
     /// Ticks every `period` seconds until `stop` is set, then ramps down.
     ///
     /// If a tick is so late that the next ones are due already, those are skipped; the loop never
-    /// catches up in a burst.
+    /// catches up in a burst. If time `waits`, it stands still a little after each moment at which a tick is due,
+    /// until that tick begins.
     pub(crate) fn run(
         &mut self,
         clock: &impl Clock,
         period: f64,
+        waits: bool,
         faults: &FaultHooks,
         stop: &AtomicBool,
     ) {
+        let _goes_on = GoesOn(clock);
         let start = clock.now();
         self.speaker.say(start, Happening::LoopStarted);
         let mut slot = 0_u64;
@@ -178,17 +192,24 @@ impl ServoLoop {
             }
             slot += 1;
             let due = start + slot as f64 * period;
+            if waits {
+                clock.stop_at(due + WAITS_AFTER * period);
+            }
             clock.wait_until(due);
             if let Some(delay) = faults.take_loop_delay() {
                 self.speaker
                     .say(clock.now(), Happening::Injected(Injection::LoopLate));
+                // Time goes on: the fault shall be felt.
+                clock.stop_at(f64::INFINITY);
                 clock.wait_until(due + delay);
             }
+            let stood = if waits { clock.take_standstill() } else { 0.0 };
             let now = clock.now();
-            // The cast saturates. The value is never negative, because a wait never returns early.
-            let skipped = ((now - due) / period) as u64;
-            slot += skipped;
-            self.tick_once(now, now - due, u32::try_from(skipped).unwrap_or(u32::MAX));
+            // The casts saturate. The values are never negative, because a wait never returns early.
+            slot += ((now - due) / period) as u64;
+            let lateness = now - due + stood;
+            let skipped = (lateness / period) as u64;
+            self.tick_once(now, lateness, u32::try_from(skipped).unwrap_or(u32::MAX));
         }
         self.disarm(clock.now());
         let ticks = self.now.tick;

@@ -25,6 +25,8 @@ use std::{
 /// doubles with each job that panics, and halves with each that does not.
 const FIRST_PAUSE: u64 = 16;
 const LONGEST_PAUSE: u64 = 4096;
+/// Least time between the beginnings of two steps, s.
+const LEAST_DT: f64 = 1e-6;
 
 /// Settings of the tissue thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,7 +177,8 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             let now = self.clock.now();
             // Steps keep a fixed grid while they are short enough; the thread does not catch up
             // after a late step.
-            due = (due + self.params.min_period).max(now);
+            // Later in any case: a clock that stands still would give a step of no time.
+            due = (due + self.params.min_period).max(now + LEAST_DT);
             let elapsed = now - last_start;
             last_start = now;
             // Smoothed, so that one late step does not make the loop expect the next ones late.

@@ -12,14 +12,16 @@ use palpa::live::{machine, notes_of};
 use palpa::one_paragraph;
 use palpa_rt::RecorderParams;
 use palpa_scene::Scene;
-use palpa_viewer::control::{Field, Hand, NoticeKind, NoticeLevel, Phase, Problem, Request};
+use palpa_viewer::control::{
+    Field, Hand, MapSight, NoticeKind, NoticeLevel, Phase, Problem, Request,
+};
 use palpa_viewer::{Answer, Clients, HostFile, Publisher};
 use serde_json::Value;
 
 use crate::bars::Bars;
 use crate::builder::{Builder, Built};
 use crate::drill::Drills;
-use crate::game::Game;
+use crate::game::{Game, GameParams};
 use crate::hand::{goal_of, in_range};
 use crate::history::{History, Origin, Wanted};
 use crate::own::{Folder, Shelf};
@@ -64,6 +66,8 @@ pub(crate) struct Desk {
     builder: Builder,
     tape: Tape,
     game: Option<Game>,
+    /// The results of the last game, as a table.
+    game_table: Option<String>,
     bars: Bars,
     drills: Drills,
     palpation: Palpation,
@@ -98,6 +102,7 @@ impl Desk {
             builder: Builder::new(orders),
             tape: Tape::default(),
             game: None,
+            game_table: None,
             bars: workers.bars,
             drills: Drills::new(params.allows_faults),
             palpation: Palpation::default(),
@@ -227,10 +232,21 @@ impl Desk {
                 self.status.set_field(field);
             }
             Request::ClearMap => self.palpation.clear(),
-            Request::StartGame { seed, n_lumps } => self.start_game(seed, n_lumps)?,
+            Request::StartGame {
+                seed,
+                n_lumps,
+                level,
+                n_rounds,
+            } => self.start_game(GameParams {
+                seed: seed.or(self.seed),
+                n_lumps,
+                level,
+                n_rounds,
+            })?,
+            Request::NextRound => self.next_round()?,
             Request::Mark { point } => self.game()?.mark(in_range(point, "point")?)?,
             Request::Unmark => self.game()?.unmark(),
-            Request::Reveal => self.reveal()?,
+            Request::Reveal => self.reveal(now)?,
             Request::EndGame => self.end_game()?,
             Request::Inject { fault } => {
                 self.drills.check_allowed()?;
@@ -369,7 +385,7 @@ impl Desk {
                 self.describe();
                 self.status.well();
                 if let Some(game) = &mut self.game {
-                    game.begin();
+                    game.begin(Instant::now());
                 }
             }
             Err(error) => self.give_up(&error),
@@ -488,7 +504,7 @@ impl Desk {
         game.context("no lumps are hidden; begin a round first")
     }
 
-    fn start_game(&mut self, seed: Option<u64>, n_lumps: u32) -> anyhow::Result<()> {
+    fn start_game(&mut self, params: GameParams) -> anyhow::Result<()> {
         if self.tape.is_under_way() {
             bail!("a recording is under way; stop it first");
         }
@@ -497,29 +513,54 @@ impl Desk {
             Some(game) => &game.before,
             None => &self.history.wanted().scene,
         };
-        let (game, scene) = Game::hide(&live.world, before, seed.or(self.seed), n_lumps)?;
+        let (game, scene) = Game::start(&live.world, before, params)?;
         if let Some(next) = &mut self.seed {
             *next = next.wrapping_add(1);
         }
-        self.tape.close();
-        live.hand.end_motion();
-        self.status.set_field(Field::None);
         self.game = Some(game);
+        self.hide(scene);
+        Ok(())
+    }
+
+    fn next_round(&mut self) -> anyhow::Result<()> {
+        if self.tape.is_under_way() {
+            bail!("a recording is under way; stop it first");
+        }
+        let live = self.stage.need()?;
+        let game = self.game.as_mut();
+        let game = game.context("no series of rounds is under way")?;
+        let scene = game.next_round(&live.world)?;
+        self.hide(scene);
+        Ok(())
+    }
+
+    /// Builds the scene of a round.
+    fn hide(&mut self, scene: Scene) {
+        self.tape.close();
+        self.end_motion();
+        self.status.set_field(Field::None);
         self.hidden = Some(scene);
         // Hide the scene's own lumps from pages too.
         self.describe();
         self.build();
-        Ok(())
     }
 
-    fn reveal(&mut self) -> anyhow::Result<()> {
+    fn reveal(&mut self, now: Instant) -> anyhow::Result<()> {
         let live = self.stage.need()?;
         let game = self.game.as_mut();
         let game = game.context("no lumps are hidden; begin a round first")?;
         if self.builder.is_building() {
             bail!("the lumps are still being hidden");
         }
-        game.reveal(&live.world);
+        game.reveal(&live.world, &self.palpation, now);
+        let wanted = self.history.wanted();
+        let key = wanted.key.as_deref().unwrap_or("own scene");
+        let changed = if wanted.is_changed() {
+            " (changed)"
+        } else {
+            ""
+        };
+        self.game_table = Some(game.table(&format!("{key}{changed}")));
         // The new mesh shows the stiffness of its lumps.
         self.screen.renew_mesh();
         self.describe();
@@ -549,7 +590,8 @@ impl Desk {
             }
             HostFile::Body if !veil.shows_body_file() => None,
             HostFile::Body => self.stage.live()?.body(),
-            HostFile::Map | HostFile::MapCsv if !veil.shows_map() => None,
+            HostFile::GameCsv => self.game_table.clone().map(Material::Game),
+            HostFile::Map | HostFile::MapCsv if veil.map() != MapSight::Everything => None,
             HostFile::Map | HostFile::MapCsv => {
                 let skin = self.stage.live()?.world.skin.surface().clone();
                 Some(Material::Map(Box::new(self.palpation.whole()), skin))
@@ -618,9 +660,9 @@ impl Desk {
                 is_made = true;
             }
         }
-        let is_hidden = !Veil::of(self.game.as_ref()).shows_map();
+        let sight = Veil::of(self.game.as_ref()).map();
         if self.screen.is_watched()
-            && let Some(map) = self.palpation.news(is_hidden, dt)
+            && let Some(map) = self.palpation.news(sight, dt)
         {
             self.screen.show_map(&map);
         }
@@ -678,7 +720,8 @@ impl Desk {
             },
             is_motion_running: live.is_some_and(|live| live.hand.is_in_motion()),
             recording: self.tape.info(),
-            game: self.game.as_ref().map(Game::info),
+            game: (self.game.as_ref()).map(|game| game.info(Instant::now())),
+            has_game_results: self.game_table.is_some(),
             n_undo: self.history.n_undo() as u32,
             n_redo: self.history.n_redo() as u32,
         });

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use palpa::map::{PalpationMap, Touch};
 use palpa_mesh::{Surface, Vec3};
 use palpa_plot::vtu::Grid;
+use palpa_viewer::control::MapSight;
 use palpa_viewer::wire::{FrameSnapshot, MapSnapshot};
 
 use crate::world::World;
@@ -43,25 +44,38 @@ impl Palpation {
         self.unsent_for = PERIOD;
     }
 
-    /// The map for pages, if it has changed and is due; `dt` seconds after the last call. An empty one while it is
-    /// hidden.
-    pub(crate) fn news(&mut self, is_hidden: bool, dt: f64) -> Option<MapSnapshot> {
+    /// The map for pages, as much as they may see, if that has changed and is due; `dt` seconds after the last
+    /// call.
+    pub(crate) fn news(&mut self, sight: MapSight, dt: f64) -> Option<MapSnapshot> {
         self.unsent_for += dt;
-        let revision = if is_hidden {
-            0
-        } else {
-            1 + self.map.revision()
+        let revision = match sight {
+            MapSight::Nothing => 0,
+            MapSight::Stiffness => 1 + 2 * self.map.revision(),
+            MapSight::Everything => 2 + 2 * self.map.revision(),
         };
         if self.unsent_for < PERIOD || self.sent == revision {
             return None;
         }
         self.sent = revision;
         self.unsent_for = 0.0;
-        Some(if is_hidden {
-            MapSnapshot::default()
-        } else {
-            snapshot(&self.map)
+        Some(match sight {
+            MapSight::Nothing => MapSnapshot::default(),
+            MapSight::Stiffness => MapSnapshot {
+                shares: vec![f32::NAN; self.map.spots().len()],
+                has_finding: 0,
+                finding: [0.0; 3],
+                finding_share: 0.0,
+                ..snapshot(&self.map)
+            },
+            MapSight::Everything => snapshot(&self.map),
         })
+    }
+
+    /// By how much a place of the skin is stiffer than its surroundings, as a share of them; none if too little was
+    /// felt there.
+    pub(crate) fn share_at(&self, point: Vec3, normal: Vec3) -> Option<f64> {
+        let shares = self.map.against_surroundings();
+        Some(self.map.value_at(&point, &normal, shares)?.0)
     }
 
     /// The map for a file, with every spot compared with its surroundings.

@@ -46,6 +46,8 @@ pub(super) enum Material {
     Log(PathBuf, Arc<Ruler>),
     /// The palpation map, and the skin.
     Map(Box<PalpationMap>, Surface),
+    /// The results of a game.
+    Game(String),
     /// The last ticks.
     Ticks(Vec<LateTick>),
 }
@@ -121,7 +123,7 @@ impl Remote {
             (Material::Log(log, _), _) => std::fs::read(log)?,
             (Material::Map(map, _), HostFile::MapCsv) => palpation::table(&map).into_bytes(),
             (Material::Map(map, skin), _) => palpation::grid(&map, &skin)?,
-            (Material::Scene(text), _) => text.into_bytes(),
+            (Material::Scene(text) | Material::Game(text), _) => text.into_bytes(),
             (Material::Archive(scene, _files), _) => packed(&scene)?,
             (Material::Tissue(model, displacements), _) => vtu(model.body(), &displacements)?,
             (Material::Springs(body, displacements), _) => vtu(&body, &displacements)?,

@@ -58,6 +58,10 @@ impl Live {
             scene: &self.world.scene,
             scene_from_device: &frame,
             fine: self.running.looks.current().fine,
+            felt: self
+                .world
+                .ruler
+                .in_scene(self.entry.devices[0].tissue_force),
         };
         let pose = self.hand.advance(&ground, dt, now);
         self.running.target.set_pose(&(frame.inverse() * pose));

@@ -3,7 +3,7 @@
 use anyhow::bail;
 use palpa::Note;
 use palpa_scene::Scene;
-use palpa_viewer::control::{self, Field, LumpInfo};
+use palpa_viewer::control::{self, Field, LumpInfo, MapSight};
 
 use crate::game::Game;
 use crate::publish::shown;
@@ -17,6 +17,8 @@ pub(crate) enum Veil<'a> {
     Drawn {
         /// The scene before they were hidden: the one that pages may see.
         before: &'a Scene,
+        /// What pages may see of the palpation map.
+        map: MapSight,
     },
 }
 
@@ -26,6 +28,7 @@ impl<'a> Veil<'a> {
         match game {
             Some(game) if !game.is_revealed() => Self::Drawn {
                 before: &game.before,
+                map: game.map_sight(),
             },
             _ => Self::Lifted,
         }
@@ -69,16 +72,19 @@ impl<'a> Veil<'a> {
         !self.is_drawn()
     }
 
-    /// Whether the palpation map may be shown: it shows what the hand is to find by itself.
-    pub(crate) fn shows_map(self) -> bool {
-        !self.is_drawn()
+    /// What may be shown of the palpation map: it shows what the hand is to find by itself.
+    pub(crate) fn map(self) -> MapSight {
+        match self {
+            Self::Lifted => MapSight::Everything,
+            Self::Drawn { map, .. } => map,
+        }
     }
 
     /// The scene for the file of the scene.
     pub(crate) fn scene_file(self, scene: &'a Scene) -> &'a Scene {
         match self {
             Self::Lifted => scene,
-            Self::Drawn { before } => before,
+            Self::Drawn { before, .. } => before,
         }
     }
 
@@ -132,7 +138,10 @@ mod tests {
         let left_out = Note::TensionLeftOut;
         let notes = [Note::LevelsTooHigh { max_levels: 9 }, left_out.clone()];
 
-        let drawn = Veil::Drawn { before: &before };
+        let drawn = Veil::Drawn {
+            before: &before,
+            map: MapSight::Nothing,
+        };
         assert!(drawn.scene(&pressed).lumps.is_empty());
         assert_eq!(*drawn.scene_file(&pressed), before);
         assert_eq!(drawn.notes(&notes), [shown(&left_out)]);
@@ -140,6 +149,7 @@ mod tests {
         assert!(drawn.check_field(Field::None).is_ok());
         assert!(drawn.check_recording().is_err());
         assert!(!drawn.shows_body_file() && !drawn.shows_lumps());
+        assert_eq!(drawn.map(), MapSight::Nothing);
 
         let lifted = Veil::Lifted;
         assert_eq!(lifted.scene(&pressed), pressed);
@@ -148,5 +158,6 @@ mod tests {
         assert!(lifted.check_field(Field::VonMises).is_ok());
         assert!(lifted.check_recording().is_ok());
         assert!(lifted.shows_body_file() && lifted.shows_lumps());
+        assert_eq!(lifted.map(), MapSight::Everything);
     }
 }

@@ -5,6 +5,7 @@
 //! the control API's document, and the page's TypeScript types are generated from it.
 
 mod engine;
+mod game;
 mod upload;
 
 use std::fmt;
@@ -17,6 +18,10 @@ use serde_json::Value;
 pub use self::engine::{
     BarProblem, DeviceTrouble, EngineFigures, ErrorBar, EventInfo, EventKind, ForceLimit,
     GrantedInfo, InjectedFault, LawFault, LostRecords, PriorityInfo, Spectrum, StepResult,
+};
+
+pub use self::game::{
+    FoundLump, GameInfo, GameResult, Level, LevelInfo, MapSight, RoundInfo, Score, SeriesInfo,
 };
 
 pub use self::upload::{
@@ -135,14 +140,22 @@ pub enum Request {
     },
     /// Forget what was felt: the palpation map becomes empty.
     ClearMap,
-    /// Start a round of "find the lump": hide lumps at random places.
+    /// Start "find the lump": hide lumps at random places.
     StartGame {
-        /// The same seed hides the lumps at the same places. Without it, a new seed is chosen.
+        /// The same seed, level and numbers give the same rounds. Without it, a new seed is chosen.
         #[serde(default)]
         seed: Option<u64>,
-        /// Number of lumps, 1 to 3.
+        /// Number of lumps in each round, 1 to 3.
         n_lumps: u32,
+        /// Level of all rounds. Without it, each round draws one from the seed.
+        #[serde(default)]
+        level: Option<Level>,
+        /// Number of rounds, 1 to 20.
+        #[serde(default = "one")]
+        n_rounds: u32,
     },
+    /// Hide the lumps of the next round of a series.
+    NextRound,
     /// Mark a place where the user suspects a lump.
     Mark {
         /// A point of the skin at rest, m.
@@ -163,6 +176,10 @@ pub enum Request {
     Restart,
 }
 
+fn one() -> u32 {
+    1
+}
+
 /// A pose of the hand: the tool's tip goes `depth` below `point`, against `normal`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Hand {
@@ -170,8 +187,11 @@ pub struct Hand {
     pub point: Vec3,
     /// Outward normal of the skin at `point`.
     pub normal: Vec3,
-    /// Depth below the skin at rest, m; negative is above the skin.
+    /// Depth below the skin at rest, m; negative is above the skin. With a force, the greatest depth.
     pub depth: f64,
+    /// Force to hold, N, in place of a depth: the hand presses until the tissue pushes back with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<f64>,
 }
 
 /// A change to one key of the scene file.
@@ -396,6 +416,10 @@ pub struct State {
     pub recording: RecordingInfo,
     /// The game, if one is under way.
     pub game: Option<GameInfo>,
+    /// The levels of the game.
+    pub levels: Vec<LevelInfo>,
+    /// Whether `/api/game.csv` has the results of a game.
+    pub has_game_results: bool,
     /// Number of nodes of the body.
     pub n_nodes: u32,
     /// Whether a page may cause faults on purpose.
@@ -527,49 +551,4 @@ pub struct RecordingCurve {
     pub tissue_force: Vec<f64>,
     /// Indices of the points before which ticks are missing: curves are broken there.
     pub gaps: Vec<u32>,
-}
-
-/// A round of "find the lump".
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct GameInfo {
-    /// The seed. The same seed gives the same round again.
-    pub seed: u64,
-    /// Number of hidden lumps.
-    pub n_lumps: u32,
-    /// The user's marks, points of the skin, m.
-    pub marks: Vec<Vec3>,
-    /// Time since the start of the round, s; it stops when the lumps are revealed.
-    pub seconds: f64,
-    /// The result, once the lumps are revealed.
-    pub result: Option<GameResult>,
-}
-
-/// The result of a round.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct GameResult {
-    /// The lumps, each with its mark.
-    pub lumps: Vec<FoundLump>,
-    /// Number of marks that belong to no lump.
-    pub n_stray_marks: u32,
-    /// Largest force used, N.
-    pub max_force: f64,
-    /// Mean force during contact, N.
-    pub mean_force: f64,
-    /// Time in contact, s.
-    pub contact_seconds: f64,
-    /// Share of the accessible skin area that was pressed, 0 to 1.
-    pub covered: f64,
-    /// The places that were pressed: point of the skin (x, y, z, m) and largest force there (N).
-    pub coverage: Vec<[f64; 4]>,
-}
-
-/// A lump and the mark that belongs to it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct FoundLump {
-    /// The lump.
-    pub lump: LumpInfo,
-    /// The point of the skin nearest to its centre, m.
-    pub over: Vec3,
-    /// Distance from that point to the lump's mark, m; null without a mark.
-    pub error: Option<f64>,
 }

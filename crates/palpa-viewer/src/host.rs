@@ -67,6 +67,8 @@ pub enum HostFile {
     Map,
     /// The places of the palpation map (CSV).
     MapCsv,
+    /// Results of the last game, one row for each lump of each round.
+    GameCsv,
     /// The recording (MCAP).
     RecordingLog,
     /// The recording's ticks (CSV).

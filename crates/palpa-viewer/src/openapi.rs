@@ -158,6 +158,7 @@ fn files(generator: &mut SchemaGenerator) -> Value {
         "/api/scene.toml": file("The scene file", "application/toml", "The scene with all defaults written out."),
         "/api/body.vtu": file("The deformed body", "application/xml", "For ParaView and other readers of VTK files."),
         "/api/map.vtu": file("The palpation map", "application/xml", "The skin at rest with the stiffness that was felt, for ParaView and other readers of VTK files."),
+        "/api/game.csv": file("The results of the last game", "text/csv", "One row for each lump of each round that was revealed."),
         "/api/map.csv": file("The places of the palpation map", "text/csv", "One row for each place that was felt."),
         "/api/recording.mcap": file("The recording", "application/octet-stream", "A log for `palpa replay`."),
         "/api/recording.csv": file("The ticks of the recording", "text/csv", "One row for each tick of the 1 kHz loop."),

@@ -48,6 +48,7 @@ pub(crate) fn router(hub: &Arc<Hub>) -> Router {
         .route("/api/body.vtu", get(|hub| file(hub, HostFile::Body)))
         .route("/api/map.vtu", get(|hub| file(hub, HostFile::Map)))
         .route("/api/map.csv", get(|hub| file(hub, HostFile::MapCsv)))
+        .route("/api/game.csv", get(|hub| file(hub, HostFile::GameCsv)))
         .route(
             "/api/recording.mcap",
             get(|hub| file(hub, HostFile::RecordingLog)),
@@ -214,6 +215,7 @@ async fn file(State(hub): Shared, file: HostFile) -> Response {
         HostFile::Body => ("application/xml", "body.vtu"),
         HostFile::Map => ("application/xml", "palpation-map.vtu"),
         HostFile::MapCsv => ("text/csv; charset=utf-8", "palpation-map.csv"),
+        HostFile::GameCsv => ("text/csv; charset=utf-8", "find-the-lump.csv"),
         HostFile::RecordingLog => ("application/octet-stream", "palpa-recording.mcap"),
         HostFile::RecordingCsv => ("text/csv; charset=utf-8", "palpa-recording.csv"),
         HostFile::RecordingCurve => ("application/json", "curve of a recording"),

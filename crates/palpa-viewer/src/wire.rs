@@ -9,7 +9,7 @@
 use std::fmt::Write as _;
 
 /// Increased with every change of a field.
-pub const SNAPSHOT_VERSION: u32 = 4;
+pub const SNAPSHOT_VERSION: u32 = 5;
 
 /// A type that a snapshot can hold.
 trait Wire {
@@ -173,6 +173,10 @@ snapshot! {
         displacement_unit: f64,
         /// Displacements of the nodes: x, y, z of each in turn.
         displacements: Vec<i16>,
+        /// Vertices of the skin in contact, ascending.
+        contacts: Vec<u32>,
+        /// Pressure of the tool on each of them, Pa.
+        contact_pressures: Vec<f32>,
         /// Field in `field_values`: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest
         /// stretch.
         field: u32,

@@ -191,6 +191,63 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/game.csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The results of the last game */
+        get: {
+            parameters: {
+                query?: never;
+                header?: never;
+                path?: never;
+                cookie?: never;
+            };
+            requestBody?: never;
+            responses: {
+                /** @description One row for each lump of each round that was revealed. */
+                200: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content: {
+                        "text/csv": unknown;
+                    };
+                };
+                /** @description There is no such file yet. */
+                404: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description The file cannot be made. The text says why. */
+                500: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+                /** @description Too many files are being made. */
+                503: {
+                    headers: {
+                        [name: string]: unknown;
+                    };
+                    content?: never;
+                };
+            };
+        };
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/map.csv": {
         parameters: {
             query?: never;
@@ -1356,18 +1413,32 @@ export interface components {
             type: "clear_map";
         } | {
             /**
+             * @description Level of all rounds. Without it, each round draws one from the seed.
+             * @default null
+             */
+            level: components["schemas"]["Level"] | null;
+            /**
              * Format: uint32
-             * @description Number of lumps, 1 to 3.
+             * @description Number of lumps in each round, 1 to 3.
              */
             n_lumps: number;
             /**
+             * Format: uint32
+             * @description Number of rounds, 1 to 20.
+             * @default 1
+             */
+            n_rounds: number;
+            /**
              * Format: uint64
-             * @description The same seed hides the lumps at the same places. Without it, a new seed is chosen.
+             * @description The same seed, level and numbers give the same rounds. Without it, a new seed is chosen.
              * @default null
              */
             seed: number | null;
             /** @constant */
             type: "start_game";
+        } | {
+            /** @constant */
+            type: "next_round";
         } | {
             /** @description A point of the skin at rest, m. */
             point: number[];
@@ -1627,13 +1698,55 @@ export interface components {
         FoundLump: {
             /**
              * Format: double
-             * @description Distance from that point to the lump's mark, m; null without a mark.
+             * @description Depth of its centre below the skin, m.
+             */
+            depth: number;
+            /**
+             * Format: double
+             * @description Distance from the mark to the point over the lump, along the skin at rest, m; null without a
+             *     mark.
              */
             error?: number | null;
+            /**
+             * Format: double
+             * @description How much stiffer than its surroundings the skin over the lump was felt, as a share; null if
+             *     too little was felt there.
+             */
+            felt?: number | null;
+            /** @description Whether the skin over the lump was pressed. */
+            is_explored: boolean;
+            /** @description Whether the lump was found: the distance is not above `tolerance`. */
+            is_found: boolean;
+            /** @description Whether mark and lump lie on opposite sides of the body: the skin faces away from each other. */
+            is_other_side: boolean;
             /** @description The lump. */
             lump: components["schemas"]["LumpInfo"];
+            /**
+             * Format: uint32
+             * @description Its mark, an index into the marks; null without one.
+             */
+            mark?: number | null;
+            /** @description The outward normal of the skin there. */
+            normal: number[];
             /** @description The point of the skin nearest to its centre, m. */
             over: number[];
+            /** @description The shortest path along the skin from the mark to the point over the lump, m. */
+            path: number[][];
+            /**
+             * Format: double
+             * @description Its radius, m.
+             */
+            radius: number;
+            /**
+             * Format: double
+             * @description Young's modulus in multiples of that of the layer around its centre.
+             */
+            times: number;
+            /**
+             * Format: double
+             * @description Largest distance that counts as found, m.
+             */
+            tolerance: number;
         };
         /** @description A scene of the gallery. */
         GalleryEntry: {
@@ -1642,8 +1755,12 @@ export interface components {
             /** @description Name in English. A page may have a translation for the key. */
             name: string;
         };
-        /** @description A round of "find the lump". */
+        /** @description A game of "find the lump": one round or a series of them. */
         GameInfo: {
+            /** @description Whether lumps may lie on the side that faces away from the press point, and there is one. */
+            is_either_side: boolean;
+            /** @description The level of the round. */
+            level: components["schemas"]["Level"];
             /** @description The user's marks, points of the skin, m. */
             marks: number[][];
             /**
@@ -1660,9 +1777,11 @@ export interface components {
             seconds: number;
             /**
              * Format: uint64
-             * @description The seed. The same seed gives the same round again.
+             * @description The seed of the round. With the level, it gives the same round again.
              */
             seed: number;
+            /** @description The series to which the round belongs. */
+            series: components["schemas"]["SeriesInfo"];
         };
         /** @description The result of a round. */
         GameResult: {
@@ -1675,7 +1794,7 @@ export interface components {
             coverage: number[][];
             /**
              * Format: double
-             * @description Share of the accessible skin area that was pressed, 0 to 1.
+             * @description Share of the skin area under which lumps may be hidden that was pressed, 0 to 1.
              */
             covered: number;
             /** @description The lumps, each with its mark. */
@@ -1692,9 +1811,21 @@ export interface components {
             mean_force: number;
             /**
              * Format: uint32
+             * @description Number of lumps that were found.
+             */
+            n_found: number;
+            /**
+             * Format: uint32
+             * @description Number of contacts with the skin, each from touching to lifting.
+             */
+            n_presses: number;
+            /**
+             * Format: uint32
              * @description Number of marks that belong to no lump.
              */
             n_stray_marks: number;
+            /** @description The score. */
+            score: components["schemas"]["Score"];
         };
         /** @description Scheduling that a thread requested, and the system's answer. */
         GrantedInfo: {
@@ -1716,9 +1847,14 @@ export interface components {
         Hand: {
             /**
              * Format: double
-             * @description Depth below the skin at rest, m; negative is above the skin.
+             * @description Depth below the skin at rest, m; negative is above the skin. With a force, the greatest depth.
              */
             depth: number;
+            /**
+             * Format: double
+             * @description Force to hold, N, in place of a depth: the hand presses until the tissue pushes back with it.
+             */
+            force?: number | null;
             /** @description Outward normal of the skin at `point`. */
             normal: number[];
             /** @description A point of the skin at rest, m. */
@@ -1766,6 +1902,23 @@ export interface components {
         };
         /** @description Unit of the lengths in a file. */
         LengthUnit: "m" | "cm" | "mm" | "in";
+        /** @description How hard a round is. */
+        Level: "easy" | "medium" | "hard";
+        /** @description A level: the ranges from which its lumps are drawn, all values equally likely. */
+        LevelInfo: {
+            /** @description Least and largest thickness of the tissue between the skin and the top of a lump, m. */
+            cover: number[];
+            /** @description Whether lumps may lie on all sides of the body; otherwise on the side of the press point. */
+            is_either_side: boolean;
+            /** @description The level. */
+            level: components["schemas"]["Level"];
+            /** @description What the palpation map shows while lumps are hidden. */
+            map: components["schemas"]["MapSight"];
+            /** @description Least and largest radius, m. */
+            radius: number[];
+            /** @description Least and largest Young's modulus, in multiples of that of the layer around the centre. */
+            times: number[];
+        };
         /** @description Records that were lost because a ring was full. */
         LostRecords: "ticks" | "steps" | "events";
         /** @description The shape of a lump. Lengths in m. */
@@ -1812,6 +1965,8 @@ export interface components {
              */
             stiffness: number;
         };
+        /** @description What the palpation map shows while lumps are hidden. */
+        MapSight: "nothing" | "stiffness" | "everything";
         /** @description The messages of the server to a client, besides snapshots. */
         Message: (components["schemas"]["Hello"] & {
             /** @constant */
@@ -1966,6 +2121,71 @@ export interface components {
              */
             id?: number | null;
         };
+        /** @description A round whose lumps are revealed. */
+        RoundInfo: {
+            /** @description Its level. */
+            level: components["schemas"]["Level"];
+            /** @description The user's marks, points of the skin, m. */
+            marks: number[][];
+            /** @description The result, without the places that were pressed and the paths along the skin. */
+            result: components["schemas"]["GameResult"];
+            /**
+             * Format: double
+             * @description Time from the start to the result, s.
+             */
+            seconds: number;
+            /**
+             * Format: uint64
+             * @description The seed of the round.
+             */
+            seed: number;
+        };
+        /** @description The score of a round: four parts of 0 to 25 points, and a total of 0 to 100. */
+        Score: {
+            /**
+             * Format: uint32
+             * @description For the area explored.
+             */
+            area: number;
+            /**
+             * Format: uint32
+             * @description For the largest force.
+             */
+            force: number;
+            /**
+             * Format: uint32
+             * @description For the number of presses.
+             */
+            presses: number;
+            /**
+             * Format: uint32
+             * @description For the time.
+             */
+            time: number;
+            /**
+             * Format: uint32
+             * @description The sum of the parts, times lumps found over lumps hidden or marks set, whichever is more.
+             */
+            total: number;
+        };
+        /** @description A series of rounds. */
+        SeriesInfo: {
+            /** @description The level of all rounds; null if each round drew its own. */
+            level?: components["schemas"]["Level"] | null;
+            /**
+             * Format: uint32
+             * @description Number of rounds.
+             */
+            n_rounds: number;
+            /** @description The rounds whose lumps are revealed, in their order. */
+            rounds: components["schemas"]["RoundInfo"][];
+            /**
+             * Format: uint64
+             * @description The seed. The same seed gives the same series again; of a single round it is that of the
+             *     round.
+             */
+            seed: number;
+        };
         /**
          * @description Amplitude spectrum of the commanded force over about the last second. Each axis is transformed for
          *     itself, without its mean and with Hann's window; an amplitude is the norm over the three axes. A
@@ -2009,6 +2229,8 @@ export interface components {
              * @description Largest depth that a page should offer, m.
              */
             greatest_depth: number;
+            /** @description Whether `/api/game.csv` has the results of a game. */
+            has_game_results: boolean;
             /** @description Pose of the hand over the place that the scene presses. */
             home: components["schemas"]["Hand"];
             /** @description Whether the scene was changed since it was loaded. */
@@ -2017,6 +2239,8 @@ export interface components {
             is_motion_running: boolean;
             /** @description The layers, from the skin down. */
             layers: components["schemas"]["LayerInfo"][];
+            /** @description The levels of the game. */
+            levels: components["schemas"]["LevelInfo"][];
             /** @description The lumps at their places at rest; empty during a game. */
             lumps: components["schemas"]["LumpInfo"][];
             /**
@@ -2221,9 +2445,12 @@ export type InjectedFault = components['schemas']['InjectedFault'];
 export type LawFault = components['schemas']['LawFault'];
 export type LayerInfo = components['schemas']['LayerInfo'];
 export type LengthUnit = components['schemas']['LengthUnit'];
+export type Level = components['schemas']['Level'];
+export type LevelInfo = components['schemas']['LevelInfo'];
 export type LostRecords = components['schemas']['LostRecords'];
 export type LumpForm = components['schemas']['LumpForm'];
 export type LumpInfo = components['schemas']['LumpInfo'];
+export type MapSight = components['schemas']['MapSight'];
 export type Message = components['schemas']['Message'];
 export type Method = components['schemas']['Method'];
 export type Note = components['schemas']['Note'];
@@ -2236,6 +2463,9 @@ export type Problem = components['schemas']['Problem'];
 export type RecordingCurve = components['schemas']['RecordingCurve'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type Reply = components['schemas']['Reply'];
+export type RoundInfo = components['schemas']['RoundInfo'];
+export type Score = components['schemas']['Score'];
+export type SeriesInfo = components['schemas']['SeriesInfo'];
 export type Spectrum = components['schemas']['Spectrum'];
 export type State = components['schemas']['State'];
 export type StepResult = components['schemas']['StepResult'];

@@ -1,6 +1,6 @@
 // Made from crates/palpa-viewer/src/wire.rs by its tests; do not edit.
 
-export const SNAPSHOT_VERSION = 4;
+export const SNAPSHOT_VERSION = 5;
 
 class Reader {
   private at = 0;
@@ -120,6 +120,10 @@ export interface FrameSnapshot {
   displacement_unit: number;
   /** Displacements of the nodes: x, y, z of each in turn. */
   displacements: Int16Array;
+  /** Vertices of the skin in contact, ascending. */
+  contacts: Uint32Array;
+  /** Pressure of the tool on each of them, Pa. */
+  contact_pressures: Float32Array;
   /** Field in `field_values`: 0 none, 1 von Mises stress (Pa), 2 pressure (Pa), 3 largest stretch. */
   field: number;
   /** Field value that 0 stands for. */
@@ -153,6 +157,8 @@ function readFrameSnapshot(r: Reader): FrameSnapshot {
     limits: r.u32(),
     displacement_unit: r.f64(),
     displacements: r.i16s(),
+    contacts: r.u32s(),
+    contact_pressures: r.f32s(),
     field: r.u32(),
     field_min: r.f64(),
     field_max: r.f64(),

@@ -2,12 +2,12 @@
 // the tool is to be.
 
 import type { Request } from '../connection';
-import type { BodyView, Vec3 } from '../scene';
+import type { BodyView, Picked } from '../scene';
 import { Gamepads } from './gamepad';
 import { PointerHand } from './pointer';
 import { Sender } from './sender';
 import { SteppingHand } from './stepping';
-import type { HandSettings, Held, Place, Target } from './target';
+import { DEPTH_STEP, FORCE_STEP, type HandSettings, type Held, type Place, type Target } from './target';
 
 /** Greatest height above the skin, as a depth, m. */
 const HIGHEST = -0.03;
@@ -16,7 +16,7 @@ const DEEPEST_SHARE = 3;
 
 export class HandControl implements Held {
   onTarget: (target: Target | null) => void = () => {};
-  onMark: (point: Vec3) => void = () => {};
+  onMark: (picked: Picked) => void = () => {};
   /** The greatest depth that the tissue allows at the tool, m, as the engine says. */
   deepest = Infinity;
   settings: HandSettings;
@@ -55,7 +55,7 @@ export class HandControl implements Held {
 
   /** Whether the tool is at the greatest depth. */
   get isDeepest(): boolean {
-    return this.target !== null && this.target.depth >= this.greatestDepth() - 1e-9;
+    return this.target !== null && this.target.force === undefined && this.target.depth >= this.greatestDepth() - 1e-9;
   }
 
   /** Another body: keys begin at its home, not where the last one was pressed. */
@@ -63,8 +63,8 @@ export class HandControl implements Held {
     this.stepping.lastPlace = null;
   }
 
-  goTo({ point, normal, depth }: Target): void {
-    this.target = { point, normal, depth };
+  goTo({ point, normal, depth, force }: Target): void {
+    this.target = force === undefined ? { point, normal, depth } : { point, normal, depth, force };
     this.stepping.lastPlace = { point, normal };
     this.onTarget(this.target);
     this.sender.goTo(this.target);
@@ -89,8 +89,18 @@ export class HandControl implements Held {
     return Math.min(Math.max(depth, HIGHEST), this.greatestDepth());
   }
 
-  mark(point: Vec3): void {
-    this.onMark(point);
+  pressed({ point, normal }: Place): Target {
+    const { pressDepth, pressForce } = this.settings;
+    return pressForce === null ? { point, normal, depth: pressDepth } : { point, normal, depth: this.greatestDepth(), force: pressForce };
+  }
+
+  deepened(target: Target, steps: number): Target {
+    if (target.force === undefined) return { ...target, depth: this.limited(target.depth + steps * DEPTH_STEP) };
+    return { ...target, force: Math.min(Math.max(target.force + steps * FORCE_STEP, 0), this.settings.greatestForce) };
+  }
+
+  mark(picked: Picked): void {
+    this.onMark(picked);
   }
 
   dispose(): void {

@@ -1,10 +1,8 @@
 // The hand by mouse and finger: press, stroke, wheel, shift-drag, and clicks that mark.
 
 import { wheelSteps } from '../scene/gestures';
-import type { Held } from './target';
+import { DEPTH_STEP, type Held, type Target } from './target';
 
-/** Depth of a notch of the wheel, m. */
-const WHEEL_STEP = 0.0005;
 /** A click that marks moves no farther than this, px. */
 const CLICK_REACH = 6;
 /** The tool comes over the place where the pointer has rested for this time, ms: the mesh is refined there, which
@@ -13,10 +11,10 @@ const DWELL = 60;
 
 interface Drag {
   id: number;
-  /** Depth of the press, m. */
-  depth: number;
-  /** Where a shift-drag began, px and m; null without one. */
-  shiftFrom: { x: number; y: number; depth: number } | null;
+  /** Depth of the press, m, or the force that it holds, N. */
+  aim: Pick<Target, 'depth' | 'force'>;
+  /** Where a shift-drag began, px, and the target then; null without one. */
+  shiftFrom: { x: number; y: number; target: Target } | null;
   /** From the cursor to the pressed place, px: shift-drags move the cursor away from it. */
   off: { x: number; y: number };
 }
@@ -39,23 +37,26 @@ export class PointerHand {
 
   /** A pointer goes down; true if the hand takes it. */
   press(event: PointerEvent): boolean {
-    const { view, settings: { mode, enabled, pressDepth } } = this.hand;
+    const { view, settings: { mode, enabled } } = this.hand;
     window.clearTimeout(this.dwell);
     if (event.button !== 0 || event.ctrlKey || mode === 'orbit') return false;
     const { pointerId: id, clientX: x, clientY: y } = event;
-    const at = view.pickRest(x, y);
-    if (!at) return false;
-    view.canvas.focus({ preventScroll: true });
     if (mode === 'mark') {
+      if (!view.pick(x, y)) return false;
+      view.canvas.focus({ preventScroll: true });
       this.click = { id, x, y };
       return true;
     }
+    const at = view.pickRest(x, y);
+    if (!at) return false;
+    view.canvas.focus({ preventScroll: true });
     if (!enabled) return false;
     event.preventDefault();
     view.canvas.setPointerCapture(id);
-    const depth = event.shiftKey ? 0 : pressDepth;
-    this.drag = { id, depth, shiftFrom: event.shiftKey ? { x, y, depth } : null, off: { x: 0, y: 0 } };
-    this.hand.goTo({ ...at, depth });
+    const pressed = this.hand.pressed(at);
+    const target = !event.shiftKey ? pressed : pressed.force === undefined ? { ...at, depth: 0 } : { ...pressed, force: 0 };
+    this.drag = { id, aim: aimOf(target), shiftFrom: event.shiftKey ? { x, y, target } : null, off: { x: 0, y: 0 } };
+    this.hand.goTo(target);
     return true;
   }
 
@@ -63,9 +64,9 @@ export class PointerHand {
   turn(event: WheelEvent): void {
     const { target } = this.hand;
     if (!target) return;
-    const depth = this.hand.limited(target.depth + wheelSteps(event) * WHEEL_STEP);
-    if (this.drag) this.drag.depth = depth;
-    this.hand.goTo({ ...target, depth });
+    const deeper = this.hand.deepened(target, wheelSteps(event));
+    if (this.drag) this.drag.aim = aimOf(deeper);
+    this.hand.goTo(deeper);
   }
 
   letGo(): void {
@@ -84,9 +85,9 @@ export class PointerHand {
     }
     if (event.shiftKey) {
       // Down presses deeper; without Shift the depth returns.
-      drag.shiftFrom ??= { x: event.clientX, y: event.clientY, depth: target.depth };
-      const depth = drag.shiftFrom.depth + (event.clientY - drag.shiftFrom.y) * view.metresPerPixel();
-      this.hand.goTo({ ...target, depth: this.hand.limited(depth) });
+      drag.shiftFrom ??= { x: event.clientX, y: event.clientY, target };
+      const steps = ((event.clientY - drag.shiftFrom.y) * view.metresPerPixel()) / DEPTH_STEP;
+      this.hand.goTo({ ...this.hand.deepened(drag.shiftFrom.target, steps), point: target.point, normal: target.normal });
       return;
     }
     if (drag.shiftFrom) {
@@ -96,7 +97,8 @@ export class PointerHand {
     }
     // Beside the body the tool stays at the last place.
     const at = view.pickRest(event.clientX + drag.off.x, event.clientY + drag.off.y);
-    this.hand.goTo({ ...(at ?? target), depth: drag.depth });
+    const { point, normal } = at ?? target;
+    this.hand.goTo({ point, normal, ...drag.aim });
   }
 
   private up(event: PointerEvent): void {
@@ -105,7 +107,7 @@ export class PointerHand {
       this.click = null;
       if (event.type !== 'pointerup' || Math.hypot(event.clientX - x, event.clientY - y) > CLICK_REACH) return;
       const at = this.hand.view.pick(event.clientX, event.clientY);
-      if (at?.part === 'skin') this.hand.mark(at.point);
+      if (at) this.hand.mark(at);
       return;
     }
     if (this.drag?.id === event.pointerId) this.hand.lift();
@@ -122,4 +124,8 @@ export class PointerHand {
     const cursor = isOn ? 'crosshair' : 'grab';
     if (view.canvas.style.cursor !== cursor) view.canvas.style.cursor = cursor;
   }
+}
+
+function aimOf({ depth, force }: Target): Pick<Target, 'depth' | 'force'> {
+  return force === undefined ? { depth } : { depth, force };
 }

@@ -41,10 +41,10 @@ export class Sender {
       this.schedule(wait);
       return;
     }
-    const { point, normal, depth } = this.target;
+    const { point, normal, depth, force } = this.target;
     this.sentAt = performance.now();
     this.isDirty = false;
-    this.send({ type: 'hand', point: [...point], normal: [...normal], depth });
+    this.send({ type: 'hand', point: [...point], normal: [...normal], depth, ...(force !== undefined && { force }) });
     this.schedule(MOST_WAIT);
   }
 

@@ -6,8 +6,6 @@ import { HOVER, type Held, type Place, type Target } from './target';
 /** Steps of the arrow keys, without and with Shift, m. */
 const STEP = 0.002;
 const STEP_FAR = 0.01;
-/** Depth of Page Up and Page Down, m. */
-const DEPTH_STEP = 0.0005;
 /** Speed of a gamepad's stick pushed all the way, m/s. */
 const STICK_SPEED = 0.06;
 /** Depth of a trigger pulled all the way, in press depths. */
@@ -50,7 +48,7 @@ export class SteppingHand {
   /** Does what a key says; false if it says nothing to the hand. */
   private isUsed({ key, shiftKey, repeat }: KeyboardEvent): boolean {
     const { hand } = this;
-    const { enabled, mode, pressDepth } = hand.settings;
+    const { enabled, mode } = hand.settings;
     if (key === 'Escape') {
       const wasHeld = hand.target !== null;
       hand.lift();
@@ -58,7 +56,7 @@ export class SteppingHand {
     }
     if (mode === 'mark' && key === 'Enter') {
       const at = hand.target ?? hand.view.home;
-      if (at) hand.mark(at.point);
+      if (at) hand.mark({ point: at.point, normal: at.normal, part: 'skin' });
       return at !== null;
     }
     if (!enabled || this.isTaken()) return false;
@@ -69,11 +67,13 @@ export class SteppingHand {
     if (!from) return key === ' ';
     if (arrow) {
       const step = shiftKey ? STEP_FAR : STEP;
-      hand.goTo({ ...this.stepped(from, arrow[0] * step, arrow[1] * step), depth: from.depth });
+      const { point, normal } = this.stepped(from, arrow[0] * step, arrow[1] * step);
+      hand.goTo({ ...from, point, normal });
     } else if (deeper) {
-      hand.goTo({ ...from, depth: hand.limited(from.depth + deeper * DEPTH_STEP) });
+      hand.goTo(hand.deepened(from, deeper));
     } else if (!repeat) {
-      hand.goTo({ ...from, depth: from.depth > 0 ? HOVER : pressDepth });
+      const { point, normal } = from;
+      hand.goTo(from.depth > 0 ? { point, normal, depth: HOVER } : hand.pressed(from));
     }
     return true;
   }

@@ -1,6 +1,6 @@
 // Where the hand is to be, and how the inputs say so.
 
-import type { BodyView, Vec3 } from '../scene';
+import type { BodyView, Picked, Vec3 } from '../scene';
 
 /** A place of the skin at rest, m, and the outward normal there. */
 export interface Place {
@@ -9,13 +9,19 @@ export interface Place {
 }
 
 export interface Target extends Place {
-  /** Depth below the skin at rest, m; negative above it. */
+  /** Depth below the skin at rest, m; negative above it. With a force, the greatest depth. */
   depth: number;
+  /** Force to hold, N, in place of the depth. */
+  force?: number;
 }
 
 export interface HandSettings {
   /** m. */
   pressDepth: number;
+  /** Force that a press holds, N; null to press to a depth. */
+  pressForce: number | null;
+  /** The largest force that the device gives, N. */
+  greatestForce: number;
   mode: 'press' | 'orbit' | 'mark';
   /** Whether this page controls. */
   enabled: boolean;
@@ -25,6 +31,10 @@ export interface HandSettings {
 
 /** Depth of a tool that is held over the skin without pressing, m. */
 export const HOVER = -0.003;
+
+/** A step of the wheel and of keys: of the depth, m, and of the force, N. */
+export const DEPTH_STEP = 0.0005;
+export const FORCE_STEP = 0.1;
 
 /** The hand as mouse, keys and gamepad see it. */
 export interface Held {
@@ -37,5 +47,9 @@ export interface Held {
   lift(): void;
   /** The nearest depth that is allowed, m. */
   limited(depth: number): number;
-  mark(point: Vec3): void;
+  /** A place to be pressed, to the depth or with the force of the settings. */
+  pressed(place: Place): Target;
+  /** A target that presses more, by `steps` of depth or of force. */
+  deepened(target: Target, steps: number): Target;
+  mark(picked: Picked): void;
 }

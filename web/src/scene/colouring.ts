@@ -38,6 +38,9 @@ export class Colouring {
     } else if (by === 'displacement' && frame) {
       const { displacements: d, displacement_unit: unit } = frame;
       for (let i = 0; i < out.length; i++) out[i] = unit * Math.sqrt(d[3 * i] * d[3 * i] + d[3 * i + 1] * d[3 * i + 1] + d[3 * i + 2] * d[3 * i + 2]);
+    } else if (by === 'contact') {
+      out.fill(rest);
+      frame?.contacts.forEach((vertex, k) => (out[vertex * body.nLevels] = frame.contact_pressures[k]));
     } else if (field && frame && frame.field === field.number && frame.field_values.length === out.length) {
       const scale = (frame.field_max - frame.field_min) / 65535;
       const values = frame.field_values;
@@ -63,7 +66,7 @@ export class Colouring {
       [this.min, this.max] = fixed ?? (high > low ? [low, high] : [0.9 * low, 1.1 * high + 1e-9]);
     } else if (fixed) {
       [this.min, this.max] = fixed;
-    } else if (by === 'displacement') {
+    } else if (by === 'displacement' || by === 'contact') {
       this.high = Math.max(extremes(values)[1], this.high * fade, leastSpan);
       [this.min, this.max] = [0, niceUp(this.high)];
     } else {

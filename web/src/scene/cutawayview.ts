@@ -26,6 +26,8 @@ interface Slice {
   layers: boolean[];
   bones: boolean;
   lumps: LumpInfo[];
+  /** Where the tool is, and its axis; null before the first frame. */
+  tool: { tip: Vector3; axis: Vector3 } | null;
 }
 
 export class CutawayView {
@@ -37,6 +39,8 @@ export class CutawayView {
   private readonly clip = new Plane();
   private readonly frame = new Lines(1.2);
   private cut: Cut | null = null;
+  /** Whether a user moves the plane, which otherwise follows the tool. */
+  private isMovable = true;
   private areaKey = '';
   /** Areas of the section; null while nothing is cut. */
   area: SectionArea | null = null;
@@ -54,10 +58,11 @@ export class CutawayView {
     return this.cut?.plane ?? null;
   }
 
-  /** Whether a point is on the side of the plane that stays. */
+  /** Whether a point is on the side of the plane that stays. A plane that follows the tool goes to where the tool
+   * presses, so nothing counts as cut away. */
   isKept(): (p: Vector3) => boolean {
     const { plane } = this;
-    if (!plane) return () => true;
+    if (!plane || !this.isMovable) return () => true;
     const [x, y, z] = plane.normal;
     return (p) => x * p.x + y * p.y + z * p.z >= plane.offset;
   }
@@ -67,7 +72,7 @@ export class CutawayView {
   }
 
   /** Cuts the body as it lies now. */
-  slice(body: Body, { cutaway, values, layers, bones, lumps }: Slice): void {
+  slice(body: Body, { cutaway, values, layers, bones, lumps, tool }: Slice): void {
     this.section.group.visible = this.frame.visible = cutaway.on;
     if (!cutaway.on) {
       this.cut = null;
@@ -77,7 +82,8 @@ export class CutawayView {
       this.areaKey = '';
       return;
     }
-    this.cut = cutOf(cutaway, body.box, this.rig.axes().forward);
+    this.cut = cutOf(cutaway, body.box, this.rig.axes().forward, tool);
+    this.isMovable = cutaway.axis !== 'tool';
     const { plane, corners } = this.cut;
     clippingPlane(plane, this.clip);
     if (this.planes.length === 0) this.planes.push(this.clip);
@@ -106,8 +112,9 @@ export class CutawayView {
   placeGrip(size: Vector2, position: number): void {
     const { cut, grip } = this;
     const { element } = grip;
-    if (element.hidden !== !cut) element.hidden = !cut;
-    if (!cut) return;
+    const isHidden = !cut || !this.isMovable;
+    if (element.hidden !== isHidden) element.hidden = isHidden;
+    if (!cut || isHidden) return;
     const toScreen = (p: Vector3) => {
       const q = p.clone().project(this.rig.camera);
       return { x: (0.5 + 0.5 * q.x) * size.x, y: (0.5 - 0.5 * q.y) * size.y };

@@ -2,6 +2,8 @@
 
 export { BodyView } from './view';
 export { DEFAULT_OPTIONS, NoWebGL2 } from './options';
+export type { LensPicture } from './lens';
+export type { Probed } from './probe';
 export type { MapKind } from './palpation';
 export type { Legend, MapLegend, Picked, SectionArea, Vec3, ViewOptions } from './options';
 export type { NoSkin } from './picking';

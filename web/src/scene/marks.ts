@@ -1,15 +1,22 @@
-// Marks of a game on the skin: numbered pins, and dots coloured by the force pressed there.
+// A game on the skin: numbered pins for marks, dots coloured by the force pressed there, and in its result the paths from
+// marks to lumps, with a ring round each lump in which a mark counts as found.
 
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Points, ShaderMaterial, SphereGeometry, Sprite,
-  SpriteMaterial, SRGBColorSpace, Vector3,
+  SpriteMaterial, SRGBColorSpace, Vector3, type Vector2,
 } from 'three';
-import type { GameInfo } from '../generated/api';
+import type { FoundLump, GameInfo } from '../generated/api';
 import type { Body } from './body';
+import { Lines } from './lines';
 import type { Vec3 } from './options';
 import { nearestOnSkin } from './picking';
 
 const PIN = '#e08a1e';
+const FOUND = '#1b9e4b';
+const MISSED = '#d42f2f';
+/** Corners of a ring, and by how much lines lie above the skin, m. */
+const RING = 48;
+const ABOVE = 4e-4;
 const UP = new Vector3(0, 1, 0);
 
 const DOTS_VERTEX = /* glsl */ `
@@ -49,6 +56,8 @@ export class MarksView {
   private readonly labels: SpriteMaterial[] = [];
   private readonly dots: Points<BufferGeometry, ShaderMaterial>;
   private pins: Anchor[] = [];
+  /** Each line twice: on the skin, and faint through the body. */
+  private readonly lines = { path: [new Lines(3), new Lines(3)], found: [new Lines(2.2), new Lines(2.2)], missed: [new Lines(2.2), new Lines(2.2)] };
   private key = '';
 
   constructor() {
@@ -59,10 +68,21 @@ export class MarksView {
     this.dots.renderOrder = 5;
     this.group.add(this.dots);
     this.dots.visible = false;
+    for (const [name, pair] of Object.entries(this.lines)) {
+      const colour = name === 'path' ? PIN : name === 'found' ? FOUND : MISSED;
+      pair.forEach((lines, i) => {
+        lines.style(colour, i === 0 ? 1 : 0.3);
+        lines.material.depthTest = i === 0;
+        lines.material.uniforms.pull.value = 2e-3;
+        lines.renderOrder = 9 - i;
+        lines.visible = false;
+        this.group.add(lines);
+      });
+    }
   }
 
   set(game: GameInfo | null, body: Body, hasCoverage: boolean): void {
-    const key = JSON.stringify([game?.marks, game?.result?.coverage.length, body.id, hasCoverage]);
+    const key = JSON.stringify([game?.marks, game?.result?.lumps, game?.result?.coverage.length, body.id, hasCoverage]);
     if (key === this.key) return;
     this.key = key;
     for (const { object } of this.pins) object.removeFromParent();
@@ -73,6 +93,7 @@ export class MarksView {
       this.group.add(object);
       return { object, triangle, shares };
     });
+    this.draw(game?.result?.lumps ?? [], body);
     const coverage = hasCoverage ? (game?.result?.coverage ?? []) : [];
     this.dots.visible = coverage.length > 0;
     if (coverage.length === 0) return;
@@ -81,6 +102,18 @@ export class MarksView {
     this.dots.geometry = new BufferGeometry();
     this.dots.geometry.setAttribute('position', new BufferAttribute(Float32Array.from(coverage.flatMap((c) => c.slice(0, 3))), 3));
     this.dots.geometry.setAttribute('force', new BufferAttribute(Float32Array.from(coverage, (c) => c[3] / most), 1));
+  }
+
+  private draw(lumps: readonly FoundLump[], body: Body): void {
+    const paths: number[] = [], rings = { found: [] as number[], missed: [] as number[] };
+    for (const lump of lumps) {
+      join(lump.path.map((p) => lifted(body, p as Vec3)), paths);
+      join(ring(body, lump), lump.is_found ? rings.found : rings.missed);
+    }
+    const show = (pair: Lines[], segments: number[]) => pair.forEach((lines) => lines.show(Float32Array.from(segments), segments.length));
+    show(this.lines.path, paths);
+    show(this.lines.found, rings.found);
+    show(this.lines.missed, rings.missed);
   }
 
   private pin(i: number): Group {
@@ -130,8 +163,9 @@ export class MarksView {
     }
   }
 
-  /** Keeps the size on the screen at any distance; `pixel` is a pixel's size, m. */
-  scale(pixel: number): void {
+  /** Keeps the size on the screen at any distance; `pixel` is a pixel's size, m, and `size` that of the picture in pixels. */
+  scale(pixel: number, size: Vector2): void {
+    for (const lines of Object.values(this.lines).flat()) (lines.material.uniforms.size.value as Vector2).copy(size);
     for (const { object } of this.pins) {
       const [stem, head, label] = object.children;
       const height = 26 * pixel;
@@ -151,7 +185,31 @@ export class MarksView {
       label.map?.dispose();
       label.dispose();
     }
+    for (const lines of Object.values(this.lines).flat()) lines.dispose();
     this.dots.geometry.dispose();
     this.dots.material.dispose();
   }
+}
+
+/** A point of the skin at rest, a little above it. */
+function lifted(body: Body, p: Vec3): Vec3 {
+  const { point, normal } = nearestOnSkin(body, p);
+  return [0, 1, 2].map((c) => point[c] + ABOVE * normal[c]) as Vec3;
+}
+
+/** The ring on the skin within which a mark finds a lump. */
+function ring(body: Body, { over, normal, tolerance }: FoundLump): Vec3[] {
+  const n = new Vector3(...(normal as Vec3));
+  const u = new Vector3(Math.abs(n.x) < 0.8 ? 1 : 0, Math.abs(n.x) < 0.8 ? 0 : 1, 0).cross(n).normalize();
+  const v = n.clone().cross(u);
+  return Array.from({ length: RING + 1 }, (_, i) => {
+    const angle = (2 * Math.PI * i) / RING;
+    const at = new Vector3(...(over as Vec3)).addScaledVector(u, tolerance * Math.cos(angle)).addScaledVector(v, tolerance * Math.sin(angle));
+    return lifted(body, at.toArray() as Vec3);
+  });
+}
+
+/** Appends the segments of a line. */
+function join(points: Vec3[], out: number[]): void {
+  for (let i = 0; i + 1 < points.length; i++) out.push(...points[i], ...points[i + 1]);
 }

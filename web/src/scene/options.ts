@@ -26,12 +26,14 @@ export interface ViewOptions {
   wireframe: boolean;
   shadows: boolean;
   /** `position` runs from 0 to 1 through the body. */
-  cutaway: { on: boolean; axis: 'x' | 'y' | 'z' | 'view'; position: number; flip: boolean };
+  cutaway: { on: boolean; axis: 'x' | 'y' | 'z' | 'view' | 'tool'; position: number; flip: boolean };
   tool: boolean;
   force: boolean;
   coverage: boolean;
   /** What the palpation map shows on the skin. */
   palpation: MapKind;
+  /** The enlarged section through the tool, while it touches. */
+  lens: boolean;
   reducedMotion: boolean;
 }
 
@@ -50,6 +52,7 @@ export const DEFAULT_OPTIONS: ViewOptions = {
   force: true,
   coverage: true,
   palpation: 'surroundings',
+  lens: true,
   reducedMotion: false,
 };
 

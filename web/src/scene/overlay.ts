@@ -1,4 +1,4 @@
-// Overlays of the picture: scale bar, axes, and the grip of the cutaway plane.
+// Overlays of the picture: scale bar, axes, the number of the force, and the grip of the cutaway plane.
 
 import type { Vector3 } from 'three';
 import './overlay.css';
@@ -67,6 +67,29 @@ export class Gizmo {
       order.push([depth, group]);
     }
     for (const [, group] of order.sort((a, b) => b[0] - a[0])) this.root.append(group);
+  }
+}
+
+/** The size of the force at the end of its arrow. */
+export class ForceTag {
+  readonly element = document.createElement('div');
+  private shown = '';
+
+  constructor() {
+    this.element.className = 'scene-force';
+    this.element.setAttribute('aria-hidden', 'true');
+    this.element.hidden = true;
+  }
+
+  /** `at` in px; null hides it. */
+  update(at: { x: number; y: number } | null, force: number): void {
+    const shown = at === null ? '' : `${force.toFixed(2)} N ${Math.round(at.x)} ${Math.round(at.y)}`;
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.element.hidden = at === null;
+    if (at === null) return;
+    this.element.textContent = `${force.toFixed(2)} N`;
+    this.element.style.transform = `translate(${Math.round(at.x) + 6}px, ${Math.round(at.y) - 20}px)`;
   }
 }
 

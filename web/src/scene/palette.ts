@@ -98,6 +98,7 @@ const MAP_OF: Record<Quantity, MapName> = {
   von_mises: 'ylgnbu',
   pressure: 'vik',
   stretch: 'ylgnbu',
+  contact: 'ylgnbu',
   stiffness: 'cividis',
 };
 
@@ -144,6 +145,8 @@ function mapTexture(colours: string[]): DataTexture {
 export interface Theme {
   /** Colours of the background in its middle and at its corners. */
   background: [string, string];
+  /** Background of the lens. */
+  lens: string;
   shadow: number;
   shadowOpacity: number;
   /** Lines between layers. */
@@ -158,6 +161,7 @@ export interface Theme {
 export const THEMES: Record<'light' | 'dark', Theme> = {
   light: {
     background: ['#fbfbfa', '#e3e6e8'],
+    lens: '#f4f6f7',
     shadow: 0x1e2a33,
     shadowOpacity: 0.34,
     outline: '#2a1c17',
@@ -168,6 +172,7 @@ export const THEMES: Record<'light' | 'dark', Theme> = {
   },
   dark: {
     background: ['#2b3036', '#14171a'],
+    lens: '#20252a',
     shadow: 0x000000,
     shadowOpacity: 0.6,
     outline: '#1a100d',

@@ -28,6 +28,7 @@ export const QUANTITIES = {
   von_mises: { field: { name: 'von_mises', number: 1 }, rest: 0, leastSpan: 50, unit: 'Pa', typed: ['kPa', 1e3], showsLumps: true },
   pressure: { field: { name: 'pressure', number: 2 }, rest: 0, leastSpan: 50, unit: 'Pa', typed: ['kPa', 1e3], showsLumps: true },
   stretch: { field: { name: 'stretch', number: 3 }, rest: 1, leastSpan: 0.01, unit: '', typed: ['', 1], showsLumps: true },
+  contact: { field: null, rest: 0, leastSpan: 200, unit: 'Pa', typed: ['kPa', 1e3], showsLumps: false },
   stiffness: { field: null, rest: 0, leastSpan: 0, unit: 'Pa', typed: ['kPa', 1e3], showsLumps: true },
 } satisfies Record<string, QuantityInfo>;
 

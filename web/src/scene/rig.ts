@@ -48,16 +48,36 @@ export class CameraRig {
   /** Fits the whole box into the picture, seen from a direction. */
   fit(box: Box3, direction: Vector3, animate: boolean): void {
     const centre = box.getCenter(new Vector3());
-    const azimuth = Math.atan2(direction.y, direction.x);
-    const elevation = Math.asin(MathUtils.clamp(direction.z, -1, 1));
     const distance = this.distanceFor(box, centre, direction);
     this.fitted = distance;
     this.radius = 0.5 * box.getSize(new Vector3()).length();
+    this.turnTo(direction, centre, distance, animate);
+  }
+
+  /** Looks at a point from a direction, so that a length around it (m) fits into the picture. */
+  lookAt(point: Vector3, direction: Vector3, span: number): void {
+    const needed = span / (2 * Math.tan(MathUtils.degToRad(FIELD_OF_VIEW / 2)) * Math.min(1, this.camera.aspect));
+    this.turnTo(direction, point, MathUtils.clamp(needed, 0.08 * this.fitted, 1.2 * this.fitted), true);
+  }
+
+  /** Turns half round an axis through a point, as one turns an arm over. */
+  turnOver(axis: Vector3, middle: Vector3): void {
+    const [azimuth, elevation, distance, target] = this.turn?.to ?? [this.azimuth, this.elevation, this.distance, this.target];
+    const over = (v: Vector3): Vector3 => axis.clone().multiplyScalar(2 * axis.dot(v)).sub(v);
+    const c = Math.cos(elevation);
+    const direction = over(new Vector3(c * Math.cos(azimuth), c * Math.sin(azimuth), Math.sin(elevation)));
+    this.turnTo(direction, over(target.clone().sub(middle)).add(middle), distance, true);
+  }
+
+  private turnTo(direction: Vector3, centre: Vector3, distance: number, animate: boolean): void {
+    const azimuth = Math.atan2(direction.y, direction.x);
+    const most = Math.PI / 2 - 0.002;
+    const elevation = MathUtils.clamp(Math.asin(MathUtils.clamp(direction.z, -1, 1)), -most, most);
     if (animate && !this.reducedMotion) {
       const near = this.azimuth + MathUtils.euclideanModulo(azimuth - this.azimuth + Math.PI, 2 * Math.PI) - Math.PI;
       this.turn = {
         from: [this.azimuth, this.elevation, this.distance, this.target.clone()],
-        to: [near, elevation, distance, centre],
+        to: [near, elevation, distance, centre.clone()],
         since: null,
       };
     } else {

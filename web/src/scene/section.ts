@@ -96,8 +96,8 @@ export class Section {
   private state = new Uint8Array(0);
   private readonly corner = new Float64Array(6 * 16);
 
-  /** Cuts the deformed body. Areas include the layers that are not shown. */
-  cut(body: Body, plane: CutPlane, values: SectionValues, shown: readonly boolean[]): void {
+  /** Cuts the deformed body, or only its columns `near` a place. Areas include the layers that are not shown. */
+  cut(body: Body, plane: CutPlane, values: SectionValues, shown: readonly boolean[], near?: { middle: readonly number[]; radius: number }): void {
     const { positions: x, rest, nLevels, nVertices, triangles, intervalLayer, rimBits, nNodes } = body;
     for (const list of [this.positions, this.rest, this.values, this.layers, this.indices, this.outline, this.wire]) list.length = 0;
     this.area = body.layerStart.map(() => 0);
@@ -109,6 +109,11 @@ export class Section {
     // prisms are skipped.
     for (let v = 0, node = 0; v < nVertices; v++) {
       let sides = 0;
+      if (near && (x[3 * node] - near.middle[0]) ** 2 + (x[3 * node + 1] - near.middle[1]) ** 2 + (x[3 * node + 2] - near.middle[2]) ** 2 > near.radius ** 2) {
+        state[v] = 0;
+        node += nLevels;
+        continue;
+      }
       for (let l = 0; l < nLevels; l++, node++) {
         const h = nx * x[3 * node] + ny * x[3 * node + 1] + nz * x[3 * node + 2] - plane.offset;
         height[node] = h;
@@ -119,7 +124,7 @@ export class Section {
     const nodes = [0, 0, 0, 0, 0, 0];
     for (let t = 0; 3 * t < triangles.length; t++) {
       const va = triangles[3 * t], vb = triangles[3 * t + 1], vc = triangles[3 * t + 2];
-      if ((state[va] | state[vb] | state[vc]) !== 3) continue;
+      if ((state[va] | state[vb] | state[vc]) !== 3 || state[va] === 0 || state[vb] === 0 || state[vc] === 0) continue;
       const a = va * nLevels, b = vb * nLevels, c = vc * nLevels;
       let above = (height[a] >= 0 ? 1 : 0) | (height[b] >= 0 ? 2 : 0) | (height[c] >= 0 ? 4 : 0);
       for (let i = 0; i < nLevels - 1; i++) {

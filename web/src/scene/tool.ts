@@ -1,4 +1,4 @@
-// The tool, the operated point at its tip, and the arrow of the force.
+// The tool, the operated point at its tip, and the arrow of the force beside it.
 
 import {
   BufferGeometry, CanvasTexture, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, MeshMatcapMaterial,
@@ -6,7 +6,7 @@ import {
 } from 'three';
 import type { ContactShape } from '../generated/api';
 import type { FrameSnapshot } from '../generated/wire';
-import { toolGeometry } from './toolshapes';
+import { reachOf, toolGeometry } from './toolshapes';
 
 /** Colours of the thesis's program. */
 const OPERATED_POINT = 0x00c8d7;
@@ -14,6 +14,11 @@ const FORCE = 0xe5252a;
 /** Forces below this are noise and have no arrow, N. */
 const LEAST_FORCE = 0.01;
 const UP = new Vector3(0, 1, 0);
+/** How much of the tool is seen: in the air, and in contact, where it would hide the dent. */
+const OPACITY = 0.62;
+const OPACITY_IN_CONTACT = 0.24;
+/** From the tool's axis to the arrow, in reaches of the tool. */
+const BESIDE = 1.35;
 
 export class ToolView {
   readonly group = new Group();
@@ -27,10 +32,13 @@ export class ToolView {
   private longest = 0.1;
   private maxForce = 10;
   private readonly force = new Vector3();
+  private readonly tip = new Vector3();
   private isNode = false;
+  /** From the tool's axis to its side, m. */
+  private reach = 0;
 
   constructor() {
-    this.tool = new Mesh(new BufferGeometry(), new MeshMatcapMaterial({ matcap: metal(), transparent: true, opacity: 0.62 }));
+    this.tool = new Mesh(new BufferGeometry(), new MeshMatcapMaterial({ matcap: metal(), transparent: true, opacity: OPACITY }));
     this.tool.renderOrder = 8;
     this.tool.castShadow = true;
     this.tool.frustumCulled = false;
@@ -51,6 +59,7 @@ export class ToolView {
     this.maxForce = maxForce > 0 ? maxForce : 10;
     this.longest = 0.85 * bodyRadius;
     this.isNode = form === null;
+    this.reach = form === null ? 0 : reachOf(form);
     const key = JSON.stringify([form, bodyRadius.toFixed(3)]);
     if (key === this.form) return;
     this.form = key;
@@ -63,8 +72,9 @@ export class ToolView {
     this.tool.position.fromArray(frame.tool);
     this.tool.quaternion.fromArray(frame.orientation);
     this.point.position.fromArray(frame.tool);
-    this.arrow.position.fromArray(frame.tool);
+    this.tip.fromArray(frame.tool);
     this.force.fromArray(frame.force);
+    this.tool.material.opacity = frame.n_active > 0 ? OPACITY_IN_CONTACT : OPACITY;
   }
 
   options(tool: boolean, force: boolean): void {
@@ -73,17 +83,21 @@ export class ToolView {
   }
 
   /** Gives point and arrow the same size on the screen at any distance; `pixel` is
-   * a pixel's size, m. */
-  scale(pixel: number): void {
+   * a pixel's size, m, and `right` the direction to the right in the picture. Returns the end of the arrow
+   * and the force; null without an arrow. */
+  scale(pixel: number, right: Vector3): { at: Vector3; force: number } | null {
     this.point.scale.setScalar(pixel * (this.isNode ? 7 : 5));
     const force = this.force.length();
-    if (force <= LEAST_FORCE) return;
+    if (!this.arrow.visible || force <= LEAST_FORCE) return null;
+    // Beside the tool, which would hide it.
+    this.arrow.position.copy(this.tip).addScaledVector(right, BESIDE * this.reach + (this.isNode ? 0 : 6 * pixel));
     const head = pixel * 13;
     const length = Math.max((force / this.maxForce) * this.longest, 1.25 * head);
     this.arrow.quaternion.setFromUnitVectors(UP, this.force.clone().divideScalar(force));
     this.shaft.scale.set(pixel * 1.8, length - 0.8 * head, pixel * 1.8);
     this.head.position.y = length - head;
     this.head.scale.set(0.38 * head, head, 0.38 * head);
+    return { at: this.arrow.position.clone().addScaledVector(this.force, length / force), force };
   }
 
   dispose(): void {

@@ -103,6 +103,20 @@ export function reshaped({ radius = '10 mm', friction }: ToolTable, shape: ToolS
   return { shape, ...begin(radius), ...(isContact && friction !== undefined && { friction }) };
 }
 
+/** From a tool's axis to its side, m. */
+export function reachOf(form: ContactShape): number {
+  switch (form.kind) {
+    case 'capsule':
+      return form.radius + form.length / 2;
+    case 'box':
+      return Math.max(form.size[0], form.size[1]) / 2;
+    case 'fingertip':
+      return Math.max(form.radii[0], form.radii[1]);
+    default:
+      return form.radius;
+  }
+}
+
 /** A tool as it is drawn. */
 export function toolGeometry(form: ContactShape, length: number): BufferGeometry {
   const draw = TOOL_SHAPES[form.kind].draw as Draw<ContactShape>;

@@ -1,6 +1,6 @@
 // The view of a body: keeps what the page gives it, and draws when something has changed.
 
-import { PCFShadowMap, Raycaster, Vector2, Vector3, WebGLRenderer } from 'three';
+import { PCFShadowMap, Quaternion, Raycaster, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { State } from '../generated/api';
 import type { FrameSnapshot, MapSnapshot, MeshSnapshot } from '../generated/wire';
 import { isSoftwareWebGL } from '../machine';
@@ -10,16 +10,18 @@ import { CutawayView } from './cutawayview';
 import { looksSame } from './frames';
 import { Gestures, type Claims } from './gestures';
 import { knownLumps, layerLooks, sectionOpacity, type NamedLook } from './looks';
+import { LensView, type LensPicture } from './lens';
 import { DrawLoop } from './loop';
 import { LumpsView } from './lumps';
 import { MarksView } from './marks';
 import type { SharedUniforms } from './materials';
 import { DEFAULT_OPTIONS, NoWebGL2, type Category, type Legend, type MapLegend, type Picked, type SectionArea, type Vec3, type ViewOptions } from './options';
-import { Gizmo, ScaleBar } from './overlay';
+import { ForceTag, Gizmo, ScaleBar } from './overlay';
 import { BONE, CORE, LUMP, mapOf, mapTextures, PALPATION_STOPS, palpationTexture, type Theme } from './palette';
 import { PalpationVolume } from './palpation';
 import { nearestOnSkin, pickNearest, pickNoSkin, pickSkin, type NoSkin } from './picking';
 import { pictureOf } from './picture';
+import { Probe, type Probed } from './probe';
 import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES, type CameraPose } from './rig';
 import { Stage } from './stage';
@@ -41,6 +43,8 @@ export class BodyView {
   onSection: (area: SectionArea | null) => void = () => {};
   onCutaway: (position: number) => void = () => {};
   onMapLegend: (legend: MapLegend | null) => void = () => {};
+  onLens: (lens: LensPicture | null) => void = () => {};
+  onProbe: (probed: Probed | null) => void = () => {};
   onFirstBody: () => void = () => {};
   /** Pictures follow each other more slowly, so that the engine keeps up; or no longer. */
   onYield: (yields: boolean) => void = () => {};
@@ -55,6 +59,7 @@ export class BodyView {
   private readonly loop: DrawLoop;
   private readonly scaleBar = new ScaleBar();
   private readonly gizmo: Gizmo;
+  private readonly forceTag = new ForceTag();
   private readonly tool = new ToolView();
   private readonly marks = new MarksView();
   private readonly colouring = new Colouring();
@@ -67,6 +72,8 @@ export class BodyView {
   private readonly cutaway: CutawayView;
   private readonly materials: Materials = new Map();
   private readonly lumps: LumpsView;
+  private readonly lens: LensView;
+  private readonly probe = new Probe();
   private readonly resizer: ResizeObserver;
   private readonly stop = new AbortController();
   private readonly raycaster = new Raycaster();
@@ -82,6 +89,8 @@ export class BodyView {
   private map: MapSnapshot | null = null;
   private isFirst = true;
   private isHeld = false;
+  private isLensOpen = false;
+  private lensTimer = 0;
   private size = new Vector2(1, 1);
   private legendKey = '';
   private mapLegendKey = '';
@@ -114,10 +123,11 @@ export class BodyView {
     });
     this.cutaway.onArea = (area) => this.onSection(area);
     this.lumps = new LumpsView(this.shared, this.stage, this.cutaway.planes);
+    this.lens = new LensView(this.shared);
 
     root.className = 'scene-root';
     this.gizmo = new Gizmo((axis, sign) => this.look(new Vector3().setComponent(axis, sign).add(new Vector3(0, -0.001, 0)).normalize()));
-    root.append(canvas, this.scaleBar.element, this.gizmo.element, this.cutaway.grip.element);
+    root.append(canvas, this.scaleBar.element, this.gizmo.element, this.forceTag.element, this.cutaway.grip.element);
     container.append(root);
     this.gestures = new Gestures(canvas, this.rig);
     this.stage.scene.add(this.tool.group, this.marks.group, this.lumps.group);
@@ -194,6 +204,22 @@ export class BodyView {
     this.look(side === 'home' ? this.homeSide() : SIDES[side]);
   }
 
+  /** Turns the camera to a place of the skin, so that a length around it (m) is seen. */
+  lookAtPoint(point: Vec3, normal: Vec3, span: number): void {
+    const direction = new Vector3(...normal);
+    // From above or below, aslant: the picture keeps its right and left.
+    direction.y -= 0.35 * Math.abs(direction.z);
+    this.rig.lookAt(new Vector3(...point), direction.normalize(), span);
+  }
+
+  /** Shows the other side of the body: half a turn round its longest axis. */
+  turnRound(): void {
+    if (!this.body) return;
+    const size = this.body.box.getSize(new Vector3()).toArray();
+    const axis = new Vector3().setComponent(size.indexOf(Math.max(...size)), 1);
+    this.rig.turnOver(axis, this.body.centre);
+  }
+
   /** The camera relative to the body; null while there is none. */
   get camera(): CameraPose | null {
     return this.body && this.rig.pose(this.body.centre);
@@ -225,6 +251,13 @@ export class BodyView {
     const { cutaway, options } = this;
     const section = cutaway.plane && { section: cutaway.section.section, plane: cutaway.plane };
     return { section, bones: options.bones, isKept: cutaway.isKept() };
+  }
+
+  /** Puts the probe at a point at rest; null takes it away. */
+  setProbe(picked: Pick<Picked, 'point' | 'part'> | null): void {
+    this.probe.set(picked?.point ?? null, picked?.part === 'skin');
+    if (picked === null) this.onProbe(null);
+    this.loop.invalidate('style');
   }
 
   /** The skin at rest under a place of the picture: it stays where it is while
@@ -267,6 +300,7 @@ export class BodyView {
     this.stop.abort();
     this.loop.stop();
     window.clearTimeout(this.meshTimer);
+    window.clearTimeout(this.lensTimer);
     this.resizer.disconnect();
     this.gestures.dispose();
     this.quality.dispose();
@@ -274,6 +308,7 @@ export class BodyView {
     for (const material of this.materials.values()) material.dispose();
     this.cutaway.dispose();
     this.lumps.dispose();
+    this.lens.dispose();
     this.marks.dispose();
     this.tool.dispose();
     this.stage.dispose();
@@ -380,13 +415,25 @@ export class BodyView {
     if (!size.equals(this.size)) renderer.setSize(this.size.x, this.size.y, false);
     const pixel = this.metresPerPixel();
     this.tool.options(options.tool, options.force);
-    this.tool.scale(pixel);
-    this.marks.scale(pixel);
+    const arrow = this.tool.scale(pixel, this.rig.axes().right);
+    this.marks.scale(pixel, this.size);
     this.cutaway.size = this.size;
     renderer.render(stage.scene, this.rig.camera);
+    if (this.isLensOpen && this.frame) this.onLens(this.lens.draw(renderer, this.size, this.theme.lens, this.frame));
+    if (this.probe.isOn && body && surfaces) {
+      const values = Colouring.isMap(options.colourBy) ? (surfaces.value.array as Float32Array) : null;
+      this.onProbe(this.probe.read(body, this.frame, values, (p) => this.onScreen(p)));
+    }
+    this.forceTag.update(arrow && this.onScreen(arrow.at), arrow?.force ?? 0);
     this.scaleBar.update(pixel);
     this.gizmo.update(this.rig.axes());
     this.cutaway.placeGrip(this.size, options.cutaway.position);
+  }
+
+  /** A point in the picture, px from its upper left corner. */
+  private onScreen(point: Vector3): { x: number; y: number } {
+    const at = point.clone().project(this.rig.camera);
+    return { x: (0.5 + 0.5 * at.x) * this.size.x, y: (0.5 - 0.5 * at.y) * this.size.y };
   }
 
   /** Takes over the changes since the last picture. */
@@ -398,11 +445,13 @@ export class BodyView {
     if (isMoved) this.colour(body, surfaces);
     if (changed.style) this.style(body, surfaces);
     else if (changed.frame) surfaces.update();
-    if (isMoved || (changed.camera && options.cutaway.axis === 'view')) {
+    const { axis } = options.cutaway;
+    if (isMoved || (changed.camera && (axis === 'view' || axis === 'tool'))) {
       this.slice(body, surfaces);
       this.stage.paintGround(body, this.cutaway.plane);
       this.explain(body);
     }
+    if (isMoved || changed.camera) this.magnify(body, surfaces);
     if (isMoved) {
       this.lumps.update(body);
       this.marks.update(body);
@@ -465,19 +514,22 @@ export class BodyView {
       bone: BONE,
       wire: { on: options.wireframe, colour: wire, opacity: theme.wireOpacity },
     });
-    const { section } = cutaway;
-    section.material.layers(looks.map((l) => l.colour), looks.map(sectionOpacity), looks.map((l) => l.name));
-    section.material.uniforms.isMapped.value = isMapped ? 1 : 0;
-    section.material.uniforms.isPlain.value = by === 'layer' ? 1 : 0;
-    section.colours(body.boneTriangles.length > 0 ? CORE : BONE, BONE, outline, wire, theme.wireOpacity, options.wireframe);
-    cutaway.frameColour = theme.plane;
     const lumps = options.lumps ? knownLumps(state) : [];
-    section.material.lumps(lumps, LUMP);
+    for (const section of [cutaway.section, this.lens.section]) {
+      section.material.layers(looks.map((l) => l.colour), looks.map(sectionOpacity), looks.map((l) => l.name));
+      section.material.uniforms.isMapped.value = isMapped ? 1 : 0;
+      section.material.uniforms.isPlain.value = by === 'layer' ? 1 : 0;
+      section.colours(body.boneTriangles.length > 0 ? CORE : BONE, BONE, outline, wire, theme.wireOpacity, options.wireframe);
+      section.material.lumps(lumps, LUMP);
+    }
+    cutaway.frameColour = theme.plane;
     const isSeenThrough = looks.some((l) => !l.visible || l.opacity < 1);
     this.lumps.set(isSeenThrough ? lumps : [], body, LUMP, Boolean(state?.game?.result));
     this.marks.set(state?.game ?? null, body, options.coverage);
     this.feel(body);
-    if (state) this.tool.set(state.tool.shape ?? null, state.max_force, body.radius);
+    if (!state) return;
+    this.tool.set(state.tool.shape ?? null, state.max_force, body.radius);
+    this.lens.set(state.tool.shape ?? null);
   }
 
   /** Shows what was felt, and its legend. */
@@ -496,16 +548,38 @@ export class BodyView {
     this.onMapLegend(legend);
   }
 
-  private slice(body: Body, surfaces: Surfaces): void {
+  /** The values and layers that sections show. */
+  private shownInSections(body: Body, surfaces: Surfaces) {
     const { options, state } = this;
     const by = options.colourBy;
     const nodes = Colouring.isMap(by) && by !== 'stiffness' ? (surfaces.value.array as Float32Array) : null;
-    this.cutaway.slice(body, {
-      cutaway: options.cutaway,
+    return {
       values: { nodes, prisms: by === 'stiffness' ? body.stiffness : null },
       layers: this.looks(body).map((l) => l.visible),
       bones: options.bones,
       lumps: knownLumps(state),
-    });
+    };
+  }
+
+  private slice(body: Body, surfaces: Surfaces): void {
+    const { options, frame } = this;
+    const tool = frame && { tip: new Vector3().fromArray(frame.tool), axis: new Vector3(0, 0, 1).applyQuaternion(new Quaternion().fromArray(frame.orientation)) };
+    this.cutaway.slice(body, { cutaway: options.cutaway, tool, ...this.shownInSections(body, surfaces) });
+  }
+
+  /** Opens the lens while the tool touches, and cuts what it shows. */
+  private magnify(body: Body, surfaces: Surfaces): void {
+    const { frame, lens, options } = this;
+    window.clearTimeout(this.lensTimer);
+    const isOpen = options.lens && frame !== null && lens.isDue(frame, performance.now());
+    if (isOpen) {
+      lens.update(body, frame, this.shownInSections(body, surfaces), this.rig.axes());
+      // It closes by itself after the last contact.
+      if (frame.n_active === 0) this.lensTimer = window.setTimeout(() => this.loop.invalidate('style'), LensView.stays + 50);
+    } else if (this.isLensOpen) {
+      lens.close();
+      this.onLens(null);
+    }
+    this.isLensOpen = isOpen;
   }
 }

@@ -3,16 +3,18 @@
 import { apiUrl } from '../connection';
 import { t } from '../i18n';
 import type { MapLegend } from '../scene';
-import { askAloud, isController, isHiding } from '../store';
+import { askAloud, isController } from '../store';
 import { mapLegend } from './body';
 import { Button, Segmented } from './controls';
 import { formatNumber } from './quantity';
-import { show, wanted } from './settings';
+import { mapSight, show, view } from './settings';
 
 export function MapBox() {
-  const kind = wanted.value.palpation;
+  const kind = view.value.palpation;
   const shown = mapLegend.value;
-  if (isHiding.value) return null;
+  const sight = mapSight.value;
+  if (sight === 'nothing') return null;
+  const kinds = sight === 'everything' ? (['off', 'absolute', 'surroundings'] as const) : (['off', 'absolute'] as const);
   return (
     <figure class="legend map-box" aria-label={t('map.title')} data-testid="map-box" data-n={shown?.n ?? 0} data-finding={shown?.finding ?? ''}>
       <figcaption>{t('map.title')}</figcaption>
@@ -20,7 +22,7 @@ export function MapBox() {
         label={t('map.title')}
         isLabelHidden
         value={kind}
-        options={(['off', 'absolute', 'surroundings'] as const).map((value) => ({ value, label: t(`map.${value}`), testid: `map-${value}` }))}
+        options={kinds.map((value) => ({ value, label: t(`map.${value}`), testid: `map-${value}` }))}
         onChange={(palpation) => show({ palpation })}
       />
       {kind !== 'off' && (shown === null ? <p class="map-hint">{t('map.empty')}</p> : <Felt shown={shown} />)}
@@ -43,8 +45,8 @@ function Felt({ shown }: { shown: MapLegend }) {
       {shown.nForgotten > 0 && <p class="map-hint">{t('map.forgotten', { n: shown.nForgotten })}</p>}
       <div class="map-tools">
         <Button kind="quiet" disabled={!isController.value} onClick={() => void askAloud({ type: 'clear_map' })} testid="map-clear">{t('map.clear')}</Button>
-        <a class="button quiet" href={apiUrl('api/map.csv')} download="palpation-map.csv" data-testid="map-csv">CSV</a>
-        <a class="button quiet" href={apiUrl('api/map.vtu')} download="palpation-map.vtu" data-testid="map-vtu">VTU</a>
+        {mapSight.value === 'everything' && <a class="button quiet" href={apiUrl('api/map.csv')} download="palpation-map.csv" data-testid="map-csv">CSV</a>}
+        {mapSight.value === 'everything' && <a class="button quiet" href={apiUrl('api/map.vtu')} download="palpation-map.vtu" data-testid="map-vtu">VTU</a>}
       </div>
     </>
   );

@@ -13,11 +13,15 @@ import { Curves } from './Curves';
 import { magnitude } from './history';
 import { Icon } from './icons';
 import { formatNumber, inMillimetres, withPrefix } from './quantity';
-import { PressDepth } from './panels/DevicePanel';
+import { GoalMarks, Reach } from './Goals';
+import { PressGoal } from './PressGoal';
 import { isDeepest } from './settings';
 
 /** Share of the force that reaches the hand, %. */
 const gain = signal(100);
+
+/** Force at the end of the bar, N. */
+const scaleEnd = signal(1);
 
 /** Writes a text or an attribute only when it differs: each write makes the browser draw. */
 function write(element: HTMLElement, text: string): void {
@@ -32,7 +36,7 @@ export function Readout() {
     <aside class="readout" aria-label={t('readout.title')}>
       <div class="numbers">
         <ForceNumber />
-        <PressDepth testid="press-depth" />
+        <PressGoal testid="press" />
       </div>
       <Curves />
     </aside>
@@ -130,6 +134,7 @@ function ForceNumber() {
       writeAttribute(gauge.current!, 'aria-valuenow', force.toFixed(2));
       writeAttribute(gauge.current!, 'aria-valuemax', String(axes.force));
       write(scale.current!, `${formatNumber(axes.force)} N`);
+      scaleEnd.value = axes.force;
       const width = `scaleX(${Math.min(1, force / axes.force).toFixed(3)})`;
       if (bar.current!.style.transform !== width) bar.current!.style.transform = width;
       // Above the skin a reduced force makes no difference.
@@ -167,9 +172,11 @@ function ForceNumber() {
         <ErrorBarNumber />
       </div>
       <ErrorBarWords />
+      <Reach />
       <div ref={gauge} class="gauge" role="meter" aria-label={t('readout.force')} aria-valuemin={0} aria-valuemax={1} aria-valuenow={0}>
         <div ref={bar} class="gauge-bar" />
       </div>
+      <GoalMarks most={scaleEnd.value} />
       <div class="gauge-scale" aria-hidden="true"><span>0</span><span ref={scale} /></div>
       <p class="depth-line">
         <span>

@@ -5,23 +5,25 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { language, t } from '../i18n';
 import { problemWords } from '../i18n/events';
 import { HandControl } from '../hand';
-import { BodyView, NoWebGL2, type Vec3 } from '../scene';
+import { BodyView, NoWebGL2, type Picked, type Vec3 } from '../scene';
 import {
   ask, askAloud, edit, homeKey, isController, isReplaying, isWatching, notify, onFrame, onMap, onMesh, scene, send, state,
 } from '../store';
-import { bodyView, firstBodyMs, legend, mapLegend, section, yields } from './body';
+import { bodyView, firstBodyMs, legend, lensPicture, mapLegend, probed, section, yields } from './body';
 import { Building } from './Building';
 import { Button, Segmented } from './controls';
 import { GameBar } from './GameBar';
 import { Icon } from './icons';
 import { LegendBox } from './LegendBox';
+import { LensBox } from './LensBox';
 import { MapBox } from './MapBox';
 import { Missed, watchMisses } from './Missed';
+import { ProbeTag } from './ProbeTag';
 import { ReplayBar } from './ReplayBar';
 import { saveImage } from './save';
 import { writtenPoint } from './quantity';
 import { inPageWords } from './words';
-import { handMode, isDeepest, lastTouched, picking, pressDepth, show, view, wanted } from './settings';
+import { handMode, greatestForce, isDeepest, lastTouched, picking, pressDepth, pressForce, show, view, wanted } from './settings';
 
 /** Whether nothing else moves the hand, so that it may follow the pointer. */
 const isFree = computed(() => state.value?.phase === 'running' && !state.value.is_motion_running);
@@ -40,6 +42,8 @@ export function Stage() {
       return;
     }
     body.onLegend = (next) => (legend.value = next);
+    body.onLens = (next) => (lensPicture.value = next);
+    body.onProbe = (next) => (probed.value = next);
     body.onMapLegend = (next) => (mapLegend.value = next);
     body.onYield = (next) => (yields.value = next);
     body.onSection = (next) => (section.value = next);
@@ -47,12 +51,12 @@ export function Stage() {
     body.onFirstBody = () => {
       firstBodyMs.value = performance.mark('palpa-first-body').startTime;
     };
-    const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), mode: handMode.peek(), enabled: false, hovers: false });
+    const hand = new HandControl(body, send, { pressDepth: pressDepth.peek(), pressForce: pressForce.peek(), greatestForce: greatestForce.peek(), mode: handMode.peek(), enabled: false, hovers: false });
     hand.onTarget = (target) => {
       if (target !== null && target.depth > 0) lastTouched.value = target.point;
       isDeepest.value = hand.isDeepest;
     };
-    hand.onMark = takePicked;
+    hand.onMark = (picked) => takePicked(picked, body);
     bodyView.value = body;
     const ends = [
       effect(() => body.setOptions(view.value)),
@@ -62,6 +66,8 @@ export function Stage() {
       effect(() =>
         hand.set({
           pressDepth: pressDepth.value,
+          pressForce: pressForce.value,
+          greatestForce: greatestForce.value,
           mode: picking.value === null ? handMode.value : 'mark',
           enabled: isController.value && !isReplaying.value,
           hovers: isFree.value,
@@ -92,6 +98,8 @@ export function Stage() {
     <main class={`stage ${picking.value === null ? '' : 'picking'}`} aria-label={t('app.body')}>
       <div class="canvas-place" ref={container} />
       <span hidden data-testid="first-body-ms" data-ms={firstBodyMs.value ?? ''}>{firstBodyMs.value?.toFixed(0)}</span>
+      <LensBox />
+      <ProbeTag />
       {problem === 'none' ? <StageTools /> : <NoBody isWebGL={problem === 'webgl'} />}
       <div class="stage-top">
         <GameBar />
@@ -110,9 +118,17 @@ export function Stage() {
 }
 
 /** Uses a picked point for its purpose. */
-function takePicked(point: Vec3): void {
+function takePicked(picked: Picked, body: BodyView): void {
   const purpose = picking.peek();
   if (purpose === null) return;
+  const { point } = picked;
+  if (purpose.kind === 'probe') {
+    picking.value = null;
+    body.setProbe(picked);
+    return;
+  }
+  // The others lie on the skin.
+  if (picked.part !== 'skin') return;
   if (purpose.kind === 'mark') {
     void markLump(point);
     return;
@@ -161,7 +177,7 @@ function PickingHint() {
   if (purpose === null) return null;
   return (
     <p class="chip accent" role="status">
-      {t(purpose.kind === 'mark' ? 'game.mark_hint' : purpose.kind === 'lump' ? 'lumps.pick_hint' : 'motion.pick_hint')}
+      {t(purpose.kind === 'mark' ? 'game.mark_hint' : purpose.kind === 'probe' ? 'probe.hint' : purpose.kind === 'lump' ? 'lumps.pick_hint' : 'motion.pick_hint')}
       <Button kind="quiet" label={t('app.cancel')} onClick={() => (picking.value = null)}><Icon name="close" /></Button>
     </p>
   );

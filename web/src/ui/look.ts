@@ -48,7 +48,7 @@ export function readLook(from: unknown): Look | null {
     layers: layers.map(({ visible, opacity }) => ({ visible: flag(visible, true), opacity: share(opacity, 1) })),
     cutaway: {
       on: flag(cut.on, false),
-      axis: oneOf(['x', 'y', 'z', 'view'] as const, cut.axis, 'x'),
+      axis: oneOf(['x', 'y', 'z', 'view', 'tool'] as const, cut.axis, 'x'),
       position: share(cut.position, 0.5),
       flip: flag(cut.flip, false),
     },

@@ -1,6 +1,6 @@
 // Quantities: as a scene file writes them ("12 kPa"), and as the page shows them.
 
-export type Dimension = 'length' | 'pressure' | 'time' | 'speed' | 'spring' | 'angle' | 'number';
+export type Dimension = 'length' | 'pressure' | 'time' | 'speed' | 'spring' | 'angle' | 'force' | 'number';
 
 const UNITS: Record<Exclude<Dimension, 'number'>, Record<string, number>> = {
   length: { m: 1, cm: 1e-2, mm: 1e-3, µm: 1e-6, μm: 1e-6, um: 1e-6, in: 0.0254 },
@@ -8,6 +8,7 @@ const UNITS: Record<Exclude<Dimension, 'number'>, Record<string, number>> = {
   time: { s: 1, ms: 1e-3, min: 60 },
   speed: { 'm/s': 1, 'cm/s': 1e-2, 'mm/s': 1e-3 },
   angle: { rad: 1, deg: Math.PI / 180, '°': Math.PI / 180 },
+  force: { N: 1, mN: 1e-3, kN: 1e3 },
   spring: { 'N/m': 1, 'mN/m': 1e-3, 'N/mm': 1e3, 'dyn/cm': 1e-3 },
 };
 
@@ -32,6 +33,7 @@ const WRITTEN: Record<Exclude<Dimension, 'number'>, [atLeast: number, unit: stri
   time: [[0.1, 's'], [0, 'ms']],
   speed: [[0, 'mm/s']],
   angle: [[0, 'deg']],
+  force: [[0, 'N']],
   spring: [[0.1, 'N/m'], [0, 'dyn/cm']],
 };
 
@@ -50,7 +52,7 @@ export function formatQuantity(value: number, dimension: Dimension, digits = 3):
 }
 
 const DEFAULT_UNITS: Record<Dimension, string> = {
-  length: 'mm', pressure: 'kPa', time: 's', speed: 'mm/s', spring: 'N/m', angle: 'deg', number: '',
+  length: 'mm', pressure: 'kPa', time: 's', speed: 'mm/s', spring: 'N/m', angle: 'deg', force: 'N', number: '',
 };
 
 export function defaultUnit(dimension: Dimension): string {

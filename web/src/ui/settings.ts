@@ -1,10 +1,10 @@
 // Settings: those that the browser remembers between visits, and how the body is shown now.
 
 import { batch, computed, effect, signal, type Signal } from '@preact/signals';
-import { DEFAULT_OPTIONS, quantityOf, type ColourBy, type ViewOptions } from '../scene';
+import { DEFAULT_OPTIONS, quantityOf, type ColourBy, type MapKind, type ViewOptions } from '../scene';
 import { t } from '../i18n';
 import { galleryKey, isHiding, state, type Vec3 } from '../store';
-import type { Field } from '../generated/api';
+import type { Field, MapSight } from '../generated/api';
 
 const PREFIX = 'palpa.';
 
@@ -102,11 +102,38 @@ export const pressDepth = computed(() => {
   return Math.min(chosenDepth.value ?? usual, state.value?.greatest_depth ?? Infinity);
 });
 
-/** Seed of the next round of the game, as it is typed; empty for a random one. */
+/** Whether a press goes to a depth or to a force. */
+export const PRESS_BY = ['depth', 'force'] as const;
+export const pressBy = remembered<(typeof PRESS_BY)[number]>('press_by', 'depth', isOneOf(...PRESS_BY));
+const isForce = (value: unknown): boolean => typeof value === 'number' && value > 0 && value <= 100;
+/** Force that a press holds, N. */
+export const chosenForce = remembered('press_force', 1, isForce);
+/** The same within what the device can give; null while presses go to a depth. */
+export const pressForce = computed(() => (pressBy.value === 'force' ? Math.min(chosenForce.value, greatestForce.value) : null));
+/** The largest force that the device gives, N. */
+export const greatestForce = computed(() => state.value?.max_force ?? 10);
+
+// Goals: a band in which the force shall stay, and a limit at which it would hurt, N.
+
+export const hasBand = remembered('band_on', false, isBoolean);
+export const bandLow = remembered('band_low', 0.8, isForce);
+export const bandHigh = remembered('band_high', 1.2, isForce);
+export const hasPainLimit = remembered('pain_on', false, isBoolean);
+export const painLimit = remembered('pain_limit', 3, isForce);
+export const goalsSound = remembered('goals_sound', true, isBoolean);
+
+/** The next game: its seed as it is typed, empty for a random one; its level, or one drawn for each round; its numbers. */
 export const wantedSeed = signal('');
+export const LEVELS = ['easy', 'medium', 'hard', 'drawn'] as const;
+export type WantedLevel = (typeof LEVELS)[number];
+export const wantedLevel = signal<WantedLevel>('easy');
+export const ROUNDS = ['1', '3', '5', '10'] as const;
+export const wantedRounds = signal<(typeof ROUNDS)[number]>('1');
+export const LUMPS = ['1', '2', '3'] as const;
+export const wantedLumps = signal<(typeof LUMPS)[number]>('1');
 
 /** The purpose of the next click on the body. */
-export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' };
+export type Picking = { kind: 'mark' } | { kind: 'lump'; index: number } | { kind: 'place' } | { kind: 'probe' };
 export const picking = signal<Picking | null>(null);
 /** Whether the tool is at the greatest depth. */
 export const isDeepest = signal(false);
@@ -126,6 +153,18 @@ export function showsLumps(colourBy: ColourBy): boolean {
   return quantityOf(colourBy)?.showsLumps ?? false;
 }
 
+/** What the palpation map may show: during a game, as much as its level allows. */
+export const mapSight = computed<MapSight>(() => {
+  const game = state.value?.game;
+  if (game == null || !isHiding.value) return 'everything';
+  return state.value?.levels.find(({ level }) => level === game.level)?.map ?? 'nothing';
+});
+
+function allowedMap(wantedMap: MapKind, sight: MapSight): MapKind {
+  if (sight === 'nothing') return 'off';
+  return sight === 'stiffness' && wantedMap === 'surroundings' ? 'absolute' : wantedMap;
+}
+
 /** The options in force: during a game, nothing that shows hidden lumps. */
 export const view = computed<ViewOptions>(() => {
   const words = { canvas: t('app.canvas'), plane: t('view.cutaway_plane') };
@@ -134,7 +173,8 @@ export const view = computed<ViewOptions>(() => {
   return {
     ...options,
     lumps: false,
-    palpation: 'off',
+    palpation: allowedMap(options.palpation, mapSight.value),
+    lens: false,
     wireframe: false,
     colourBy: showsLumps(options.colourBy) ? 'tissue' : options.colourBy,
     range: showsLumps(options.colourBy) ? null : options.range,

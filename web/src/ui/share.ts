@@ -8,7 +8,7 @@ import type { SceneTable } from '../generated/scene';
 import { t } from '../i18n';
 import { ask, isController, notify, onMesh, state } from '../store';
 import { applyLook, presentLook, readLook, type Look } from './look';
-import { tab, wantedSeed } from './settings';
+import { LEVELS, LUMPS, ROUNDS, tab, wantedLevel, wantedLumps, wantedRounds, wantedSeed } from './settings';
 
 const MARK = '#palpa=';
 /** Longest link, characters: longer ones are cut by mail programs and chats. */
@@ -24,6 +24,8 @@ interface Content {
   key?: string;
   scene?: SceneTable;
   seed?: string;
+  /** The rest of the game, if there is a seed: level, lumps in each round, rounds. */
+  game?: [string, string, string];
   look?: Look;
 }
 
@@ -33,12 +35,16 @@ export async function linkOfPresent(): Promise<{ link: string } | { error: strin
   if (now?.scene == null) return { error: t('phase.waiting') };
   const isPlain = now.gallery_key != null && !now.is_changed;
   if (!isPlain && now.files.length > 0) return { error: t('share.has_files') };
-  const seed = now.game == null ? wantedSeed.peek().trim() : String(now.game.seed);
+  const series = now.game?.series;
+  const seed = series === undefined ? wantedSeed.peek().trim() : String(series.seed);
+  const game: Content['game'] = series === undefined
+    ? [wantedLevel.peek(), wantedLumps.peek(), wantedRounds.peek()]
+    : [series.level ?? 'drawn', String(now.game!.n_lumps), String(series.n_rounds)];
   const content: Content = {
     v: 1,
     ...(now.gallery_key == null ? {} : { key: now.gallery_key }),
     ...(isPlain ? {} : { scene: now.scene as SceneTable }),
-    ...(seed === '' ? {} : { seed }),
+    ...(seed === '' ? {} : { seed, game }),
     look: rounded(presentLook()),
   };
   const packed = await deflated(JSON.stringify(content));
@@ -84,13 +90,14 @@ async function read(hash: string): Promise<Content | null> {
     if (hash.length > LONGEST) return null;
     const from = JSON.parse(await inflated(hash.slice(MARK.length))) as Record<string, unknown> | null;
     if (from === null || typeof from !== 'object' || from.v !== 1) return null;
-    const { key, scene, seed, look } = from;
+    const { key, scene, seed, game, look } = from;
     if (typeof key !== 'string' && (typeof scene !== 'object' || scene === null)) return null;
     return {
       v: 1,
       ...(typeof key === 'string' ? { key } : {}),
       ...(typeof scene === 'object' && scene !== null ? { scene: scene as SceneTable } : {}),
       ...(typeof seed === 'string' && /^\d{1,20}$/.test(seed) ? { seed } : {}),
+      ...(Array.isArray(game) && game.length === 3 ? { game: game.map(String) as Content['game'] } : {}),
       ...(readLook(look) === null ? {} : { look: readLook(look)! }),
     };
   } catch {
@@ -132,7 +139,7 @@ export function beginLinks(): void {
   });
 }
 
-async function open({ key, scene, seed, look }: Content): Promise<void> {
+async function open({ key, scene, seed, game, look }: Content): Promise<void> {
   const now = state.peek()!;
   const isThere = scene === undefined && now.gallery_key === key && !now.is_changed;
   if (!isThere) {
@@ -145,6 +152,10 @@ async function open({ key, scene, seed, look }: Content): Promise<void> {
   }
   if (seed !== undefined) {
     wantedSeed.value = seed;
+    const [level, lumps, rounds] = game ?? [];
+    wantedLevel.value = LEVELS.find((one) => one === level) ?? 'easy';
+    wantedLumps.value = LUMPS.find((one) => one === lumps) ?? '1';
+    wantedRounds.value = ROUNDS.find((one) => one === rounds) ?? '1';
     tab.value = 'game';
   }
   if (look !== undefined) {

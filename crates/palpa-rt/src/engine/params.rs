@@ -19,6 +19,9 @@ pub struct EngineParams {
     /// How long the loop spins before each tick instead of sleeping, s. Spinning reduces lateness
     /// but uses more CPU.
     pub spin: f64,
+    /// Whether the engine's time stands still while the loop has no core: for devices without hardware, whose
+    /// hand loses nothing by waiting. Lateness and skipped ticks are counted all the same.
+    pub time_waits: bool,
     /// Priority and core of the loop's thread, if the system grants them.
     pub servo_wish: Wish,
     /// Priority and core of the tissue's thread.
@@ -39,6 +42,7 @@ impl Default for EngineParams {
             servo: ServoParams::default(),
             tissue: TissueParams::default(),
             spin: 0.0,
+            time_waits: false,
             servo_wish: Wish {
                 priority: Priority::RealTime(80),
                 core: None,

@@ -10,7 +10,8 @@ use crate::{
 };
 use palpa_device::DeviceFault;
 use palpa_rt::{
-    Engine, Happening, Injection, Level, Log, ReplayParams, Report, StepStatus, Verdict, replay,
+    Engine, EngineParams, Happening, Injection, Level, Log, ReplayParams, Report, StepStatus,
+    Verdict, replay,
 };
 use palpa_servo::Faults;
 
@@ -397,6 +398,42 @@ fn ticks_that_begin_up_to_30_ms_late_keep_the_force() {
         &[|e| matches!(e, Happening::DeadlineMissed { .. })],
     );
     let log = Log::open(&path).unwrap();
+    let again = replay(&log, Bed::new(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
+}
+
+#[test]
+fn a_loop_whose_time_waits_keeps_the_force_however_late_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let hand = Hand::default();
+    let devices = vec![announced(Scripted::new(&hand))];
+    let patient = EngineParams {
+        time_waits: true,
+        ..params()
+    };
+    let engine = Engine::start(Bed::new(), devices, &patient, &recorder(&path)).unwrap();
+    until_felt(&hand);
+    hand.make(Ill::Slow);
+    until("slow readings left ticks out", || {
+        engine.loop_stats().skipped.load(Ordering::Relaxed) >= 400
+    });
+    hand.make(Ill::No);
+    let report = engine.stop();
+    let faults = |e: &&palpa_rt::Event| has(&e.what, Faults::MISSED_DEADLINE);
+    assert_eq!(report.events.iter().filter(faults).count(), 0);
+    // Lateness is counted and said, and no tick comes more than three periods after the one before.
+    assert!(report.skipped >= 400, "{}", report.skipped);
+    assert!(report.lateness.max > 3e-3);
+    check_said(
+        &report,
+        &[|e| matches!(e, Happening::DeadlineMissed { .. })],
+    );
+    let log = Log::open(&path).unwrap();
+    for pair in log.ticks.windows(2) {
+        let between = pair[1].tick.now - pair[0].tick.now;
+        assert!(between > 0.0 && between < 3.5e-3, "{between} s");
+    }
     let again = replay(&log, Bed::new(), &ReplayParams::default());
     assert_eq!(again.verdict, Verdict::Same, "{again:?}");
 }

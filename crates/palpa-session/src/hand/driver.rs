@@ -8,7 +8,8 @@
 //!     pressed ── stroke, along the skin ──► pressed
 //! ```
 //! A place is a point of the skin at rest. The tool's tip is `depth` below it, along the inward
-//! normal.
+//! normal. A goal may have a force: then the hand presses deeper or less deep until the tissue pushes
+//! back with it.
 
 use nalgebra::{Rotation3, Unit, UnitQuaternion};
 use palpa_mesh::Vec3;
@@ -35,6 +36,13 @@ const STRIDE: f64 = 15e-3;
 const GLIDE: f64 = 0.1;
 /// Largest step of a glide, m: the skin is followed in steps.
 const GLIDE_STEP: f64 = 4e-3;
+/// The pace at which the hand goes to the depth that it expects to give the wanted force, 1/s. The force that
+/// it feels is 20 to 60 ms old.
+const FORCE_PACE: f64 = 4.0;
+/// Largest speed on the way to a force, m/s: what the hand feels late, it has passed by then.
+const FORCE_SPEED: f64 = 0.015;
+/// Least stiffness with which the hand reckons, N/m: softer contacts are approached more slowly.
+const LEAST_STIFFNESS: f64 = 60.0;
 /// Distance between skin and tool on the path around the body, m; the tool's size is added.
 const CLEARANCE: f64 = 12e-3;
 
@@ -43,8 +51,21 @@ const CLEARANCE: f64 = 12e-3;
 pub(crate) struct Goal {
     /// The place on the skin.
     pub(crate) place: Place,
-    /// Depth of the tip below the place, m; negative above the skin.
+    /// Depth of the tip below the place, m; negative above the skin. With a force, the greatest depth.
     pub(crate) depth: f64,
+    /// Force to be held, N, in place of a depth.
+    pub(crate) force: Option<f64>,
+}
+
+impl Goal {
+    /// Goes to a depth.
+    pub(crate) fn at_depth(place: Place, depth: f64) -> Self {
+        Self {
+            place,
+            depth,
+            force: None,
+        }
+    }
 }
 
 /// The hand's state on its path.
@@ -118,8 +139,9 @@ impl HandDriver {
         self.doing == Doing::There && self.depth <= -HOVER
     }
 
-    /// Moves the hand by `dt` seconds. Returns the commanded pose of the tool in the scene's frame.
-    pub(crate) fn advance(&mut self, skin: &Skin, dt: f64) -> Pose {
+    /// Moves the hand by `dt` seconds. `felt` is the force of the tissue on the tool, N, in the scene's
+    /// frame. Returns the commanded pose of the tool in the scene's frame.
+    pub(crate) fn advance(&mut self, skin: &Skin, dt: f64, felt: Vec3) -> Pose {
         match &mut self.doing {
             Doing::Travel(points) => {
                 let mut way = AIR_SPEED * dt;
@@ -137,17 +159,20 @@ impl HandDriver {
                     self.doing = Doing::There;
                 }
             }
-            Doing::There => self.go_on(skin, dt),
+            Doing::There => self.go_on(skin, dt, felt.dot(&self.place.normal)),
         }
         Pose::from_parts(self.tip.into(), turned_to(&self.place.normal, &self.along))
     }
 
-    fn go_on(&mut self, skin: &Skin, dt: f64) {
+    fn go_on(&mut self, skin: &Skin, dt: f64, felt: f64) {
         let far = self
             .goal
             .is_some_and(|goal| (goal.place.point - self.place.point).norm() > STRIDE);
         let wanted = match self.goal {
-            Some(goal) if !far => goal.depth,
+            Some(goal) if !far => match goal.force {
+                Some(force) => self.depth_for(force, felt, dt).min(goal.depth),
+                None => goal.depth,
+            },
             // On the way to another place it stays low.
             Some(_) => self.depth.clamp(-HOVER, -LOW),
             None => -HOVER,
@@ -166,6 +191,16 @@ impl HandDriver {
             }
         }
         self.tip = self.place.point - self.place.normal * self.depth;
+    }
+
+    /// The next depth on the way to a force, N, while the tissue pushes back with `felt`, N.
+    fn depth_for(&self, force: f64, felt: f64, dt: f64) -> f64 {
+        if self.depth < 0.0 {
+            return 0.0;
+        }
+        let stiffness = (felt / self.depth.max(1e-6)).max(LEAST_STIFFNESS);
+        let speed = (FORCE_PACE * (force - felt) / stiffness).clamp(-FORCE_SPEED, FORCE_SPEED);
+        (self.depth + speed * dt).max(0.0)
     }
 
     /// Whether the hand can go to a place close over the skin.
@@ -313,10 +348,10 @@ mod tests {
         let skin = limb();
         let mut hand = hand(&skin);
         let place = *hand.place();
-        hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-        let mut before = hand.advance(&skin, DT);
+        hand.set_goal(Some(Goal::at_depth(place, 5e-3)));
+        let mut before = hand.advance(&skin, DT, Vec3::zeros());
         for _ in 0..60 {
-            let pose = hand.advance(&skin, DT);
+            let pose = hand.advance(&skin, DT, Vec3::zeros());
             let way = pose.translation.vector - before.translation.vector;
             // Fast in the air, and at the speed of a press from a millimetre above the skin.
             let above = place.normal.dot(&(before.translation.vector - place.point));
@@ -332,7 +367,7 @@ mod tests {
         assert!((before.translation.vector - wanted).norm() < 1e-9);
         assert!(!hand.is_lifted());
         hand.set_goal(None);
-        (0..60).for_each(|_| before = hand.advance(&skin, DT));
+        (0..60).for_each(|_| before = hand.advance(&skin, DT, Vec3::zeros()));
         assert!(hand.is_lifted());
         assert!((before.rotation * Vec3::z() - place.normal).norm() < 1e-9);
     }
@@ -342,9 +377,9 @@ mod tests {
         let skin = limb();
         let mut hand = hand(&skin);
         let place = *hand.place();
-        hand.set_goal(Some(Goal { place, depth: 1.0 }));
+        hand.set_goal(Some(Goal::at_depth(place, 1.0)));
         let mut pose = Pose::identity();
-        (0..200).for_each(|_| pose = hand.advance(&skin, DT));
+        (0..200).for_each(|_| pose = hand.advance(&skin, DT, Vec3::zeros()));
         let depth = place.normal.dot(&(place.point - pose.translation.vector));
         assert!((depth - MOST_OF_TISSUE * 28e-3).abs() < 1e-6, "{depth}");
     }
@@ -354,11 +389,11 @@ mod tests {
         let skin = limb();
         let mut hand = hand(&skin);
         let place = at(&skin, 0.05, std::f64::consts::PI);
-        hand.set_goal(Some(Goal { place, depth: 4e-3 }));
+        hand.set_goal(Some(Goal::at_depth(place, 4e-3)));
         let mut least = f64::INFINITY;
         let mut pose = Pose::identity();
         for _ in 0..300 {
-            pose = hand.advance(&skin, DT);
+            pose = hand.advance(&skin, DT, Vec3::zeros());
             let off_axis = pose.translation.vector.yz().norm();
             if hand.depth <= 0.0 {
                 least = least.min(off_axis);
@@ -374,15 +409,58 @@ mod tests {
         let skin = limb();
         let mut hand = hand(&skin);
         let place = *hand.place();
-        hand.set_goal(Some(Goal { place, depth: 5e-3 }));
+        hand.set_goal(Some(Goal::at_depth(place, 5e-3)));
         (0..60).for_each(|_| {
-            hand.advance(&skin, DT);
+            hand.advance(&skin, DT, Vec3::zeros());
         });
         for k in 1..=60 {
             let place = at(&skin, 0.08, f64::from(k) * 0.02);
-            hand.set_goal(Some(Goal { place, depth: 5e-3 }));
-            let tip = hand.advance(&skin, DT).translation.vector;
+            hand.set_goal(Some(Goal::at_depth(place, 5e-3)));
+            let tip = hand.advance(&skin, DT, Vec3::zeros()).translation.vector;
             assert!((tip.yz().norm() - 0.035).abs() < 8e-4, "{tip:?}");
         }
+    }
+
+    #[test]
+    fn it_holds_a_force_that_it_feels_late() {
+        let skin = limb();
+        // Soft and stiff tissue that stiffens, felt three steps late.
+        for stiffness in [120.0, 900.0] {
+            let mut hand = hand(&skin);
+            let place = *hand.place();
+            let force = 1.5;
+            hand.set_goal(Some(Goal {
+                place,
+                depth: 20e-3,
+                force: Some(force),
+            }));
+            let push = |depth: f64| stiffness * depth.max(0.0) * (1.0 + 20.0 * depth.max(0.0));
+            let mut past = [0.0; 4];
+            let mut largest: f64 = 0.0;
+            for _ in 0..180 {
+                hand.advance(&skin, DT, place.normal * past[0]);
+                past.rotate_left(1);
+                past[3] = push(hand.depth);
+                largest = largest.max(past[3]);
+            }
+            assert!(
+                (push(hand.depth) - force).abs() < 0.01 * force,
+                "{stiffness}"
+            );
+            assert!(largest < 1.1 * force, "{largest} N with {stiffness} N/m");
+        }
+        // Where the tissue is too soft for the force, it goes to the greatest depth.
+        let mut hand = hand(&skin);
+        let place = *hand.place();
+        hand.set_goal(Some(Goal {
+            place,
+            depth: 4e-3,
+            force: Some(50.0),
+        }));
+        for _ in 0..180 {
+            let felt = place.normal * 100.0 * hand.depth.max(0.0);
+            hand.advance(&skin, DT, felt);
+        }
+        assert!((hand.depth - 4e-3).abs() < 1e-9);
     }
 }

@@ -35,6 +35,8 @@ const HOMING: Duration = Duration::from_secs(5);
 const ARRIVED: f64 = 1e-4;
 /// The scene's motion starts where the mesh is fine: within this share of the radius of its fine part.
 const FINE: f64 = 0.5;
+/// Largest force that a page may ask to be held, N: more than any device here gives.
+const MOST_FORCE: f64 = 100.0;
 /// Largest coordinate that a page may send, m: no body is larger.
 const FAR: f64 = 100.0;
 
@@ -82,6 +84,8 @@ pub(crate) struct Ground<'a> {
     pub(crate) scene_from_device: &'a Pose,
     /// The fine part of the mesh (centre and radius, m), where it moves with the hand.
     pub(crate) fine: Option<(Vec3, f64)>,
+    /// Force of the tissue on the tool, N.
+    pub(crate) felt: Vec3,
 }
 
 /// The hand.
@@ -120,10 +124,7 @@ impl Hand {
 
     /// Starts the scene's motion. First the hand goes to a point over `home`.
     pub(crate) fn run_motion(&mut self, home: Place, now: Instant) {
-        let goal = Goal {
-            place: home,
-            depth: -HOVER,
-        };
+        let goal = Goal::at_depth(home, -HOVER);
         self.driver.set_goal(Some(goal));
         self.lead = Lead::Homing { since: now };
     }
@@ -179,7 +180,7 @@ impl Hand {
             }
             Lead::Homing { since } => {
                 let since = *since;
-                let pose = self.driver.advance(ground.skin, dt);
+                let pose = self.driver.advance(ground.skin, dt, ground.felt);
                 let off = |from: Vec3| (ground.home.point - from).norm();
                 let is_home = off(self.driver.place().point) < ARRIVED && self.driver.is_lifted();
                 let is_fine = (ground.fine).is_none_or(|(middle, r)| off(middle) < FINE * r);
@@ -200,7 +201,7 @@ impl Hand {
                 return frame * Pose::translation(at.x, at.y, at.z);
             }
         }
-        self.driver.advance(ground.skin, dt)
+        self.driver.advance(ground.skin, dt, ground.felt)
     }
 }
 
@@ -219,6 +220,12 @@ pub(crate) fn goal_of(
     if !hand.depth.is_finite() {
         bail!("the depth is not a number");
     }
+    if hand
+        .force
+        .is_some_and(|force| !(0.0..=MOST_FORCE).contains(&force))
+    {
+        bail!("the force must lie between 0 and {MOST_FORCE} N");
+    }
     let place = skin.nearest(point).context("there is no skin")?;
     let normal = normal.try_normalize(1e-6).unwrap_or(place.normal);
     // A page's normal far from the skin's own is wrong: use the skin's own.
@@ -230,6 +237,7 @@ pub(crate) fn goal_of(
     Ok(Goal {
         place: Place { normal, ..place },
         depth: hand.depth.min(greatest_depth),
+        force: hand.force,
     })
 }
 
@@ -291,6 +299,7 @@ mod tests {
                     scene: &self.scene,
                     scene_from_device: &self.frame,
                     fine: None,
+                    felt: Vec3::zeros(),
                 };
                 pose = self.hand.advance(&ground, DT, self.now);
             }
@@ -306,10 +315,7 @@ mod tests {
     #[test]
     fn the_hand_lifts_when_its_page_falls_silent() {
         let mut bench = Bench::new(0.08);
-        let goal = Goal {
-            place: bench.home,
-            depth: 5e-3,
-        };
+        let goal = Goal::at_depth(bench.home, 5e-3);
         bench.hand.put(goal, bench.now).unwrap();
         let pressed = bench.run(0.9);
         assert!((bench.depth(&pressed) - 5e-3).abs() < 1e-9);
@@ -338,10 +344,7 @@ mod tests {
             panic!("{:?}", bench.hand.lead)
         };
         let rest = path.duration() - time;
-        let goal = Goal {
-            place: bench.home,
-            depth: 1e-3,
-        };
+        let goal = Goal::at_depth(bench.home, 1e-3);
         let refused = bench.hand.put(goal, bench.now).unwrap_err().to_string();
         assert!(
             refused.contains("motion of the scene is running"),
@@ -372,10 +375,15 @@ mod tests {
             point: bench.home.point.into(),
             normal: (-bench.home.normal).into(),
             depth: 1.0,
+            force: None,
         };
         let goal = goal_of(&asked, &bench.skin, 6e-3).unwrap();
         assert!((goal.depth - 6e-3).abs() < 1e-12);
         assert!(goal.place.normal.dot(&bench.home.normal) > 0.99);
+        asked.force = Some(-1.0);
+        let error = goal_of(&asked, &bench.skin, 6e-3).unwrap_err().to_string();
+        assert!(error.contains("force must lie between 0"), "{error}");
+        asked.force = None;
         asked.point[1] = 1e308;
         let error = goal_of(&asked, &bench.skin, 6e-3).unwrap_err().to_string();
         assert!(error.contains("point is out of range"), "{error}");

@@ -58,6 +58,16 @@ pub(super) fn put_displacements(frame: &mut FrameSnapshot, displacements: &[Vec3
         .extend(components.map(|x| (x / unit).round() as i16));
 }
 
+/// Puts the vertices in contact into a frame, each with the pressure on it, Pa.
+pub(super) fn put_contacts(frame: &mut FrameSnapshot, contacts: &[(u32, f32)]) {
+    frame.contacts.clear();
+    frame.contact_pressures.clear();
+    frame.contacts.extend(contacts.iter().map(|(v, _)| v));
+    frame
+        .contact_pressures
+        .extend(contacts.iter().map(|(_, pressure)| pressure));
+}
+
 /// Puts a tick of the loop into a frame. `over` is the place of the skin (point, outward normal)
 /// from which depth is measured.
 pub(super) fn put_tick(

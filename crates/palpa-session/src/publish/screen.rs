@@ -99,15 +99,17 @@ impl Screen {
         field: Field,
     ) -> Option<(&FrameSnapshot, &MeshBytes)> {
         let look = live.look();
-        let (settled, model);
+        let (settled, model, contacts);
         let displacements: &[Vec3] = match look.body.as_ref()? {
             Seen::Tissue(glance) => {
                 settled = glance.settled();
                 model = Some(Arc::clone(glance.model()));
+                contacts = glance.contacts();
                 &settled
             }
             Seen::Springs(displacements) => {
                 model = None;
+                contacts = &[][..];
                 displacements
             }
         };
@@ -126,6 +128,7 @@ impl Screen {
         self.frame.mesh = self.n_meshes;
         self.frame.sequence = self.n_frames as u32;
         frame::put_displacements(&mut self.frame, displacements);
+        frame::put_contacts(&mut self.frame, contacts);
         let field = model.and_then(|model| {
             let mesh = u64::from(self.n_meshes);
             self.fields.of(mesh, field, &model, displacements)

@@ -13,7 +13,7 @@ use crate::history::Wanted;
 use crate::own;
 use crate::veil::Veil;
 use crate::world::World;
-use crate::{edit, gallery};
+use crate::{edit, gallery, game};
 
 /// The parts of the state that change without a request.
 #[derive(Debug)]
@@ -26,6 +26,8 @@ pub(crate) struct Told {
     pub(crate) recording: RecordingInfo,
     /// The game, if one is on.
     pub(crate) game: Option<GameInfo>,
+    /// Whether there are results of a game.
+    pub(crate) has_game_results: bool,
     /// Number of changes of the scene that can be undone.
     pub(crate) n_undo: u32,
     /// Number of changes of the scene that can be redone.
@@ -52,6 +54,7 @@ impl Status {
             publisher,
             state: State {
                 gallery: gallery::entries(),
+                levels: game::levels(),
                 allows_faults,
                 ..State::default()
             },
@@ -147,6 +150,7 @@ impl Status {
             is_motion_running,
             recording,
             game,
+            has_game_results,
             n_undo,
             n_redo,
         } = told();
@@ -156,6 +160,7 @@ impl Status {
         state.is_motion_running = is_motion_running;
         state.recording = recording;
         state.game = game;
+        state.has_game_results = has_game_results;
         (state.n_undo, state.n_redo) = (n_undo, n_redo);
         self.publisher.state(state.clone());
     }

@@ -123,7 +123,9 @@ impl Film {
 }
 
 fn bytes_of(frame: &FrameSnapshot) -> usize {
-    size_of::<FrameSnapshot>() + 2 * (frame.displacements.len() + frame.field_values.len())
+    size_of::<FrameSnapshot>()
+        + 2 * (frame.displacements.len() + frame.field_values.len())
+        + 8 * frame.contacts.len()
 }
 
 #[cfg(test)]

@@ -51,6 +51,8 @@ impl World {
         let device = open_device(&self.scene.device, target.clone())?;
         let params = EngineParams {
             servo: servo_params(&*device),
+            // All devices of a session are simulated yet.
+            time_waits: true,
             tissue: TissueParams {
                 min_period: STEP_PERIOD,
                 ..TissueParams::default()

@@ -13,6 +13,24 @@ impl World {
         self.tool.shape.map_or(0.0, |shape| shape.half_width())
     }
 
+    /// Young's modulus at small strain of the layer at a depth (m) below the vertex of the skin that is
+    /// nearest to a point, Pa; none for a network of bars.
+    pub(crate) fn stiffness_below(&self, point: Vec3, depth: f64) -> Option<f64> {
+        let body = &self.prepared()?.grown.growth.body;
+        let distance = |v: &usize| (body.skin.points[*v] - point).norm_squared();
+        let v = (0..body.n_vertices()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let mut left = depth;
+        let layer = body.interval_layer.iter().enumerate().find(|(i, _)| {
+            let [above, below] = [*i, i + 1].map(|l| body.positions[body.node(v, l)]);
+            left -= (below - above).norm();
+            left <= 0.0
+        });
+        let layer = layer
+            .map(|(_, layer)| layer)
+            .or(body.interval_layer.last())?;
+        Some(self.layers[*layer].stiffness)
+    }
+
     /// Young's modulus at small strain of every prism of a body, Pa; for a network of bars the
     /// stiffness of a bar, N/m. `[n_prisms]`
     pub(crate) fn stiffness(&self, body: &LayeredBody, shows_lumps: bool) -> Vec<f32> {

@@ -200,6 +200,7 @@ impl World {
             point: self.home.point.into(),
             normal: self.home.normal.into(),
             depth: -HOVER,
+            force: None,
         }
     }
 }

@@ -31,6 +31,7 @@ fn nearly() -> impl Strategy<Value = String> {
         "play",
         "show_field",
         "start_game",
+        "next_round",
         "mark",
         "reveal",
         "inject",
@@ -40,7 +41,7 @@ fn nearly() -> impl Strategy<Value = String> {
     ]);
     let keys = prop::sample::select(vec![
         "id", "point", "normal", "depth", "key", "text", "edits", "path", "value", "time", "on",
-        "field", "seed", "n_lumps", "fault", "type",
+        "field", "seed", "n_lumps", "level", "n_rounds", "fault", "type",
     ]);
     let leaf = prop_oneof![
         Just(Value::Null),

@@ -84,6 +84,8 @@ fn read_frame(bytes: &[u8]) -> FrameSnapshot {
         limits: r.u32(),
         displacement_unit: r.f64(),
         displacements: r.items(i16::from_le_bytes),
+        contacts: r.items(u32::from_le_bytes),
+        contact_pressures: r.items(f32::from_le_bytes),
         field: r.u32(),
         field_min: r.f64(),
         field_max: r.f64(),
@@ -117,13 +119,15 @@ proptest! {
         places in uniform6(uniform3(-1.0..1.0)),
         orientation in uniform4(-1.0..1.0),
         displacements in vec(any::<i16>(), 0..40),
+        contacts in vec(any::<u32>(), 0..9),
+        contact_pressures in vec(0f32..1e6, 0..9),
         field_values in vec(any::<u16>(), 0..40),
     ) {
         let [mesh, sequence, faults, limits] = numbers;
         let [device, tool, force, tissue_force, place, [depth, gain, time]] = places;
         let frame = FrameSnapshot {
             mesh, sequence, faults, limits, device, tool, force, tissue_force, place, depth, gain, time, orientation,
-            displacements, field_values, displacement_unit: 1e-6, field: 2, field_min: -1e3, field_max: 4e5,
+            displacements, contacts, contact_pressures, field_values, displacement_unit: 1e-6, field: 2, field_min: -1e3, field_max: 4e5,
             is_replay: 1, tick: 1e9, n_active: 17, step_status: 2, deepest: 0.0125,
         };
         prop_assert_eq!(read_frame(&frame.encode()), frame);
@@ -140,14 +144,14 @@ fn where_things_lie() {
         ..FrameSnapshot::default()
     };
     let bytes = frame.encode();
-    assert_eq!(bytes[..12], [4, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
+    assert_eq!(bytes[..12], [5, 0, 0, 0, 2, 0, 0, 0, 4, 3, 2, 1]);
     // Version, kind, mesh, sequence, is_replay; then doubles from the next multiple of 8.
     assert_eq!(bytes[24..32], 1f64.to_le_bytes());
     // 2 + 19 + 3 doubles, 4 numbers, a double; the list's length and its items.
     let list = 24 + 24 * 8 + 4 * 4 + 8;
     assert_eq!(bytes[list..list + 10], [3, 0, 0, 0, 0xfe, 0xff, 3, 0, 4, 0]);
-    // field (at a multiple of 4), two doubles, a list of one.
-    let field = (list + 10).next_multiple_of(4);
+    // Two empty lists (at a multiple of 4), the field, two doubles, a list of one.
+    let field = (list + 10).next_multiple_of(4) + 8;
     let end = (field + 4).next_multiple_of(8) + 16 + 4 + 2;
     assert_eq!(bytes.len(), end);
     assert_eq!(bytes[end - 2..], [0xff, 0xff]);

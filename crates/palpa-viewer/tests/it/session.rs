@@ -218,6 +218,8 @@ impl Inner {
             field: Field::None,
             recording: self.recording.clone(),
             game: None,
+            levels: vec![],
+            has_game_results: false,
             n_nodes: 6,
             allows_faults: false,
         }
@@ -229,6 +231,7 @@ pub(crate) fn hand(depth: f64) -> Hand {
         point: [0.0; 3],
         normal: [0.0, 0.0, 1.0],
         depth,
+        force: None,
     }
 }
 
@@ -263,9 +266,11 @@ impl Host for Session {
             HostFile::Scene => Ok(Some(inner.scene().to_string().into_bytes())),
             HostFile::SceneArchive => Ok(Some(b"PK".to_vec())),
             HostFile::Body => Err("the disk is full".into()),
-            HostFile::Map | HostFile::MapCsv | HostFile::RecordingLog | HostFile::Spectrum => {
-                Ok(None)
-            }
+            HostFile::Map
+            | HostFile::MapCsv
+            | HostFile::GameCsv
+            | HostFile::RecordingLog
+            | HostFile::Spectrum => Ok(None),
             HostFile::RecordingCurve => {
                 let there = inner.recording.duration > 0.0;
                 let curve = RecordingCurve {

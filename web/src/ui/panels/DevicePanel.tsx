@@ -3,10 +3,12 @@
 import { CHOICES } from '../../generated/scene';
 import { t } from '../../i18n';
 import { edit, scene, state } from '../../store';
-import { aloud, Controlled, Section, Segmented, Select, Slider, Toggle } from '../controls';
+import { aloud, Controlled, Section, Segmented, Select, Toggle } from '../controls';
 import { canVibrate } from '../feedback';
-import { formatNumber, inMillimetres } from '../quantity';
-import { chosenDepth, handMode, hasSound, hasVibration, pressDepth } from '../settings';
+import { Goals } from '../Goals';
+import { PressGoal } from '../PressGoal';
+import { formatNumber } from '../quantity';
+import { handMode, hasSound, hasVibration } from '../settings';
 
 export function DevicePanel() {
   const device = scene.value?.device ?? {};
@@ -38,8 +40,9 @@ export function DevicePanel() {
           options={(['press', 'orbit'] as const).map((value) => ({ value, label: t(`hand.${value}`) }))}
           onChange={(mode) => (handMode.value = mode)}
         />
-        <PressDepth testid="press-depth-panel" />
+        <PressGoal testid="panel-press" />
       </Section>
+      <Goals />
       <Section title={t('feedback.title')} hint={t('feedback.hint')}>
         <Toggle label={t('feedback.sound')} on={hasSound.value} onChange={(on) => (hasSound.value = on)} testid="sound" />
         <Toggle
@@ -51,22 +54,5 @@ export function DevicePanel() {
         {!canVibrate() && <p class="hint">{t('feedback.no_vibration')}</p>}
       </Section>
     </>
-  );
-}
-
-/** The depth to which a press goes. */
-export function PressDepth({ testid }: { testid: string }) {
-  const greatest = state.value?.greatest_depth ?? 0.02;
-  return (
-    <Slider
-      label={t('device.press_depth')}
-      value={pressDepth.value}
-      min={Math.min(0.0005, greatest / 20)}
-      max={greatest}
-      step={greatest > 0.05 ? 0.001 : 0.00025}
-      shown={inMillimetres(pressDepth.value)}
-      onInput={(depth) => (chosenDepth.value = depth)}
-      testid={testid}
-    />
   );
 }

@@ -1,25 +1,13 @@
-// The game: start a round, follow it, and read its result.
+// The game: choose and start it, follow a round, and read the results.
 
-import { signal } from '@preact/signals';
 import { useId } from 'preact/hooks';
 import { t } from '../../i18n';
-import { askAloud, state } from '../../store';
-import type { GameInfo, GameResult } from '../../generated/api';
-import { Button, Controlled, Section, Segmented, Toggle } from '../controls';
-import { formatNumber } from '../quantity';
-import { picking, show, view, wantedSeed } from '../settings';
-
-const wantedLumps = signal<'1' | '2' | '3'>('1');
-
-function startGame(n_lumps: number, seed: number | null): void {
-  picking.value = null;
-  void askAloud({ type: 'start_game', n_lumps, seed });
-}
-
-export function endGame(): void {
-  picking.value = null;
-  void askAloud({ type: 'end_game' });
-}
+import { state } from '../../store';
+import type { GameInfo, LevelInfo } from '../../generated/api';
+import { Button, Controlled, Download, Section, Segmented } from '../controls';
+import { bests, clock, rangeOf, startGame } from '../game';
+import { LEVELS, LUMPS, ROUNDS, wantedLevel, wantedLumps, wantedRounds, wantedSeed } from '../settings';
+import { GameResults } from './GameResults';
 
 export function GamePanel() {
   const game = state.value?.game ?? null;
@@ -30,9 +18,10 @@ export function GamePanel() {
         <Section title={t('game.going_on')}>
           <p class="hint">{t('game.how')}</p>
           <GameFigures game={game} />
+          <LevelWords level={game.level} />
         </Section>
       )}
-      {game?.result != null && <Result game={game} result={game.result} />}
+      {game?.result != null && <GameResults game={game} result={game.result} />}
     </Controlled>
   );
 }
@@ -41,109 +30,112 @@ function Start() {
   const id = useId();
   const seed = wantedSeed.value.trim();
   const isSeed = seed === '' || /^\d{1,15}$/.test(seed);
+  const level = wantedLevel.value;
   return (
-    <Section title={t('game.setup')} hint={t('game.about')}>
-      <Segmented
-        label={t('game.n_lumps')}
-        value={wantedLumps.value}
-        options={(['1', '2', '3'] as const).map((value) => ({ value, label: value, testid: `game-lumps-${value}` }))}
-        onChange={(value) => (wantedLumps.value = value)}
-      />
-      <div class={`row quantity ${isSeed ? '' : 'refused'}`}>
-        <label for={id}>{t('game.seed')}</label>
-        <input
-          id={id}
-          type="text"
-          inputMode="numeric"
-          autocomplete="off"
-          placeholder={t('game.seed_random')}
-          value={wantedSeed.value}
-          aria-invalid={!isSeed}
-          aria-describedby={isSeed ? undefined : `${id}-error`}
-          onInput={(event) => (wantedSeed.value = event.currentTarget.value)}
-          data-testid="game-seed"
+    <>
+      <Section title={t('game.setup')} hint={t('game.about')}>
+        <Segmented
+          label={t('game.level')}
+          value={level}
+          options={LEVELS.map((value) => ({ value, label: t(`game.level_${value}`), testid: `game-level-${value}` }))}
+          onChange={(value) => (wantedLevel.value = value)}
         />
-        {!isSeed && <p class="field-error" id={`${id}-error`} role="alert">{t('game.seed_error')}</p>}
-      </div>
-      <div class="buttons">
-        <Button
-          kind="primary"
-          disabled={!isSeed}
-          onClick={() => startGame(Number(wantedLumps.value), seed === '' ? null : Number(seed))}
-          testid="game-start"
-        >
-          {t('game.start')}
-        </Button>
-      </div>
+        {level === 'drawn' ? <p class="hint">{t('game.drawn')}</p> : <LevelWords level={level} />}
+        <Segmented
+          label={t('game.rounds')}
+          value={wantedRounds.value}
+          options={ROUNDS.map((value) => ({ value, label: value, testid: `game-rounds-${value}` }))}
+          onChange={(value) => (wantedRounds.value = value)}
+        />
+        <Segmented
+          label={t('game.n_lumps')}
+          value={wantedLumps.value}
+          options={LUMPS.map((value) => ({ value, label: value, testid: `game-lumps-${value}` }))}
+          onChange={(value) => (wantedLumps.value = value)}
+        />
+        <div class={`row quantity ${isSeed ? '' : 'refused'}`}>
+          <label for={id}>{t('game.seed')}</label>
+          <input
+            id={id}
+            type="text"
+            inputMode="numeric"
+            autocomplete="off"
+            placeholder={t('game.seed_random')}
+            value={wantedSeed.value}
+            aria-invalid={!isSeed}
+            aria-describedby={isSeed ? undefined : `${id}-error`}
+            onInput={(event) => (wantedSeed.value = event.currentTarget.value)}
+            data-testid="game-seed"
+          />
+          {!isSeed && <p class="field-error" id={`${id}-error`} role="alert">{t('game.seed_error')}</p>}
+        </div>
+        <div class="buttons">
+          <Button kind="primary" disabled={!isSeed} onClick={() => startGame(seed === '' ? null : Number(seed))} testid="game-start">
+            {t('game.start')}
+          </Button>
+        </div>
+      </Section>
+      <Bests />
+      {state.value?.has_game_results === true && (
+        <div class="buttons">
+          <Download path="api/game.csv" name="find-the-lump.csv" testid="game-csv">{t('game.save_csv')}</Download>
+        </div>
+      )}
+    </>
+  );
+}
+
+/** The ranges of a level in words. */
+function LevelWords({ level }: { level: LevelInfo['level'] }) {
+  const info = state.value?.levels.find((one) => one.level === level);
+  if (info === undefined) return null;
+  return (
+    <ul class="level-words hint" data-testid="level-words" data-level={level}>
+      <li>{t('game.range_radius', { range: rangeOf(info.radius, 1e3) })}</li>
+      <li>{t('game.range_cover', { range: rangeOf(info.cover, 1e3) })}</li>
+      <li>{t('game.range_times', { range: rangeOf(info.times, 1) })}</li>
+      <li>{t(info.is_either_side ? 'game.on_either_side' : 'game.on_near_side')}</li>
+      <li>{t(`game.map_${info.map}`)}</li>
+    </ul>
+  );
+}
+
+function Bests() {
+  const all = (['easy', 'medium', 'hard'] as const).flatMap((level) => {
+    const best = bests.value[level];
+    return best === undefined ? [] : [{ level, ...best }];
+  });
+  if (all.length === 0) return null;
+  return (
+    <Section title={t('game.bests')}>
+      <dl class="figures" data-testid="game-bests">
+        {all.map(({ level, score, seconds }) => [
+          <dt key={level}>{t(`game.level_${level}`)}</dt>,
+          <dd key={`${level} score`}>{t('game.best', { score, time: clock(seconds) })}</dd>,
+        ])}
+      </dl>
     </Section>
   );
 }
 
 function GameFigures({ game }: { game: GameInfo }) {
+  const { series } = game;
   return (
     <dl class="figures">
+      {series.n_rounds > 1 && (
+        <>
+          <dt>{t('game.rounds')}</dt>
+          <dd>{series.rounds.length + 1} / {series.n_rounds}</dd>
+        </>
+      )}
+      <dt>{t('game.level')}</dt>
+      <dd>{t(`game.level_${game.level}`)}</dd>
       <dt>{t('game.n_lumps')}</dt>
       <dd>{game.n_lumps}</dd>
       <dt>{t('game.marks')}</dt>
       <dd data-testid="game-marks">{game.marks.length}</dd>
       <dt>{t('game.seed')}</dt>
-      <dd data-testid="game-seed-used">{game.seed}</dd>
+      <dd data-testid="game-seed-used">{series.seed}</dd>
     </dl>
-  );
-}
-
-export function clock(seconds: number): string {
-  const whole = Math.floor(seconds);
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
-}
-
-function Result({ game, result }: { game: GameInfo; result: GameResult }) {
-  const newtons = (value: number): string => `${formatNumber(value)} N`;
-  return (
-    <>
-      <div class="section" role="group" data-testid="game-result" aria-label={t('game.result')}>
-        <div class="section-head"><h3>{t('game.result')}</h3></div>
-        <table class="result">
-          <thead>
-            <tr>
-              <th scope="col">{t('game.lump')}</th>
-              <th scope="col">{t('game.error')}</th>
-            </tr>
-          </thead>
-          <tbody>
-            {result.lumps.map((found, index) => (
-              <tr key={index}>
-                <th scope="row">{index + 1}</th>
-                <td data-error={found.error ?? ''}>
-                  {found.error == null ? t('game.not_found') : `${(found.error * 1e3).toFixed(1)} mm`}
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-        <dl class="figures">
-          <dt>{t('game.stray')}</dt>
-          <dd>{result.n_stray_marks}</dd>
-          <dt>{t('game.time')}</dt>
-          <dd>{clock(game.seconds)}</dd>
-          <dt>{t('game.contact_time')}</dt>
-          <dd>{clock(result.contact_seconds)}</dd>
-          <dt>{t('game.max_force')}</dt>
-          <dd>{newtons(result.max_force)}</dd>
-          <dt>{t('game.mean_force')}</dt>
-          <dd>{newtons(result.mean_force)}</dd>
-          <dt>{t('game.covered')}</dt>
-          <dd data-testid="game-covered">{Math.round(result.covered * 100)} %</dd>
-          <dt>{t('game.seed')}</dt>
-          <dd>{game.seed}</dd>
-        </dl>
-        <Toggle label={t('game.coverage')} on={view.value.coverage} onChange={(coverage) => show({ coverage })} testid="show-coverage" />
-      </div>
-      <div class="buttons">
-        <Button kind="primary" onClick={() => startGame(game.n_lumps, null)} testid="game-again">{t('game.new_round')}</Button>
-        <Button onClick={() => startGame(game.n_lumps, game.seed)} testid="game-same-seed">{t('game.same_seed')}</Button>
-        <Button onClick={endGame} testid="game-end">{t('game.end')}</Button>
-      </div>
-    </>
   );
 }

@@ -6,7 +6,7 @@ import { COLOURINGS, quantityOf, type ViewOptions } from '../../scene';
 import { Button, Section, Segmented, Select, Slider, Toggle } from '../controls';
 import { bodyView, legend, section } from '../body';
 import { parseQuantity, formatNumber } from '../quantity';
-import { showsLumps, neededField, show, view, wanted } from '../settings';
+import { neededField, picking, show, showsLumps, view, wanted } from '../settings';
 import { saveImage } from '../save';
 import { SavedViews } from '../SavedViews';
 import { useId, useState } from 'preact/hooks';
@@ -37,6 +37,13 @@ export function ViewPanel() {
       <Section title={t('view.cutaway')}>
         <Cutaway options={options} hiding={hiding} />
       </Section>
+      <Section title={t('probe.title')} hint={t('probe.about')}>
+        <div class="buttons">
+          <Button pressed={picking.value?.kind === 'probe'} disabled={hiding} onClick={() => (picking.value = picking.value?.kind === 'probe' ? null : { kind: 'probe' })} testid="probe-place">
+            {t('probe.place_it')}
+          </Button>
+        </div>
+      </Section>
       <Section title={t('view.layers')}>
         <Layers options={options} />
         <Toggle label={t('view.bones')} on={options.bones} onChange={(bones) => show({ bones })} testid="show-bones" />
@@ -58,6 +65,7 @@ export function ViewPanel() {
         />
         <Toggle label={t('view.shadows')} on={options.shadows} onChange={(shadows) => show({ shadows })} />
         <Toggle label={t('view.tool')} on={options.tool} onChange={(tool) => show({ tool })} />
+        <Toggle label={t('view.lens')} on={options.lens} disabled={hiding} onChange={(lens) => show({ lens })} testid="show-lens" />
         <Toggle label={t('view.force')} on={options.force} onChange={(force) => show({ force })} />
       </Section>
       <Section title={t('view.views')}>
@@ -160,9 +168,9 @@ function Cutaway({ options, hiding }: { options: ViewOptions; hiding: boolean })
         label={t('view.cutaway_axis')}
         value={cutaway.axis}
         disabled={!cutaway.on}
-        options={(['x', 'y', 'z', 'view'] as const).map((value) => ({
+        options={(['x', 'y', 'z', 'view', 'tool'] as const).map((value) => ({
           value,
-          label: value === 'view' ? t('view.cutaway_view') : value,
+          label: value === 'view' ? t('view.cutaway_view') : value === 'tool' ? t('view.cutaway_tool') : value,
           testid: `cutaway-axis-${value}`,
         }))}
         onChange={(axis) => change({ axis })}
@@ -174,7 +182,7 @@ function Cutaway({ options, hiding }: { options: ViewOptions; hiding: boolean })
         max={1}
         step={0.005}
         shown={`${Math.round(cutaway.position * 100)} %`}
-        disabled={!cutaway.on}
+        disabled={!cutaway.on || cutaway.axis === 'tool'}
         onInput={(position) => change({ position })}
         testid="cutaway-position"
       />

@@ -23,12 +23,18 @@ pub struct Glance {
     /// The load on that exterior; empty for none.
     load: Vec<f32>,
     displacements: Vec<Vec3>,
+    contacts: Vec<(u32, f32)>,
 }
 
 impl Glance {
     /// The body and its materials.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
+    }
+
+    /// Vertices of the skin in contact, ascending, each with the pressure on it, Pa.
+    pub fn contacts(&self) -> &[(u32, f32)] {
+        &self.contacts
     }
 
     /// Displacements of all nodes, m. `[n_nodes]` Cost: a substitution through the exterior.
@@ -49,18 +55,27 @@ impl Live {
     /// Copies the displacements, reusing the memory of an older copy if given. Cost: a copy of the
     /// displacements.
     pub fn glance(&self, old: Option<Glance>) -> Glance {
-        let (mut displacements, mut load) =
-            old.map_or_else(Default::default, |old| (old.displacements, old.load));
+        let (mut displacements, mut load, mut contacts) = old
+            .map_or_else(Default::default, |old| {
+                (old.displacements, old.load, old.contacts)
+            });
         displacements.clear();
         displacements.extend_from_slice(&self.state.displacements);
         load.clear();
         load.extend_from_slice(self.beyond.load().unwrap_or(&[]));
+        contacts.clear();
+        contacts.extend(
+            (self.skin.pressures.iter().enumerate())
+                .filter(|(_, pressure)| **pressure > 0.0)
+                .map(|(v, &pressure)| (v as u32, pressure as f32)),
+        );
         Glance {
             model: Arc::clone(&self.model),
             exterior: (self.exterior.origin(&self.outside))
                 .map(|outside| (Arc::clone(&self.plan), outside)),
             load,
             displacements,
+            contacts,
         }
     }
 }
