@@ -179,10 +179,10 @@ test('the body is turned over, and a mark there says that the lump is on the oth
   await start(palpa, { level: 'hard', seed: 4 });
   await palpa.by('game-turn').click();
   await markAt(palpa);
-  const { home, game } = await palpa.viewer.state();
+  const { home: at, game } = await palpa.viewer.state();
   const mark = game?.marks[0];
   assert.ok(mark);
-  const below = home.normal.reduce((sum, n, c) => sum + n * (mark[c] - home.point[c]), 0);
+  const below = at.normal.reduce((sum, n, c) => sum + n * (mark[c] - at.point[c]), 0);
   assert.ok(below < -0.02, `the mark is on the far side: ${below} m`);
   await palpa.by('game-reveal').click();
   const { result } = await revealed(palpa);

@@ -13,7 +13,7 @@ use palpa::one_paragraph;
 use palpa_rt::RecorderParams;
 use palpa_scene::Scene;
 use palpa_viewer::control::{
-    Field, Hand, MapSight, NoticeKind, NoticeLevel, Phase, Problem, Request,
+    Field, Hand, Level, MapSight, NoticeKind, NoticeLevel, Phase, Problem, Request,
 };
 use palpa_viewer::{Answer, Clients, HostFile, Publisher};
 use serde_json::Value;
@@ -66,8 +66,8 @@ pub(crate) struct Desk {
     builder: Builder,
     tape: Tape,
     game: Option<Game>,
-    /// The results of the last game, as a table.
-    game_table: Option<String>,
+    /// The results of the last game as a table, and the number of its rounds.
+    game_table: Option<(String, u32)>,
     bars: Bars,
     drills: Drills,
     palpation: Palpation,
@@ -237,12 +237,7 @@ impl Desk {
                 n_lumps,
                 level,
                 n_rounds,
-            } => self.start_game(GameParams {
-                seed: seed.or(self.seed),
-                n_lumps,
-                level,
-                n_rounds,
-            })?,
+            } => self.start_game(seed, n_lumps, level, n_rounds)?,
             Request::NextRound => self.next_round()?,
             Request::Mark { point } => self.game()?.mark(in_range(point, "point")?)?,
             Request::Unmark => self.game()?.unmark(),
@@ -504,7 +499,13 @@ impl Desk {
         game.context("no lumps are hidden; begin a round first")
     }
 
-    fn start_game(&mut self, params: GameParams) -> anyhow::Result<()> {
+    fn start_game(
+        &mut self,
+        seed: Option<u64>,
+        n_lumps: u32,
+        level: Option<Level>,
+        n_rounds: u32,
+    ) -> anyhow::Result<()> {
         if self.tape.is_under_way() {
             bail!("a recording is under way; stop it first");
         }
@@ -512,6 +513,12 @@ impl Desk {
         let before = match &self.game {
             Some(game) => &game.before,
             None => &self.history.wanted().scene,
+        };
+        let params = GameParams {
+            seed: seed.or(self.seed),
+            n_lumps,
+            level,
+            n_rounds,
         };
         let (game, scene) = Game::start(&live.world, before, params)?;
         if let Some(next) = &mut self.seed {
@@ -590,7 +597,10 @@ impl Desk {
             }
             HostFile::Body if !veil.shows_body_file() => None,
             HostFile::Body => self.stage.live()?.body(),
-            HostFile::GameCsv => self.game_table.clone().map(Material::Game),
+            HostFile::GameCsv => {
+                let (table, _) = self.game_table.as_ref()?;
+                Some(Material::Game(table.clone()))
+            }
             HostFile::Map | HostFile::MapCsv if veil.map() != MapSight::Everything => None,
             HostFile::Map | HostFile::MapCsv => {
                 let skin = self.stage.live()?.world.skin.surface().clone();
@@ -721,7 +731,7 @@ impl Desk {
             is_motion_running: live.is_some_and(|live| live.hand.is_in_motion()),
             recording: self.tape.info(),
             game: (self.game.as_ref()).map(|game| game.info(Instant::now())),
-            has_game_results: self.game_table.is_some(),
+            n_game_results: (self.game_table.as_ref()).map_or(0, |(_, n)| *n),
             n_undo: self.history.n_undo() as u32,
             n_redo: self.history.n_redo() as u32,
         });

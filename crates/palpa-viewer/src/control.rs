@@ -418,8 +418,8 @@ pub struct State {
     pub game: Option<GameInfo>,
     /// The levels of the game.
     pub levels: Vec<LevelInfo>,
-    /// Whether `/api/game.csv` has the results of a game.
-    pub has_game_results: bool,
+    /// Number of rounds in `/api/game.csv`.
+    pub n_game_results: u32,
     /// Number of nodes of the body.
     pub n_nodes: u32,
     /// Whether a page may cause faults on purpose.

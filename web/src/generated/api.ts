@@ -2229,8 +2229,6 @@ export interface components {
              * @description Largest depth that a page should offer, m.
              */
             greatest_depth: number;
-            /** @description Whether `/api/game.csv` has the results of a game. */
-            has_game_results: boolean;
             /** @description Pose of the hand over the place that the scene presses. */
             home: components["schemas"]["Hand"];
             /** @description Whether the scene was changed since it was loaded. */
@@ -2255,6 +2253,11 @@ export interface components {
              * @description Number of pages that are connected.
              */
             n_clients: number;
+            /**
+             * Format: uint32
+             * @description Number of rounds in `/api/game.csv`.
+             */
+            n_game_results: number;
             /**
              * Format: uint32
              * @description Number of nodes of the body.

@@ -8,12 +8,13 @@
 //!      \|/               t = (t_p h_q + t_q h_p) / (h_p + h_q)
 //!       b            with the feet t_p, t_q of p and q on the edge, and their heights h_p, h_q over it.
 //! ```
-//! Paths through a vertex stay in it. On flat skin the length is within 0.5 % of the exact one, on a limb of 24
-//! sides within 1 %.
+//! A path through a vertex is tried on either side of it, across the edges that meet there, until no side
+//! is shorter.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use palpa_mesh::distance::Closest;
 use palpa_mesh::{Surface, SurfaceIndex, Vec3};
 
 /// Points on each edge, and the largest number of all: a finer graph would hold up the session.
@@ -22,6 +23,11 @@ const MOST_POINTS: usize = 60_000;
 /// Sweeps over the crossings; fewer if no crossing moves by more than [`STILL`] of its edge.
 const SWEEPS: usize = 200;
 const STILL: f64 = 1e-6;
+/// Most passages of a vertex that are tried on its sides, and the gain that counts, m.
+const MOST_TRIES: usize = 60;
+const GAIN: f64 = 1e-9;
+/// Where a path that passes a vertex on one side crosses its edges at first, from the vertex.
+const NEAR: f64 = 0.1;
 
 /// A path along the skin.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,24 +52,19 @@ pub(super) struct Ways<'a> {
 }
 
 /// A point of a path between its ends.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Crossing {
-    Vertex(Vec3),
+    /// A vertex.
+    Vertex(u32),
     /// An edge from `a` to `b`, crossed at `a + t (b − a)`.
-    Edge {
-        a: Vec3,
-        b: Vec3,
-        t: f64,
-    },
+    Edge { edge: u32, t: f64 },
 }
 
-impl Crossing {
-    fn point(self) -> Vec3 {
-        match self {
-            Self::Vertex(point) => point,
-            Self::Edge { a, b, t } => a + (b - a) * t,
-        }
-    }
+/// An end of a path, or a crossing.
+#[derive(Debug, Clone, Copy)]
+enum Stop {
+    End { point: Vec3, triangle: u32 },
+    At(Crossing),
 }
 
 impl<'a> Ways<'a> {
@@ -132,7 +133,7 @@ impl<'a> Ways<'a> {
         let way = |mark: &Vec3| {
             let end = self.index.closest(*mark)?;
             if end.triangle == start.triangle {
-                return Some(straightened(end.point, Vec::new(), start.point));
+                return Some(Way::through(vec![end.point, start.point]));
             }
             let last = self.nodes_of(end.triangle).min_by(|&a, &b| {
                 let whole =
@@ -148,7 +149,11 @@ impl<'a> Ways<'a> {
                 crossings.push(self.crossing(node));
                 node = reached[node as usize].1;
             }
-            Some(straightened(end.point, crossings, start.point))
+            let stop = |at: Closest| Stop::End {
+                point: at.point,
+                triangle: at.triangle,
+            };
+            Some(self.shortened(stop(end), crossings, stop(start)))
         };
         marks.iter().map(way).collect()
     }
@@ -174,56 +179,192 @@ impl<'a> Ways<'a> {
     }
 
     fn crossing(&self, node: u32) -> Crossing {
-        let points = &self.surface.points;
-        match (node as usize).checked_sub(points.len()) {
-            None => Crossing::Vertex(points[node as usize]),
-            Some(at) => {
-                let [a, b] = self.edges[at / self.per_edge].map(|v| points[v as usize]);
-                let t = (at % self.per_edge + 1) as f64 / (self.per_edge + 1) as f64;
-                Crossing::Edge { a, b, t }
-            }
+        match (node as usize).checked_sub(self.surface.points.len()) {
+            None => Crossing::Vertex(node),
+            Some(at) => Crossing::Edge {
+                edge: (at / self.per_edge) as u32,
+                t: (at % self.per_edge + 1) as f64 / (self.per_edge + 1) as f64,
+            },
         }
     }
 
     fn point(&self, node: u32) -> Vec3 {
-        self.crossing(node).point()
+        self.at(self.crossing(node))
     }
-}
 
-/// The shortest path from `begin` to `end` over these edges and vertices.
-fn straightened(begin: Vec3, mut crossings: Vec<Crossing>, end: Vec3) -> Way {
-    for _ in 0..SWEEPS {
-        let mut moved: f64 = 0.0;
-        for i in 0..crossings.len() {
-            let p = i.checked_sub(1).map_or(begin, |i| crossings[i].point());
-            let q = crossings.get(i + 1).map_or(end, |next| next.point());
-            if let Crossing::Edge { a, b, t } = &mut crossings[i] {
-                let along = *b - *a;
+    fn at(&self, crossing: Crossing) -> Vec3 {
+        let points = &self.surface.points;
+        match crossing {
+            Crossing::Vertex(v) => points[v as usize],
+            Crossing::Edge { edge, t } => {
+                let [a, b] = self.edges[edge as usize].map(|v| points[v as usize]);
+                a + (b - a) * t
+            }
+        }
+    }
+
+    /// The shortest path near a given one.
+    fn shortened(&self, begin: Stop, crossings: Vec<Crossing>, end: Stop) -> Way {
+        let mut best = self.straightened(begin, crossings, end);
+        let mut length = self.way(begin, &best, end).length;
+        for _ in 0..MOST_TRIES {
+            let vertices = (0..best.len()).filter(|&i| matches!(best[i], Crossing::Vertex(_)));
+            let shorter = vertices
+                .flat_map(|i| self.sides_of(begin, &best, end, i))
+                .find_map(|crossings| {
+                    let crossings = self.straightened(begin, crossings, end);
+                    let other = self.way(begin, &crossings, end).length;
+                    (other < length - GAIN).then_some((other, crossings))
+                });
+            let Some(shorter) = shorter else { break };
+            (length, best) = shorter;
+        }
+        self.way(begin, &best, end)
+    }
+
+    fn way(&self, begin: Stop, crossings: &[Crossing], end: Stop) -> Way {
+        let inner = crossings.iter().map(|&crossing| self.at(crossing));
+        let points = std::iter::once(self.place(begin)).chain(inner);
+        Way::through(points.chain([self.place(end)]).collect())
+    }
+
+    fn place(&self, stop: Stop) -> Vec3 {
+        match stop {
+            Stop::End { point, .. } => point,
+            Stop::At(crossing) => self.at(crossing),
+        }
+    }
+
+    /// The triangles that a stop lies on.
+    fn triangles_of(&self, stop: Stop) -> &[u32] {
+        match stop {
+            Stop::End { triangle, .. } => {
+                let all = &self.around[self.surface.triangles[triangle as usize][0] as usize];
+                let at = all.iter().position(|&t| t == triangle).unwrap_or_default();
+                &all[at..=at]
+            }
+            Stop::At(Crossing::Vertex(v)) => &self.around[v as usize],
+            Stop::At(Crossing::Edge { edge, .. }) => &self.beside[edge as usize],
+        }
+    }
+
+    /// The crossings with edges that slide to where the path is shortest. One that comes to a vertex
+    /// becomes that vertex.
+    fn straightened(&self, begin: Stop, mut crossings: Vec<Crossing>, end: Stop) -> Vec<Crossing> {
+        let [begin, end] = [begin, end].map(|stop| self.place(stop));
+        for _ in 0..SWEEPS {
+            let mut moved: f64 = 0.0;
+            for i in 0..crossings.len() {
+                let Crossing::Edge { edge, t } = crossings[i] else {
+                    continue;
+                };
+                let p = i.checked_sub(1).map_or(begin, |i| self.at(crossings[i]));
+                let q = crossings.get(i + 1).map_or(end, |&next| self.at(next));
+                let [a, b] = self.edges[edge as usize].map(|v| self.surface.points[v as usize]);
+                let along = b - a;
                 let scale = along.norm_squared().max(f64::MIN_POSITIVE);
                 let on = |x: Vec3| {
-                    let foot = (x - *a).dot(&along) / scale;
-                    (foot, (x - *a - along * foot).norm())
+                    let foot = (x - a).dot(&along) / scale;
+                    (foot, (x - a - along * foot).norm())
                 };
                 let ((t_p, h_p), (t_q, h_q)) = (on(p), on(q));
                 let heights = h_p + h_q;
                 if heights > 1e-9 * scale.sqrt() {
                     let best = ((t_p * h_q + t_q * h_p) / heights).clamp(0.0, 1.0);
-                    moved = moved.max((best - *t).abs());
-                    *t = best;
+                    moved = moved.max((best - t).abs());
+                    crossings[i] = Crossing::Edge { edge, t: best };
+                }
+            }
+            if moved < STILL {
+                break;
+            }
+        }
+        for crossing in &mut crossings {
+            if let Crossing::Edge { edge, t } = *crossing {
+                let [a, b] = self.edges[edge as usize];
+                if t < STILL {
+                    *crossing = Crossing::Vertex(a);
+                } else if t > 1.0 - STILL {
+                    *crossing = Crossing::Vertex(b);
                 }
             }
         }
-        if moved < STILL {
-            break;
-        }
+        crossings.dedup();
+        crossings
     }
-    let mut points = vec![begin];
-    points.extend(crossings.into_iter().map(Crossing::point));
-    points.push(end);
-    points.dedup_by(|a, b| (*a - *b).norm() < 1e-9);
-    // Not `sum`: of nothing it is −0.
-    let length = (points.windows(2)).fold(0.0, |sum, pair| sum + (pair[1] - pair[0]).norm());
-    Way { length, points }
+
+    /// The paths that pass the vertex at `i` on its sides, across the edges between the triangles
+    /// before and after it.
+    fn sides_of(
+        &self,
+        begin: Stop,
+        crossings: &[Crossing],
+        end: Stop,
+        i: usize,
+    ) -> Vec<Vec<Crossing>> {
+        let Crossing::Vertex(v) = crossings[i] else {
+            return Vec::new();
+        };
+        let before = i.checked_sub(1).map_or(begin, |i| Stop::At(crossings[i]));
+        let after = (crossings.get(i + 1)).map_or(end, |&next| Stop::At(next));
+        let around = &self.around[v as usize];
+        let of = |stop: Stop| {
+            let all = self.triangles_of(stop).iter().copied();
+            all.filter(|t| around.contains(t)).collect::<Vec<u32>>()
+        };
+        let (from, to) = (of(before), of(after));
+        let mut all = Vec::new();
+        for &first in &from {
+            for way_out in self.edges_at(first, v) {
+                let Some(fan) = self.fan(v, first, way_out, &to) else {
+                    continue;
+                };
+                let mut path = crossings[..i].to_vec();
+                path.extend(fan.into_iter().map(|edge| Crossing::Edge {
+                    edge,
+                    t: if self.edges[edge as usize][0] == v {
+                        NEAR
+                    } else {
+                        1.0 - NEAR
+                    },
+                }));
+                path.extend_from_slice(&crossings[i + 1..]);
+                all.push(path);
+            }
+        }
+        all
+    }
+
+    /// The edges of a triangle that meet in a vertex.
+    fn edges_at(&self, triangle: u32, v: u32) -> impl Iterator<Item = u32> + '_ {
+        let sides = self.sides[triangle as usize];
+        (sides.into_iter()).filter(move |&e| self.edges[e as usize].contains(&v))
+    }
+
+    /// The edges at a vertex that are crossed from a triangle, at first across `way_out`, to one of `to`. None
+    /// if a rim is in the way.
+    fn fan(&self, v: u32, first: u32, way_out: u32, to: &[u32]) -> Option<Vec<u32>> {
+        let (mut triangle, mut edge, mut crossed) = (first, way_out, Vec::new());
+        for _ in 0..=self.around[v as usize].len() {
+            if to.contains(&triangle) {
+                return Some(crossed);
+            }
+            crossed.push(edge);
+            let beside = &self.beside[edge as usize];
+            triangle = *beside.iter().find(|&&t| t != triangle)?;
+            edge = self.edges_at(triangle, v).find(|&e| e != edge)?;
+        }
+        None
+    }
+}
+
+impl Way {
+    fn through(mut points: Vec<Vec3>) -> Self {
+        points.dedup_by(|a, b| (*a - *b).norm() < 1e-9);
+        // Not `sum`: of nothing it is −0.
+        let length = (points.windows(2)).fold(0.0, |sum, pair| sum + (pair[1] - pair[0]).norm());
+        Self { length, points }
+    }
 }
 
 #[cfg(test)]
@@ -268,7 +409,7 @@ mod tests {
             let [a, b] = [a, b].map(|[x, y]: [f64; 2]| Vec3::new(x, y, 0.0));
             let (found, exact) = (length(&flat, a, b), (a - b).norm());
             assert!(found > exact - 1e-9, "{found} is shorter than {exact}");
-            assert!(found < 1.005 * exact, "{found} is longer than {exact}");
+            assert!(found < 1.001 * exact, "{found} is longer than {exact}");
         }
     }
 
@@ -279,14 +420,14 @@ mod tests {
         // Open along the line of angle 0, as skin that was cut.
         let limb = grid(24, 20, |u, v| around(2.0 * PI * u, long * v));
         for (a, b) in [
-            ((1.0, 0.05), (1.0 + PI, 0.05)),
+            ((1.0_f64, 0.05_f64), (1.0 + PI, 0.05)),
             ((0.5, 0.1), (2.5, 0.2)),
             ((3.0, 0.2), (3.3, 0.03)),
         ] {
-            let exact = f64::hypot(radius * (a.0 - b.0 as f64), a.1 - b.1 as f64);
+            let exact = (radius * (a.0 - b.0)).hypot(a.1 - b.1);
             let found = length(&limb, around(a.0, a.1), around(b.0, b.1));
             // Chords of 24 sides are shorter than the circle by 0.3 %.
-            assert!((found / exact - 1.0).abs() < 0.01, "{found} for {exact}");
+            assert!((found / exact - 1.0).abs() < 0.004, "{found} for {exact}");
             let through = (around(a.0, a.1) - around(b.0, b.1)).norm();
             assert!(found > through - 1e-9);
         }
@@ -312,7 +453,7 @@ mod tests {
             assert!((on(middle) - middle).norm() < 1e-9, "{middle}");
         }
         let backward = length(&limb, mark, over);
-        assert!((way.length - backward).abs() < 0.005 * way.length);
+        assert!((way.length - backward).abs() < 0.001 * way.length);
     }
 
     #[test]

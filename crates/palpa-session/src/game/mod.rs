@@ -226,9 +226,10 @@ impl Game {
         round.result = Some((seconds, result));
     }
 
-    /// The revealed rounds as a table. `scene` is the name of the scene.
-    pub(crate) fn table(&self, scene: &str) -> String {
-        table::table(scene, &self.series)
+    /// The revealed rounds as a table, and their number. `scene` is the name of the scene.
+    pub(crate) fn table(&self, scene: &str) -> (String, u32) {
+        let table = table::table(scene, &self.series);
+        (table, self.series.rounds.len() as u32)
     }
 
     /// The game for the state; the result only once the lumps are revealed.
@@ -564,7 +565,7 @@ mod tests {
                 "no answer before the result"
             );
             reveal(&mut game, &world, now);
-            seen.push((info.seed, info.level, world.lumps[0].centre));
+            seen.push((info.seed, info.level, world.lumps[0].clone()));
             if round < 3 {
                 world = World::build(&game.next_round(&world).unwrap()).unwrap();
             }
@@ -576,9 +577,9 @@ mod tests {
                 .contains("last round")
         );
         let rounds = game.info(now).series.rounds;
-        for ((seed, level, centre), round) in seen.iter().zip(&rounds) {
+        for ((seed, level, lump), round) in seen.iter().zip(&rounds) {
             assert_eq!((round.seed, round.level), (*seed, *level));
-            assert_eq!(round.result.lumps[0].lump.centre, *centre);
+            assert_eq!(round.result.lumps[0].lump, *lump);
             assert!(round.result.coverage.is_empty() && round.result.lumps[0].path.is_empty());
             // Each round can be played again by itself.
             let single = GameParams {
@@ -588,7 +589,7 @@ mod tests {
             };
             let (_, again) = Game::start(&world, &before, single).unwrap();
             let again = World::build(&again).unwrap();
-            assert_eq!(again.lumps[0].centre, *centre);
+            assert_eq!(again.lumps[0], *lump);
         }
         assert_eq!(plan(7, None, 3), game.plan);
         let many = plan(7, None, 20);
@@ -609,7 +610,8 @@ mod tests {
         let now = Instant::now();
         game.begin(now);
         reveal(&mut game, &world, now + Duration::from_millis(12_300));
-        let text = game.table("a, \"b\"");
+        let (text, n_rounds) = game.table("a, \"b\"");
+        assert_eq!(n_rounds, 1);
         let mut lines = text.lines();
         let head: Vec<&str> = lines.next().unwrap().split(',').collect();
         let rows: Vec<Vec<&str>> = lines

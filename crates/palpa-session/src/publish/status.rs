@@ -26,8 +26,8 @@ pub(crate) struct Told {
     pub(crate) recording: RecordingInfo,
     /// The game, if one is on.
     pub(crate) game: Option<GameInfo>,
-    /// Whether there are results of a game.
-    pub(crate) has_game_results: bool,
+    /// Number of rounds in the table of results.
+    pub(crate) n_game_results: u32,
     /// Number of changes of the scene that can be undone.
     pub(crate) n_undo: u32,
     /// Number of changes of the scene that can be redone.
@@ -150,7 +150,7 @@ impl Status {
             is_motion_running,
             recording,
             game,
-            has_game_results,
+            n_game_results,
             n_undo,
             n_redo,
         } = told();
@@ -160,7 +160,7 @@ impl Status {
         state.is_motion_running = is_motion_running;
         state.recording = recording;
         state.game = game;
-        state.has_game_results = has_game_results;
+        state.n_game_results = n_game_results;
         (state.n_undo, state.n_redo) = (n_undo, n_redo);
         self.publisher.state(state.clone());
     }

@@ -219,7 +219,7 @@ impl Inner {
             recording: self.recording.clone(),
             game: None,
             levels: vec![],
-            has_game_results: false,
+            n_game_results: 0,
             n_nodes: 6,
             allows_faults: false,
         }

@@ -76,7 +76,7 @@ function Start() {
         </div>
       </Section>
       <Bests />
-      {state.value?.has_game_results === true && (
+      {(state.value?.n_game_results ?? 0) > 0 && (
         <div class="buttons">
           <Download path="api/game.csv" name="find-the-lump.csv" testid="game-csv">{t('game.save_csv')}</Download>
         </div>
