@@ -65,7 +65,7 @@ const SCENES: [BuiltIn; 12] = [
     in_gallery(scene!(
         "forearm_lump",
         "Forearm with a lump",
-        "the same with a fibrous lump of 12 mm in the muscle"
+        "the same with a fibrous lump of 16 mm in the muscle"
     )),
     in_gallery(scene!(
         "limb",

@@ -89,6 +89,16 @@ export class Colouring {
   }
 
   /** `inside`: what else is seen of the inside, besides the layers. */
+  /** The colour of a value, between evenly spaced `stops`. */
+  colours(stops: readonly string[]): (value: number) => string {
+    const [low, high] = this.range;
+    return (value) => {
+      const v = this.isLog ? Math.log10(Math.max(value, 1e-12)) : value;
+      const share = Math.min(1, Math.max(0, (v - low) / Math.max(high - low, 1e-20)));
+      return stops[Math.round(share * (stops.length - 1))];
+    };
+  }
+
   legend(by: ColourBy, layers: LayerInfo[], isOpen: boolean, inside: readonly Category[], isReference: boolean): Legend | null {
     if (!Colouring.isMap(by)) {
       if (by === 'tissue' && !isOpen) return null;

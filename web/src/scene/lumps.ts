@@ -148,7 +148,7 @@ function tetShares(x: Float32Array, a: number, b: number, c: number, d: number, 
 }
 
 /** Below 0 inside a lump, at rest; roughly a distance. */
-function outside({ shape: form, centre, axes }: LumpInfo, x: number, y: number, z: number): number {
+export function outside({ shape: form, centre, axes }: LumpInfo, x: number, y: number, z: number): number {
   const d = [x - centre[0], y - centre[1], z - centre[2]];
   const p = axes.map((a) => a[0] * d[0] + a[1] * d[1] + a[2] * d[2]);
   if (form.kind === 'capsule') {
@@ -159,14 +159,18 @@ function outside({ shape: form, centre, axes }: LumpInfo, x: number, y: number, 
   return (Math.hypot(p[0] / r[0], p[1] / r[1], p[2] / r[2]) - 1) * Math.min(...r);
 }
 
+/** From a lump's centre to its farthest point, m. */
+export function lumpReach({ shape }: LumpInfo): number {
+  return shape.kind === 'capsule' ? shape.radius + shape.length / 2 : shape.kind === 'ellipsoid' ? Math.max(...shape.radii) : shape.radius;
+}
+
 /** Area of the section that lies in lumps, m². */
 export function lumpArea(section: Section, lumps: LumpInfo[]): number {
   if (lumps.length === 0) return 0;
   const { positions: { data: x }, rest: { data: r }, indices } = section;
   let sum = 0;
   for (const lump of lumps) {
-    const form = lump.shape;
-    const reach = form.kind === 'capsule' ? form.radius + form.length / 2 : form.kind === 'ellipsoid' ? Math.max(...form.radii) : form.radius;
+    const reach = lumpReach(lump);
     for (let t = 0; t < indices.length; t += 3) {
       const [a, b, c] = [indices.data[t], indices.data[t + 1], indices.data[t + 2]].map((i) => 3 * i);
       const mx = (r[a] + r[b] + r[c]) / 3 - lump.centre[0], my = (r[a + 1] + r[b + 1] + r[c + 1]) / 3 - lump.centre[1], mz = (r[a + 2] + r[b + 2] + r[c + 2]) / 3 - lump.centre[2];

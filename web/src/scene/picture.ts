@@ -9,8 +9,9 @@ const MARGIN = 20;
 /** Height of the bar's ends, px. */
 const TICK = 6;
 
-/** `size` is that of the canvas on the page, px; the canvas itself may have more pixels. */
-export function pictureOf(canvas: HTMLCanvasElement, size: Vector2, theme: Theme, scaleBar: ScaleBar): Promise<Blob> {
+/** `size` is that of the canvas on the page, px; the canvas itself may have more pixels. The lens lies over it while it
+ * is open. */
+export function pictureOf(canvas: HTMLCanvasElement, size: Vector2, theme: Theme, scaleBar: ScaleBar, lens: HTMLCanvasElement): Promise<Blob> {
   const out = document.createElement('canvas');
   const { width, height } = canvas;
   [out.width, out.height] = [width, height];
@@ -23,6 +24,7 @@ export function pictureOf(canvas: HTMLCanvasElement, size: Vector2, theme: Theme
   g.fillRect(0, 0, width, height);
   g.drawImage(canvas, 0, 0);
   g.scale(width / size.x, width / size.x);
+  if (!lens.hidden) g.drawImage(lens, lens.offsetLeft, lens.offsetTop, lens.offsetWidth, lens.offsetHeight);
   drawScaleBar(g, MARGIN, size.y - MARGIN, theme.ink, scaleBar);
   return new Promise((resolve, reject) =>
     out.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the browser could not encode the picture as PNG'))), 'image/png'),

@@ -72,7 +72,7 @@ export class BodyView {
   private readonly cutaway: CutawayView;
   private readonly materials: Materials = new Map();
   private readonly lumps: LumpsView;
-  private readonly lens: LensView;
+  private readonly lens = new LensView();
   private readonly probe = new Probe();
   private readonly resizer: ResizeObserver;
   private readonly stop = new AbortController();
@@ -123,11 +123,10 @@ export class BodyView {
     });
     this.cutaway.onArea = (area) => this.onSection(area);
     this.lumps = new LumpsView(this.shared, this.stage, this.cutaway.planes);
-    this.lens = new LensView(this.shared);
 
     root.className = 'scene-root';
     this.gizmo = new Gizmo((axis, sign) => this.look(new Vector3().setComponent(axis, sign).add(new Vector3(0, -0.001, 0)).normalize()));
-    root.append(canvas, this.scaleBar.element, this.gizmo.element, this.forceTag.element, this.cutaway.grip.element);
+    root.append(canvas, this.lens.canvas, this.scaleBar.element, this.gizmo.element, this.forceTag.element, this.cutaway.grip.element);
     container.append(root);
     this.gestures = new Gestures(canvas, this.rig);
     this.stage.scene.add(this.tool.group, this.marks.group, this.lumps.group);
@@ -207,17 +206,24 @@ export class BodyView {
   /** Turns the camera to a place of the skin, so that a length around it (m) is seen. */
   lookAtPoint(point: Vec3, normal: Vec3, span: number): void {
     const direction = new Vector3(...normal);
-    // From above or below, aslant: the picture keeps its right and left.
+    const along = this.longest();
+    // Across the body, so that it lies as from its usual side; from above or below, aslant.
+    const across = direction.clone().addScaledVector(along, -direction.dot(along));
+    if (across.length() > 0.3) direction.copy(across.normalize());
     direction.y -= 0.35 * Math.abs(direction.z);
     this.rig.lookAt(new Vector3(...point), direction.normalize(), span);
+  }
+
+  /** The axis along which the body is longest. */
+  private longest(): Vector3 {
+    const size = this.body ? this.body.box.getSize(new Vector3()).toArray() : [1, 0, 0];
+    return new Vector3().setComponent(size.indexOf(Math.max(...size)), 1);
   }
 
   /** Shows the other side of the body: half a turn round its longest axis. */
   turnRound(): void {
     if (!this.body) return;
-    const size = this.body.box.getSize(new Vector3()).toArray();
-    const axis = new Vector3().setComponent(size.indexOf(Math.max(...size)), 1);
-    this.rig.turnOver(axis, this.body.centre);
+    this.rig.turnOver(this.longest(), this.body.centre);
   }
 
   /** The camera relative to the body; null while there is none. */
@@ -232,7 +238,7 @@ export class BodyView {
   /** The view as a PNG, with the scale bar. */
   image(): Promise<Blob> {
     this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true, grain: true });
-    const made = pictureOf(this.canvas, this.size, this.theme, this.scaleBar);
+    const made = pictureOf(this.canvas, this.size, this.theme, this.scaleBar, this.lens.canvas);
     this.loop.invalidate('camera');
     return made;
   }
@@ -419,7 +425,6 @@ export class BodyView {
     this.marks.scale(pixel, this.size);
     this.cutaway.size = this.size;
     renderer.render(stage.scene, this.rig.camera);
-    if (this.isLensOpen && this.frame) this.onLens(this.lens.draw(renderer, this.size, this.theme.lens, this.frame));
     if (this.probe.isOn && body && surfaces) {
       const values = Colouring.isMap(options.colourBy) ? (surfaces.value.array as Float32Array) : null;
       this.onProbe(this.probe.read(body, this.frame, values, (p) => this.onScreen(p)));
@@ -515,13 +520,12 @@ export class BodyView {
       wire: { on: options.wireframe, colour: wire, opacity: theme.wireOpacity },
     });
     const lumps = options.lumps ? knownLumps(state) : [];
-    for (const section of [cutaway.section, this.lens.section]) {
-      section.material.layers(looks.map((l) => l.colour), looks.map(sectionOpacity), looks.map((l) => l.name));
-      section.material.uniforms.isMapped.value = isMapped ? 1 : 0;
-      section.material.uniforms.isPlain.value = by === 'layer' ? 1 : 0;
-      section.colours(body.boneTriangles.length > 0 ? CORE : BONE, BONE, outline, wire, theme.wireOpacity, options.wireframe);
-      section.material.lumps(lumps, LUMP);
-    }
+    const { section } = cutaway;
+    section.material.layers(looks.map((l) => l.colour), looks.map(sectionOpacity), looks.map((l) => l.name));
+    section.material.uniforms.isMapped.value = isMapped ? 1 : 0;
+    section.material.uniforms.isPlain.value = by === 'layer' ? 1 : 0;
+    section.colours(body.boneTriangles.length > 0 ? CORE : BONE, BONE, outline, wire, theme.wireOpacity, options.wireframe);
+    section.material.lumps(lumps, LUMP);
     cutaway.frameColour = theme.plane;
     const isSeenThrough = looks.some((l) => !l.visible || l.opacity < 1);
     this.lumps.set(isSeenThrough ? lumps : [], body, LUMP, Boolean(state?.game?.result));
@@ -567,13 +571,22 @@ export class BodyView {
     this.cutaway.slice(body, { cutaway: options.cutaway, tool, ...this.shownInSections(body, surfaces) });
   }
 
-  /** Opens the lens while the tool touches, and cuts what it shows. */
+  /** Draws the lens while the tool touches. */
   private magnify(body: Body, surfaces: Surfaces): void {
-    const { frame, lens, options } = this;
+    const { frame, lens, options, theme } = this;
     window.clearTimeout(this.lensTimer);
     const isOpen = options.lens && frame !== null && lens.isDue(frame, performance.now());
     if (isOpen) {
-      lens.update(body, frame, this.shownInSections(body, surfaces), this.rig.axes());
+      const { values, bones } = this.shownInSections(body, surfaces);
+      const by = options.colourBy;
+      const looks = this.looks(body);
+      this.onLens(lens.draw(body, frame, {
+        values, bones,
+        colourOf: Colouring.isMap(by) ? this.colouring.colours(mapOf(by).stops) : null,
+        layers: looks,
+        lumps: options.lumps ? knownLumps(this.state) : [],
+        colours: { background: theme.lens, core: CORE, bone: BONE, lump: LUMP, outline: theme.outline },
+      }, this.rig.axes(), this.size));
       // It closes by itself after the last contact.
       if (frame.n_active === 0) this.lensTimer = window.setTimeout(() => this.loop.invalidate('style'), LensView.stays + 50);
     } else if (this.isLensOpen) {

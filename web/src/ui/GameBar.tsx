@@ -74,7 +74,6 @@ function Verdict({ game, result }: { game: GameInfo; result: GameResult }) {
       {isLast
         ? <Button kind="primary" disabled={cannot} onClick={() => newGame(game)} testid="game-bar-again">{t(game.series.n_rounds > 1 ? 'game.new_series' : 'game.new_round')}</Button>
         : <Button kind="primary" disabled={cannot} onClick={nextRound} testid="game-next">{t('game.next_round')}</Button>}
-      <Button kind="quiet" onClick={() => bodyView.value?.turnRound()}>{t('game.turn_round')}</Button>
     </section>
   );
 }

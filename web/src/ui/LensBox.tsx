@@ -6,7 +6,7 @@ import { state } from '../store';
 import { lensPicture } from './body';
 import { Button } from './controls';
 import { Icon } from './icons';
-import { withPrefix } from './quantity';
+import { formatQuantity } from './quantity';
 import { show } from './settings';
 
 export function LensBox() {
@@ -31,7 +31,7 @@ export function LensBox() {
         <span class="lens-force" style={{ left: `${Math.round(forceAt.x)}px`, top: `${Math.round(forceAt.y)}px` }}>{`${force.toFixed(2)} N`}</span>
       )}
       <span class="lens-scale" style={{ width: `${Math.round(tenMillimetres)}px` }}>10 mm</span>
-      {pressure !== null && <span class="lens-pressure">{t('lens.pressure', { pressure: withPrefix(pressure, 'Pa', 2) })}</span>}
+      {pressure !== null && <span class="lens-pressure">{t('lens.pressure', { pressure: formatQuantity(pressure, 'pressure', 2) })}</span>}
     </figure>
   );
 }

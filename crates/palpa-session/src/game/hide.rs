@@ -24,8 +24,13 @@ const SAME_SIDE: f64 = 0.5;
 /// The levels.
 pub(crate) const LEVELS: [Level; 3] = [Level::Easy, Level::Medium, Level::Hard];
 
-/// The ranges of a level. Which lumps of them are noticed on the forearm: see the test
-/// `levels_get_harder`.
+/// The ranges of a level. By `palpa press` on the forearm with a ball of 10 mm at 4 mm, the force above
+/// the weakest, middle and strongest lump of a level grows by
+///
+/// | easy | 76 % | 182 % | 360 % |
+/// | --- | --- | --- | --- |
+/// | medium | 15 % | 36 % | 108 % |
+/// | hard | 4 % | 9 % | 27 % |
 pub(crate) fn info(level: Level) -> LevelInfo {
     let (radius, cover, times) = match level {
         Level::Easy => ([7e-3, 9e-3], [2.5e-3, 4e-3], [8.0, 16.0]),

@@ -1,7 +1,7 @@
 // The result of a round, and the summary of a series.
 
 import { language, t } from '../../i18n';
-import type { FoundLump, GameInfo, GameResult, RoundInfo, Score } from '../../generated/api';
+import type { FoundLump, GameInfo, GameResult, RoundInfo } from '../../generated/api';
 import { Button, Download, Toggle } from '../controls';
 import { bests, clock, endGame, isLastRound, newGame, nextRound, repeatGame, standing, verdict } from '../game';
 import { formatNumber } from '../quantity';
@@ -41,7 +41,7 @@ export function GameResults({ game, result }: { game: GameInfo; result: GameResu
         </dl>
         <Toggle label={t('game.coverage')} on={view.value.coverage} onChange={(coverage) => show({ coverage })} testid="show-coverage" />
       </div>
-      <ScoreTable score={result.score} game={game} />
+      <ScoreTable result={result} game={game} />
       <div class="buttons">
         {isLast ? (
           <>
@@ -88,7 +88,7 @@ function signed(value: number): string {
   return `${value < 0 ? '−' : '+'}${formatNumber(Math.abs(value), 2)}`;
 }
 
-function ScoreTable({ score, game }: { score: Score; game: GameInfo }) {
+function ScoreTable({ result: { score, lumps, n_found }, game }: { result: GameResult; game: GameInfo }) {
   const best = bests.value[game.level];
   return (
     <div class="section" role="group" aria-label={t('game.score')} data-testid="game-score" data-total={score.total}>
@@ -101,6 +101,8 @@ function ScoreTable({ score, game }: { score: Score; game: GameInfo }) {
           <dt key={part}>{t(`game.score_${part}`)}</dt>,
           <dd key={`${part} n`}>{score[part]} / 25</dd>,
         ])}
+        <dt>{t('game.score_found')}</dt>
+        <dd>× {n_found} / {Math.max(lumps.length, game.marks.length)}</dd>
       </dl>
       <p class="hint">{t('game.score_rule')}</p>
       {standing.value === 'best' && <p class="new-best" role="status">{t('game.new_best', { level: t(`game.level_${game.level}`) })}</p>}
