@@ -42,13 +42,21 @@ async function home(palpa) {
   await palpa.page.locator('.stage-tools').getByRole('button', { name: 'Home' }).click();
 }
 
-/** Presses until a force is felt, and lifts. @param {PalpaPage} palpa */
+/**
+ * Presses until a force is felt, and lifts. On a busy machine a page may be silent for so long that the hand lifts by itself:
+ * then it is pressed again.
+ * @param {PalpaPage} palpa
+ */
 async function pressOnce(palpa, x = 0.46, y = 0.5) {
-  await palpa.press(x, y);
-  const read = await palpa.reads('a force', ({ newtons }) => newtons > 0.1);
-  await palpa.release();
-  await palpa.atRest();
-  return read;
+  let isFelt = false;
+  for (let k = 0; k < 5 && !isFelt; k++) {
+    const { tick } = await palpa.readout();
+    await palpa.press(x, y);
+    await palpa.reads('a force, or a hand that lifted', (now) => (isFelt = now.newtons > 0.1) || now.tick > tick + 15_000);
+    await palpa.release();
+    await palpa.atRest();
+  }
+  assert.ok(isFelt, 'a press is felt');
 }
 
 /** Marks a place by a click. @param {PalpaPage} palpa */
@@ -223,7 +231,7 @@ test('a series of three rounds by mouse and keyboard, with its table', async () 
       await palpa.focus();
       await page.keyboard.press('Space');
       await palpa.reads('a force', ({ newtons }) => newtons > 0.1);
-      await page.keyboard.press('Space');
+      await page.keyboard.press('Escape');
       await palpa.atRest();
       await enter('game-mark-mode');
       await palpa.focus();

@@ -1,6 +1,7 @@
 // The palpation map: the skin remembers what was felt.
 
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { sharedPage } from './session.mjs';
 import { until } from './viewer.mjs';
@@ -37,6 +38,11 @@ test('a stroke paints the skin, and the map is saved and cleared', async () => {
   }
   const vtu = await (await palpa.viewer.get('api/map.vtu')).text();
   for (const name of ['stiffness', 'against_surroundings', 'coverage']) assert.ok(vtu.includes(`Name="${name}"`), name);
+
+  const [picture] = await Promise.all([palpa.page.waitForEvent('download'), palpa.by('map-png').click()]);
+  assert.match(picture.suggestedFilename(), /^palpation-map-.*\.png$/);
+  const png = readFileSync(await picture.path());
+  assert.ok(png.length > 20_000 && png.subarray(1, 4).toString() === 'PNG');
 
   await palpa.by('map-clear').click();
   await until('nothing is remembered', async () => (await n()) === 0);

@@ -20,7 +20,7 @@ import { ForceTag, Gizmo, ScaleBar } from './overlay';
 import { BONE, CORE, LUMP, mapOf, mapTextures, PALPATION_STOPS, palpationTexture, type Theme } from './palette';
 import { PalpationVolume } from './palpation';
 import { nearestOnSkin, pickNearest, pickNoSkin, pickSkin, type NoSkin } from './picking';
-import { pictureOf } from './picture';
+import { pictureOf, type PictureLegend } from './picture';
 import { Probe, type Probed } from './probe';
 import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES, type CameraPose } from './rig';
@@ -235,10 +235,10 @@ export class BodyView {
     if (this.body && pose) this.rig.setPose(pose, this.body.centre);
   }
 
-  /** The view as a PNG, with the scale bar. */
-  image(): Promise<Blob> {
+  /** The view as a PNG, with the scale bar and, if there is one, a legend. */
+  image(legend: PictureLegend | null): Promise<Blob> {
     this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true, grain: true });
-    const made = pictureOf(this.canvas, this.size, this.theme, this.scaleBar, this.lens.canvas);
+    const made = pictureOf(this.canvas, this.size, this.theme, this.scaleBar, this.lens.canvas, legend);
     this.loop.invalidate('camera');
     return made;
   }

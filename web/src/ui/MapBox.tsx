@@ -3,10 +3,11 @@
 import { apiUrl } from '../connection';
 import { t } from '../i18n';
 import type { MapLegend } from '../scene';
-import { askAloud, isController } from '../store';
+import { askAloud, isController, notify } from '../store';
 import { mapLegend } from './body';
 import { Button, Segmented } from './controls';
-import { formatNumber } from './quantity';
+import { mapWords } from './mapwords';
+import { saveImage } from './save';
 import { mapSight, show, view } from './settings';
 
 export function MapBox() {
@@ -35,24 +36,16 @@ function Felt({ shown }: { shown: MapLegend }) {
     <>
       <div class="legend-bar" style={{ background: `linear-gradient(to right, ${shown.stops.join(', ')})` }} />
       <div class="legend-scale" data-testid="map-scale">
-        {[shown.range[0], (shown.range[0] + shown.range[1]) / 2, shown.range[1]].map((value, index) => <span key={index}>{inUnit(value, shown)}</span>)}
+        {mapWords(shown).labels.map((label, index) => <span key={index}>{label}</span>)}
       </div>
-      {shown.kind === 'surroundings' && (
-        <p class="map-finding" data-testid="map-finding">
-          {shown.finding === null ? t('map.nothing') : t('map.stands_out', { share: formatNumber(100 * shown.finding, 2) })}
-        </p>
-      )}
+      {shown.kind === 'surroundings' && <p class="map-finding" data-testid="map-finding">{mapWords(shown).note}</p>}
       {shown.nForgotten > 0 && <p class="map-hint">{t('map.forgotten', { n: shown.nForgotten })}</p>}
       <div class="map-tools">
         <Button kind="quiet" disabled={!isController.value} onClick={() => void askAloud({ type: 'clear_map' })} testid="map-clear">{t('map.clear')}</Button>
+        <Button kind="quiet" onClick={() => saveImage('palpation-map').catch((error: unknown) => notify('error', String(error)))} testid="map-png">PNG</Button>
         {mapSight.value === 'everything' && <a class="button quiet" href={apiUrl('api/map.csv')} download="palpation-map.csv" data-testid="map-csv">CSV</a>}
         {mapSight.value === 'everything' && <a class="button quiet" href={apiUrl('api/map.vtu')} download="palpation-map.vtu" data-testid="map-vtu">VTU</a>}
       </div>
     </>
   );
-}
-
-/** A value of the legend. */
-function inUnit(value: number, { kind }: MapLegend): string {
-  return kind === 'surroundings' ? `+${formatNumber(100 * value, 2)} %` : `${formatNumber(value / 1e3, 2)} N/mm`;
 }
