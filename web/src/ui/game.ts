@@ -57,12 +57,16 @@ export function clock(seconds: number): string {
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
 }
 
-const inMillimetres = (metres: number): string => `${formatNumber(1e3 * metres, 2)} mm`;
+/** A length in whole mm, below 10 mm in tenths. */
+export function millimetres(metres: number): string {
+  const value = 1e3 * metres;
+  return `${value.toFixed(value < 9.95 ? 1 : 0)} mm`;
+}
 
 /** A lump's result in a sentence. */
 export function verdict({ is_found, error, is_other_side }: FoundLump): string {
   if (error == null) return t('game.unmarked');
-  const words = t(is_found ? 'game.found' : 'game.missed', { error: inMillimetres(error) });
+  const words = t(is_found ? 'game.found' : 'game.missed', { error: millimetres(error) });
   return is_other_side ? `${words} ${t('game.other_side')}` : words;
 }
 

@@ -3,11 +3,10 @@
 import { language, t } from '../../i18n';
 import type { FoundLump, GameInfo, GameResult, RoundInfo } from '../../generated/api';
 import { Button, Download, Toggle } from '../controls';
-import { bests, clock, endGame, isLastRound, newGame, nextRound, repeatGame, standing, verdict } from '../game';
+import { bests, clock, endGame, isLastRound, millimetres, newGame, nextRound, repeatGame, standing, verdict } from '../game';
 import { formatNumber } from '../quantity';
 import { show, view } from '../settings';
 
-const millimetres = (metres: number): string => `${formatNumber(1e3 * metres, 2)} mm`;
 const percent = (share: number): string => `${Math.round(100 * share)} %`;
 
 export function GameResults({ game, result }: { game: GameInfo; result: GameResult }) {
@@ -140,7 +139,7 @@ function Summary({ rounds }: { rounds: readonly RoundInfo[] }) {
             <tr key={index}>
               <th scope="row">{index + 1} {t(`game.level_${level}`)}</th>
               <td>{result.n_found} / {result.lumps.length}</td>
-              <td>{result.lumps.map(({ error }) => (error == null ? '–' : formatNumber(1e3 * error, 2))).join(', ')}</td>
+              <td>{result.lumps.map(({ error }) => (error == null ? '–' : millimetres(error).replace(' mm', ''))).join(', ')}</td>
               <td>{clock(seconds)}</td>
               <td>{result.score.total}</td>
             </tr>
