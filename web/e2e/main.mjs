@@ -13,5 +13,6 @@ import './power.test.mjs';
 import './own.test.mjs';
 import './access.test.mjs';
 import './curves.test.mjs';
+import './first.test.mjs';
 import './connection.test.mjs';
 import './words.test.mjs';

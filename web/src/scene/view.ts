@@ -21,6 +21,7 @@ import { BONE, CORE, LUMP, mapOf, mapTextures, PALPATION_STOPS, palpationTexture
 import { PalpationVolume } from './palpation';
 import { nearestOnSkin, pickNearest, pickNoSkin, pickSkin, type NoSkin } from './picking';
 import { pictureOf, type PictureLegend } from './picture';
+import { Pins } from './pins';
 import { Probe, type Probed } from './probe';
 import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES, type CameraPose } from './rig';
@@ -58,6 +59,7 @@ export class BodyView {
   private readonly quality: Quality;
   private readonly loop: DrawLoop;
   private readonly scaleBar = new ScaleBar();
+  private readonly pins = new Pins(this.rig);
   private readonly gizmo: Gizmo;
   private readonly forceTag = new ForceTag();
   private readonly tool = new ToolView();
@@ -293,6 +295,13 @@ export class BodyView {
     return home ? { point: home.point as Vec3, normal: home.normal as Vec3 } : null;
   }
 
+  /** Keeps an element of the page at a place of the body while the picture turns. Returns what ends it. */
+  pin(element: HTMLElement, place: () => { point: Vec3; normal: Vec3 } | null): () => void {
+    const end = this.pins.add(element, place);
+    this.pins.update(this.size);
+    return end;
+  }
+
   /** Pictures no longer leave the engine more time when it is late. */
   neverYield(): void {
     this.quality.neverYield();
@@ -433,6 +442,7 @@ export class BodyView {
     this.scaleBar.update(pixel);
     this.gizmo.update(this.rig.axes());
     this.cutaway.placeGrip(this.size, options.cutaway.position);
+    this.pins.update(this.size);
   }
 
   /** A point in the picture, px from its upper left corner. */

@@ -7,6 +7,7 @@ import { askAloud, isController, notify } from '../store';
 import { mapLegend } from './body';
 import { Button, Segmented } from './controls';
 import { mapWords } from './mapwords';
+import { NOTICED_SHARE, noticedBy } from './people';
 import { saveImage } from './save';
 import { mapSight, show, view } from './settings';
 
@@ -39,6 +40,7 @@ function Felt({ shown }: { shown: MapLegend }) {
         {mapWords(shown).labels.map((label, index) => <span key={index}>{label}</span>)}
       </div>
       {shown.kind === 'surroundings' && <p class="map-finding" data-testid="map-finding">{mapWords(shown).note}</p>}
+      {shown.kind === 'surroundings' && shown.finding !== null && <Noticed share={shown.finding} />}
       {shown.nForgotten > 0 && <p class="map-hint">{t('map.forgotten', { n: shown.nForgotten })}</p>}
       <div class="map-tools">
         <Button kind="quiet" disabled={!isController.value} onClick={() => void askAloud({ type: 'clear_map' })} testid="map-clear">{t('map.clear')}</Button>
@@ -47,5 +49,15 @@ function Felt({ shown }: { shown: MapLegend }) {
         {mapSight.value === 'everything' && <a class="button quiet" href={apiUrl('api/map.vtu')} download="palpation-map.vtu" data-testid="map-vtu">VTU</a>}
       </div>
     </>
+  );
+}
+
+/** Whether a hand would notice what stands out. */
+function Noticed({ share }: { share: number }) {
+  const { least, most } = NOTICED_SHARE;
+  return (
+    <p class="map-hint" title={t('map.noticed_source')} data-testid="map-noticed" data-noticed={noticedBy(share)}>
+      {t(`map.noticed_${noticedBy(share)}`, { least: Math.round(100 * least), most: Math.round(100 * most) })}
+    </p>
   );
 }

@@ -48,6 +48,12 @@ export function written(force: number): string {
   return force > 0 && force < 0.005 && state.peek()?.method === 'reference' ? withPrefix(force, 'N', 2) : `${force.toFixed(2)} N`;
 }
 
+/** Depth below the skin, or height above it. */
+function depthWords(depth: number): string {
+  const height = -depth * 1e3;
+  return height > 0 ? t('readout.above', { height: `${height < 0.95 ? height.toFixed(1) : Math.round(height)} mm` }) : inMillimetres(depth);
+}
+
 /** The error bar of the force shown: none of a recording, or while the engine cannot be heard. */
 function presentBar() {
   const bar = figures.value?.error_bar;
@@ -130,7 +136,10 @@ function ForceNumber() {
       write(number.current!, written(force));
       // For programs that read the page: not part of the document, so that setting it draws nothing.
       Object.assign(number.current!, { shown: { newtons: force, tick: newest.tick, metres: newest.depth } });
-      write(depth.current!, inMillimetres(newest.depth));
+      write(depth.current!, depthWords(newest.depth));
+      // A zero without contact is no measurement.
+      number.current!.toggleAttribute('data-none', force < 0.005 && newest.depth <= 0);
+      depth.current!.toggleAttribute('data-above', newest.depth < 0);
       writeAttribute(gauge.current!, 'aria-valuenow', force.toFixed(2));
       writeAttribute(gauge.current!, 'aria-valuemax', String(axes.force));
       write(scale.current!, `${formatNumber(axes.force)} N`);
@@ -153,9 +162,10 @@ function ForceNumber() {
 
   const speak = (): void => {
     if (latestFrame === null) return;
-    const words = t('readout.spoken', {
+    const { depth } = latestFrame;
+    const words = t(depth < 0 ? 'readout.spoken_above' : 'readout.spoken', {
       force: written(magnitude(latestFrame.force)),
-      depth: inMillimetres(latestFrame.depth),
+      depth: depthWords(depth),
     });
     // Screen readers speak a text only when it changes.
     setSpoken(words === spoken ? `${words}\u00a0` : words);

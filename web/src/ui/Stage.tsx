@@ -12,7 +12,9 @@ import {
 import { bodyView, firstBodyMs, legend, lensPicture, mapLegend, probed, section, yields } from './body';
 import { Building } from './Building';
 import { Button, Segmented } from './controls';
+import { FirstHint, GhostChip } from './FirstRun';
 import { GameBar } from './GameBar';
+import { beginGhost, notePress } from './ghost';
 import { Icon } from './icons';
 import { LegendBox } from './LegendBox';
 import { LensBox } from './LensBox';
@@ -55,6 +57,7 @@ export function Stage() {
     hand.onTarget = (target) => {
       if (target !== null && target.depth > 0) lastTouched.value = target.point;
       isDeepest.value = hand.isDeepest;
+      if (target !== null) notePress(target.depth);
     };
     hand.onMark = (picked) => takePicked(picked, body);
     bodyView.value = body;
@@ -78,6 +81,7 @@ export function Stage() {
         hand.forget();
       }),
       watchMisses(body),
+      beginGhost(hand, body),
       onMesh((mesh) => body.setMesh(mesh)),
       onMap((map) => body.setMap(map)),
       onFrame((frame) => {
@@ -104,6 +108,7 @@ export function Stage() {
       <div class="stage-top">
         <GameBar />
         <PickingHint />
+        <GhostChip />
         <Yields />
         {isWatching.value && <p class="chip">{t(state.value?.controller == null ? 'control.nobody_chip' : 'control.watching_chip')}</p>}
       </div>
@@ -111,6 +116,7 @@ export function Stage() {
         {problem === 'none' && <div class="stage-legends"><MapBox /><LegendBox /></div>}
         <ReplayBar />
       </div>
+      {problem === 'none' && <FirstHint />}
       <Missed />
       <Phase />
     </main>
