@@ -110,4 +110,4 @@ pub use threads::{Granted, Priority, Wish, lock_memory};
 pub use tissue::{
     StepStatus, Tissue, TissueInput, TissueStep, ahead, empty_patch, patch_hash, stamp,
 };
-pub use tissue_thread::{TissueParams, TissueStats};
+pub use tissue_thread::{REST_STEPS, TissueParams, TissueStats};

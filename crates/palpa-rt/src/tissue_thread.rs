@@ -27,6 +27,8 @@ const FIRST_PAUSE: u64 = 16;
 const LONGEST_PAUSE: u64 = 4096;
 /// Least time between the beginnings of two steps, s.
 const LEAST_DT: f64 = 1e-6;
+/// Number of steps without an iteration after which the tissue is at rest.
+pub const REST_STEPS: u32 = 50;
 
 /// Settings of the tissue thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +36,9 @@ pub struct TissueParams {
     /// Smallest time between the starts of two steps, s. More steps could not be felt, and other
     /// threads can use the core meanwhile.
     pub min_period: f64,
+    /// The same, if it is longer, once [`REST_STEPS`] steps in a row have found nothing to do: a body at rest, or under
+    /// a tool that does not move.
+    pub rest_period: f64,
     /// Largest time by which one step moves the tissue on, s. Without the cap, a stall would cause
     /// a jump.
     pub max_dt: f64,
@@ -43,6 +48,7 @@ impl Default for TissueParams {
     fn default() -> Self {
         Self {
             min_period: 1e-3,
+            rest_period: 0.0,
             max_dt: 0.02,
         }
     }
@@ -168,6 +174,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         let mut period = self.params.min_period;
         let mut status = StepStatus::Converged;
         let mut lost = Lost::default();
+        let mut idle_steps = 0;
         while !stop.load(Ordering::Relaxed) {
             if self.faults.is_tissue_paused() {
                 self.wait_out_pause(stop);
@@ -178,11 +185,20 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             // Steps keep a fixed grid while they are short enough; the thread does not catch up
             // after a late step.
             // Later in any case: a clock that stands still would give a step of no time.
-            due = (due + self.params.min_period).max(now + LEAST_DT);
+            let is_at_rest = idle_steps >= REST_STEPS;
+            let spacing = if is_at_rest {
+                self.params.rest_period
+            } else {
+                0.0
+            };
+            due = (due + self.params.min_period.max(spacing)).max(now + LEAST_DT);
             let elapsed = now - last_start;
             last_start = now;
             // Smoothed, so that one late step does not make the loop expect the next ones late.
-            period += 0.1 * (elapsed.min(self.params.max_dt) - period);
+            // Nor does rest, after which steps are as short as before.
+            if !is_at_rest {
+                period += 0.1 * (elapsed.min(self.params.max_dt) - period);
+            }
             lost.add(elapsed - self.params.max_dt, now, &mut self.speaker);
             step += 1;
             // After a panic the state of the tissue may be half changed, so the thread ends. The
@@ -192,6 +208,12 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
                 self.speaker
                     .say(self.clock.now(), Happening::TissuePanicked(step));
                 return;
+            };
+            let is_idle = new_status == StepStatus::Converged && record.iterations == 0;
+            idle_steps = if is_idle {
+                idle_steps.saturating_add(1)
+            } else {
+                0
             };
             if new_status != status {
                 status = new_status;

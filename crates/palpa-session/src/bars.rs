@@ -14,9 +14,10 @@ use palpa_viewer::control::{BarProblem, ErrorBar};
 
 use crate::stage::Live;
 
-/// A tool that moves less than the first value, m, for the second, s, stays.
+/// A tool that moves less than the first value, m, for the second, s, stays: a hand that feels its way leaves the cores
+/// to the steps and the pictures.
 const STAYS: f64 = 0.4e-3;
-const STAY: f64 = 0.4;
+const STAY: f64 = 0.8;
 /// Rest between the end of one computation and the beginning of the next, s.
 const REST: f64 = 0.5;
 /// A bar holds where the tool is this near to its place, as a share of the contact radius, and as

@@ -6,8 +6,8 @@ use crate::{
 };
 use palpa_device::{DeviceModel, Grip, Path as Path3, SimulatedDevice};
 use palpa_rt::{
-    Ending, Engine, EngineParams, Log, Machine, RecorderParams, ReplayParams, Report, StartError,
-    StepRecord, Verdict, replay,
+    Ending, Engine, EngineParams, Log, Machine, REST_STEPS, RecorderParams, ReplayParams, Report,
+    StartError, StepRecord, TissueParams, Verdict, replay,
 };
 use palpa_servo::Vec3;
 use std::path::Path;
@@ -316,4 +316,38 @@ fn an_engine_that_is_dropped_lets_go_of_its_devices() {
     until("a force is felt", || hand.force() > 0.1);
     drop(engine);
     assert!(hand.force() == 0.0);
+}
+
+#[test]
+fn a_tissue_at_rest_steps_seldom() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let devices = vec![announced(Scripted::new(&Hand::default()))];
+    let seldom = EngineParams {
+        tissue: TissueParams {
+            rest_period: 15e-3,
+            ..TissueParams::default()
+        },
+        ..params()
+    };
+    let idle = || {
+        let mut bed = Bed::new();
+        bed.is_idle = true;
+        bed
+    };
+    let mut engine = Engine::start(idle(), devices, &seldom, &recorder(&path)).unwrap();
+    go_on(&mut engine, 0, u64::from(REST_STEPS) + 10, 0);
+    engine.stop();
+    let log = Log::open(&path).unwrap();
+    let (busy, rest) = log.steps.split_at(REST_STEPS as usize + 2);
+    assert!(rest.len() > 5);
+    // On a fixed grid: one that begins late is nearer to the next.
+    let time = rest[rest.len() - 1].now - rest[0].now;
+    assert!(time > 15e-3 * (rest.len() - 2) as f64, "{time} s");
+    assert!(busy[busy.len() / 2].period < 15e-3);
+    // Rest is not taken for slow steps: patches are not expected late after it.
+    let last = rest.last().unwrap();
+    assert!((last.period - rest[0].period).abs() < 1e-12);
+    let again = replay(&log, idle(), &ReplayParams::default());
+    assert_eq!(again.verdict, Verdict::Same, "{again:?}");
 }

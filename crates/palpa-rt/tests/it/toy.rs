@@ -38,6 +38,8 @@ pub(crate) struct Bed {
     jobs: u64,
     /// A thread to wake at every step, for `until`.
     pub(crate) waiter: Option<Thread>,
+    /// Whether its steps say that there was nothing to do.
+    pub(crate) is_idle: bool,
 }
 
 impl Bed {
@@ -54,6 +56,7 @@ impl Bed {
             panics_in: None,
             jobs: 0,
             waiter: None,
+            is_idle: false,
         }
     }
 }
@@ -148,7 +151,7 @@ impl Tissue for Bed {
                 Some(step) if (step..step + 20).contains(&self.steps) => StepStatus::Failed,
                 _ => StepStatus::Converged,
             },
-            iterations: 1,
+            iterations: u32::from(!self.is_idle),
             residual: 0.0,
             factor: self.factor,
             zone: 0,

@@ -13,6 +13,8 @@ use crate::hand::{HandDriver, Place};
 const LOOK_PERIOD: f64 = 1.0 / 60.0;
 /// Least time between two steps of the tissue, s, because the browser needs the processor too.
 const STEP_PERIOD: f64 = 2e-3;
+/// The same while the body is at rest, s: a hand that comes down is 0.4 mm deeper by then.
+const REST_PERIOD: f64 = 10e-3;
 /// Requested priority of the threads that compute the force. A browser without a graphics card
 /// takes every core it gets; the force has priority if the system grants it.
 pub(crate) const BEFORE_THE_BROWSER: Wish = Wish {
@@ -55,6 +57,7 @@ impl World {
             time_waits: true,
             tissue: TissueParams {
                 min_period: STEP_PERIOD,
+                rest_period: REST_PERIOD,
                 ..TissueParams::default()
             },
             tissue_wish: BEFORE_THE_BROWSER,
