@@ -145,10 +145,11 @@ function takePicked(picked: Picked, body: BodyView): void {
 }
 
 async function markLump(point: Vec3): Promise<void> {
+  // The new state may come after the answer.
+  const game = state.peek()?.game;
   const error = await ask({ type: 'mark', point });
   if (error !== null) notify('warning', error);
-  const game = state.peek()?.game;
-  if (game != null && game.marks.length >= game.n_lumps) picking.value = null;
+  else if (game != null && game.marks.length + 1 >= game.n_lumps) picking.value = null;
 }
 
 function movePress(point: Vec3): Promise<string | null> {
