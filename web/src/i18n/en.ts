@@ -304,7 +304,7 @@ export const en = {
   'probe.place_it': 'Read a point of the body…',
   'probe.about': 'A point on the skin or in the cutaway: displacement, stiffness, pressure and the quantity that colours the body.',
   'view.lens': 'Lens while pressing',
-  'view.cutaway_tool': 'at the tool',
+  'view.cutaway_tool': 'tool',
   'lens.title': 'Under the tool',
   'lens.close': 'Close the lens; “View” opens it again',
   'lens.pressure': 'Pressure up to {pressure}',

@@ -306,7 +306,7 @@ export const ja: Dictionary = {
   'probe.place_it': '体の一点の値を読む…',
   'probe.about': '皮膚または断面の一点：変位、硬さ、圧力、着色中の量。',
   'view.lens': '押しているときのレンズ',
-  'view.cutaway_tool': '道具の位置',
+  'view.cutaway_tool': '道具',
   'lens.title': '道具の下',
   'lens.close': 'レンズを閉じる（「表示」で再び開く）',
   'lens.pressure': '圧力 最大 {pressure}',

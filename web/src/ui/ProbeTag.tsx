@@ -5,7 +5,7 @@ import { state } from '../store';
 import { bodyView, legend, probed } from './body';
 import { Button } from './controls';
 import { Icon } from './icons';
-import { formatNumber, formatQuantity, inMillimetres, withPrefix } from './quantity';
+import { formatNumber, formatQuantity, inMillimetres } from './quantity';
 
 export function ProbeTag() {
   const now = probed.value;
@@ -21,11 +21,11 @@ export function ProbeTag() {
         <Button kind="quiet" label={t('probe.remove')} onClick={() => bodyView.value?.setProbe(null)} testid="probe-remove"><Icon name="close" /></Button>
         <strong>{layer === null ? t('probe.skin') : named('tissue', state.value?.layers[layer]?.name ?? '')}</strong>
         <dl>
-          <dt>{t('probe.place')}</dt><dd>{point.map((x) => formatNumber(1e3 * x, 4)).join(', ')} mm</dd>
+          <dt>{t('probe.place')}</dt><dd>{point.map((x) => (1e3 * x).toFixed(1)).join(', ')} mm</dd>
           <dt>{t('colour.displacement')}</dt><dd>{inMillimetres(Math.hypot(dx, dy, dz), 2)}</dd>
-          {contact !== null && <><dt>{t('colour.contact')}</dt><dd>{withPrefix(contact, 'Pa', 3)}</dd></>}
+          {contact !== null && <><dt>{t('colour.contact')}</dt><dd>{formatQuantity(contact, 'pressure')}</dd></>}
           {value !== null && shown !== null && shown.title !== 'displacement' && shown.title !== 'contact' && shown.title !== 'stiffness' && (
-            <><dt>{t(`colour.${shown.title}`)}</dt><dd>{isPascal ? withPrefix(value, 'Pa', 3) : formatNumber(value, 4)}</dd></>
+            <><dt>{t(`colour.${shown.title}`)}</dt><dd>{isPascal ? formatQuantity(value, 'pressure') : formatNumber(value, 4)}</dd></>
           )}
           {state.value?.method !== 'reference' && <><dt>{t('probe.modulus')}</dt><dd>{formatQuantity(stiffness, 'pressure')}</dd></>}
         </dl>

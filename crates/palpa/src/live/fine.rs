@@ -20,8 +20,9 @@ const MARGIN: f64 = 15e-3;
 /// Number of parts of an edge of the grown body, between which there are places: with vertices only, a
 /// tool would be up to half an edge beside the middle of the fine part.
 const PARTS: f64 = 3.0;
-/// Largest number of meshes that are kept for reuse.
-const MOST_KEPT: usize = 24;
+/// Largest number of nodes in the meshes that are kept for reuse, but for the latest: a node with its elements takes some
+/// 3 kB.
+const MOST_KEPT: usize = 60_000;
 
 /// Meshes of the scene's body, each fine around one place of the body as it was grown.
 pub struct FineScene {
@@ -129,8 +130,12 @@ impl FineBodies for FineScene {
             None => Arc::new(self.build(place)?),
         };
         let mut kept = self.kept();
-        if kept.len() >= MOST_KEPT {
-            kept.pop_front();
+        let mut n_nodes: usize = kept.iter().map(|(_, model)| model.n_nodes()).sum();
+        while n_nodes > MOST_KEPT {
+            let Some((_, oldest)) = kept.pop_front() else {
+                break;
+            };
+            n_nodes -= oldest.n_nodes();
         }
         kept.push_back((place, Arc::clone(&model)));
         Ok(model)
