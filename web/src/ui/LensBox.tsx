@@ -9,6 +9,9 @@ import { Icon } from './icons';
 import { formatQuantity } from './quantity';
 import { show } from './settings';
 
+/** Two names nearer to each other than this would overlap, px. */
+const NAME_HEIGHT = 16;
+
 export function LensBox() {
   const shown = lensPicture.value;
   if (shown === null) return null;
@@ -24,7 +27,7 @@ export function LensBox() {
     >
       <figcaption>{t('lens.title')}</figcaption>
       <Button kind="quiet" label={t('lens.close')} onClick={() => show({ lens: false })} testid="lens-close"><Icon name="close" /></Button>
-      {names.map(({ layer, y }) => (
+      {names.filter(({ y }, i) => i === 0 || y - names[i - 1].y >= NAME_HEIGHT).map(({ layer, y }) => (
         <span key={layer} class="lens-name" style={{ top: `${Math.round(y)}px` }}>{named('tissue', layers[layer]?.name ?? '')}</span>
       ))}
       {forceAt !== null && (

@@ -51,7 +51,7 @@ export function written(force: number): string {
 /** Depth below the skin, or height above it. */
 function depthWords(depth: number): string {
   const height = -depth * 1e3;
-  return height > 0 ? t('readout.above', { height: `${height < 0.95 ? height.toFixed(1) : Math.round(height)} mm` }) : inMillimetres(depth);
+  return height >= 0.05 ? t('readout.above', { height: `${height < 0.95 ? height.toFixed(1) : Math.round(height)} mm` }) : inMillimetres(depth);
 }
 
 /** The error bar of the force shown: none of a recording, or while the engine cannot be heard. */

@@ -4,7 +4,7 @@
 import { effect, signal, untracked } from '@preact/signals';
 import type { HandControl } from '../hand';
 import type { BodyView, Vec3 } from '../scene';
-import { ask, isController, isReplaying, latestFrame, notify, state } from '../store';
+import { ask, isController, isReplaying, latestFrame, notify, state, status } from '../store';
 import { distance } from './history';
 import { picking, pressDepth, reducedMotion, remembered, show } from './settings';
 
@@ -140,6 +140,8 @@ function stroke(hand: HandControl, body: BodyView): () => void {
   let waited = 0;
   let before = performance.now();
   const timer = window.setInterval(() => {
+    // A busy engine is waited for.
+    if (status.peek() !== 'open') return;
     const now = performance.now();
     const step = Math.min((now - before) / 1000, LONGEST_STEP);
     before = now;
