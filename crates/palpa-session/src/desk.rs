@@ -624,7 +624,7 @@ impl Desk {
         if let Some(live) = self.stage.live_mut() {
             live.refresh();
             let was_in_motion = live.hand.is_in_motion();
-            live.move_hand(dt, now);
+            live.move_hand(now);
             if was_in_motion != live.hand.is_in_motion() {
                 self.status.change();
             }

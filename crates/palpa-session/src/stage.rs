@@ -33,7 +33,12 @@ pub(crate) struct Live {
     /// Number of the engine: no two of a session share it.
     pub(crate) engine: u64,
     figures: Figures,
+    /// The engine's time at which the hand moved last, s.
+    moved_at: f64,
 }
+
+/// Longest time by which the hand moves at once, s.
+const LONGEST_MOVE: f64 = 0.1;
 
 impl Live {
     /// Takes the latest data from engine and tissue.
@@ -49,8 +54,11 @@ impl Live {
         self.running.looks.current()
     }
 
-    /// Moves the hand by `dt` seconds.
-    pub(crate) fn move_hand(&mut self, dt: f64, now: Instant) {
+    /// Moves the hand as far as it comes in the engine's time since the last move. That time stands still while the
+    /// engine has no core, and the hand must not run away from its device.
+    pub(crate) fn move_hand(&mut self, now: Instant) {
+        let dt = (self.entry.tick.now - self.moved_at).clamp(0.0, LONGEST_MOVE);
+        self.moved_at = self.entry.tick.now;
         let frame = self.world.scene_from_device;
         let ground = Ground {
             skin: &self.world.skin,
@@ -231,6 +239,7 @@ impl Stage {
             step: StepRecord::default(),
             engine: self.n_engines,
             figures: Figures::new(),
+            moved_at: 0.0,
         });
     }
 }
