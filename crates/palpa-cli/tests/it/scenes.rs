@@ -106,8 +106,19 @@ fn a_name_that_is_nearly_right_is_answered_with_the_right_one() {
     for command in ["press", "view", "loop-report", "export"] {
         meant(&[command, "limbb"], "limb");
     }
-    meant(&["check", "limbb"], "limb");
-    meant(&["check", "skin.stil"], "skin.stl");
+    // A check has a line for each file, whatever it finds.
+    for (file, right) in [("limbb", "limb"), ("skin.stil", "skin.stl")] {
+        let (code, stdout, said) = bench.run(&["check", file]);
+        assert_eq!(
+            (code, &*stdout),
+            (2, &*format!("{file}: cannot be read\n")),
+            "{said}"
+        );
+        assert!(
+            said.contains(&format!("did you mean \"{right}\"?")),
+            "{said}"
+        );
+    }
     meant(&["view", "forarm", "--no-open"], "forearm");
     meant(&["press", "scenes/limb.toml"], "limb");
     meant(&["press", "my_tigh.toml"], "my_thigh.toml");
