@@ -33,7 +33,9 @@ function inked(palpa, kind, variable) {
   return palpa.page.evaluate(([id, name]) => {
     const place = /** @type {HTMLElement} */ (document.querySelector(`[data-testid=${id}]`));
     const canvas = /** @type {HTMLCanvasElement} */ (place.querySelector('canvas'));
-    const over = /** @type {HTMLElement} */ (place.querySelector('.u-over'));
+    const over = /** @type {HTMLElement | null} */ (place.querySelector('.u-over'));
+    // Between two plots there is none for a moment.
+    if (over === null) return [0];
     const [left, top, width, height] = [over.offsetLeft, over.offsetTop, over.offsetWidth, over.offsetHeight].map((x) => Math.round(x * devicePixelRatio));
     const paint = document.createElement('canvas').getContext('2d');
     if (paint === null) throw new Error('no canvas');
