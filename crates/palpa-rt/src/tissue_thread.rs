@@ -184,14 +184,14 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             let now = self.clock.now();
             // Steps keep a fixed grid while they are short enough; the thread does not catch up
             // after a late step.
-            // Later in any case: a clock that stands still would give a step of no time.
             let is_at_rest = idle_steps >= REST_STEPS;
             let spacing = if is_at_rest {
-                self.params.rest_period
+                self.params.min_period.max(self.params.rest_period)
             } else {
-                0.0
+                self.params.min_period
             };
-            due = (due + self.params.min_period.max(spacing)).max(now + LEAST_DT);
+            // Later in any case: a clock that stands still would give a step of no time.
+            due = (due + spacing).max(now + LEAST_DT);
             let elapsed = now - last_start;
             last_start = now;
             // Smoothed, so that one late step does not make the loop expect the next ones late.

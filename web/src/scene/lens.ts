@@ -137,7 +137,8 @@ export class LensView {
     const place = placeIn(size);
     const g = this.begin(place, look.colours.background);
     const tip = new Vector3().fromArray(frame.tool);
-    this.turn(new Quaternion().fromArray(frame.orientation), axes);
+    const orientation = new Quaternion().fromArray(frame.orientation);
+    this.turn(orientation, axes);
     const { out, up, half, middle } = this;
     middle.fromArray(frame.place).addScaledVector(up, (ABOVE - 0.5) * 2 * half * ASPECT);
     const plane: CutPlane = { normal: out.toArray(), offset: out.dot(tip) };
@@ -151,7 +152,7 @@ export class LensView {
     this.drawLumps(g, look);
     this.drawOutline(g, look.colours.outline);
     this.drawPressure(g, body, frame, plane);
-    this.drawTool(g, tip, new Quaternion().fromArray(frame.orientation));
+    this.drawTool(g, tip, orientation);
     return {
       place,
       force: new Vector3().fromArray(frame.force).length(),

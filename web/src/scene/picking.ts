@@ -72,7 +72,7 @@ function nearestPart(ray: Ray, body: Body, { section, bones, isKept }: Pickable)
   return { picked: best, distance: nearest };
 }
 
-/** What is pressed in place of the skin: an end or side where the body was cut off, a section, a bone. */
+/** The part under the pointer that is not skin: an end or side where the body was cut off, a section, a bone. */
 export type NoSkin = 'end' | 'section' | 'bone';
 
 /** The part under a ray that is nearer than the skin and is not skin; null beside the body. */

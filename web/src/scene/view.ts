@@ -25,6 +25,7 @@ import { Pins } from './pins';
 import { Probe, type Probed } from './probe';
 import { Quality, type Detail } from './quality';
 import { CameraRig, SIDES, type CameraPose } from './rig';
+import type { SectionValues } from './section';
 import { Stage } from './stage';
 import { Surfaces, type Materials } from './surfaces';
 import { ToolView } from './tool';
@@ -562,23 +563,24 @@ export class BodyView {
     this.onMapLegend(legend);
   }
 
-  /** The values and layers that sections show. */
-  private shownInSections(body: Body, surfaces: Surfaces) {
-    const { options, state } = this;
-    const by = options.colourBy;
+  /** The values by which sections are coloured. */
+  private sectionValues(body: Body, surfaces: Surfaces): SectionValues {
+    const by = this.options.colourBy;
     const nodes = Colouring.isMap(by) && by !== 'stiffness' ? (surfaces.value.array as Float32Array) : null;
-    return {
-      values: { nodes, prisms: by === 'stiffness' ? body.stiffness : null },
-      layers: this.looks(body).map((l) => l.visible),
-      bones: options.bones,
-      lumps: knownLumps(state),
-    };
+    return { nodes, prisms: by === 'stiffness' ? body.stiffness : null };
   }
 
   private slice(body: Body, surfaces: Surfaces): void {
-    const { options, frame } = this;
+    const { options, frame, state } = this;
     const tool = frame && { tip: new Vector3().fromArray(frame.tool), axis: new Vector3(0, 0, 1).applyQuaternion(new Quaternion().fromArray(frame.orientation)) };
-    this.cutaway.slice(body, { cutaway: options.cutaway, tool, ...this.shownInSections(body, surfaces) });
+    this.cutaway.slice(body, {
+      cutaway: options.cutaway,
+      values: this.sectionValues(body, surfaces),
+      layers: this.looks(body).map((l) => l.visible),
+      bones: options.bones,
+      lumps: knownLumps(state),
+      tool,
+    });
   }
 
   /** Draws the lens while the tool touches. */
@@ -587,13 +589,12 @@ export class BodyView {
     window.clearTimeout(this.lensTimer);
     const isOpen = options.lens && frame !== null && lens.isDue(frame, performance.now());
     if (isOpen) {
-      const { values, bones } = this.shownInSections(body, surfaces);
       const by = options.colourBy;
-      const looks = this.looks(body);
       this.onLens(lens.draw(body, frame, {
-        values, bones,
+        values: this.sectionValues(body, surfaces),
+        bones: options.bones,
         colourOf: Colouring.isMap(by) ? this.colouring.colours(mapOf(by).stops) : null,
-        layers: looks,
+        layers: this.looks(body),
         lumps: options.lumps ? knownLumps(this.state) : [],
         colours: { background: theme.lens, core: CORE, bone: BONE, lump: LUMP, outline: theme.outline },
       }, this.rig.axes(), this.size));

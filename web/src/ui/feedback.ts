@@ -5,6 +5,7 @@ import { effect } from '@preact/signals';
 import { onFrame, state } from '../store';
 import { magnitude } from './history';
 import { hasSound, hasVibration } from './settings';
+import { beginTone, type Tone } from './tone';
 
 const LOWEST_PITCH = 110;
 /** Range of the pitch: small loudspeakers play it well. */
@@ -14,33 +15,12 @@ const DEAD_BAND = 0.02;
 /** Length of one vibration, ms; the next one starts a little before its end. */
 const PIECE = 120;
 
-interface Tone {
-  context: AudioContext;
-  oscillator: OscillatorNode;
-  gain: GainNode;
-}
-
 export function canVibrate(): boolean {
   return 'vibrate' in navigator || pads().length > 0;
 }
 
 function pads(): Gamepad[] {
   return (navigator.getGamepads?.() ?? []).filter((pad): pad is Gamepad => pad?.vibrationActuator != null);
-}
-
-function beginTone(): Tone {
-  const context = new AudioContext();
-  const oscillator = context.createOscillator();
-  oscillator.type = 'triangle';
-  const gain = context.createGain();
-  gain.gain.value = 0;
-  oscillator.connect(gain).connect(context.destination);
-  oscillator.start();
-  // Browsers keep a page silent until the user has touched it.
-  const wake = (): void => void context.resume();
-  window.addEventListener('pointerdown', wake, { once: true });
-  window.addEventListener('keydown', wake, { once: true });
-  return { context, oscillator, gain };
 }
 
 /** Strength of sound and vibration, 0 to 1; its square root makes small forces
@@ -57,7 +37,7 @@ export function beginFeedback(): void {
 
   effect(() => {
     if (hasSound.value) {
-      tone ??= beginTone();
+      tone ??= beginTone('triangle');
       return;
     }
     void tone?.context.close();

@@ -1,4 +1,4 @@
-// The game on the page: what is asked of the engine, the best scores that the browser keeps, and where the camera looks.
+// The game on the page: requests to the engine, the best scores that the browser keeps, and where the camera looks.
 
 import { effect, signal, untracked } from '@preact/signals';
 import type { FoundLump, GameInfo, Level, RoundInfo } from '../generated/api';

@@ -4,6 +4,7 @@ import { effect, signal } from '@preact/signals';
 import { onFrame } from '../store';
 import { magnitude } from './history';
 import { bandHigh, bandLow, goalsSound, hasBand, hasPainLimit, painLimit } from './settings';
+import { beginTone, type Tone } from './tone';
 
 export type Reached = 'none' | 'below' | 'in' | 'above' | 'pain';
 
@@ -36,7 +37,7 @@ export function reachedBy(force: number, before: Reached): Reached {
 /** Follows the force. */
 export function beginGoals(): void {
   let began = 0;
-  let sound: { context: AudioContext; oscillator: OscillatorNode; gain: GainNode } | null = null;
+  let sound: Tone | null = null;
   let heardAt = 0;
   onFrame((frame) => {
     if (!hasBand.peek() && !hasPainLimit.peek()) {
@@ -55,16 +56,7 @@ export function beginGoals(): void {
       sound?.gain.gain.setTargetAtTime(0, sound.context.currentTime, 0.03);
       return;
     }
-    if (sound === null) {
-      // Browsers keep a page silent until it was touched: a press has touched it.
-      const context = new AudioContext();
-      const oscillator = context.createOscillator();
-      const gain = context.createGain();
-      gain.gain.value = 0;
-      oscillator.connect(gain).connect(context.destination);
-      oscillator.start();
-      sound = { context, oscillator, gain };
-    }
+    sound ??= beginTone(tone.type);
     void sound.context.resume();
     sound.oscillator.type = tone.type;
     sound.oscillator.frequency.value = tone.pitch;
