@@ -43,8 +43,8 @@ const LONGEST_ARROW = 0.6;
 const LEAST_SCALE = 1;
 /** Forces below this have no arrow, N. */
 const LEAST_FORCE = 0.01;
-/** Part of the width at the left edge where the names of layers stand. */
-const NAMES = 0.16;
+/** Where the names of layers stand, as a share of the width. */
+const NAMES = 0.1;
 /** Least height of a layer that has room for its name, px. */
 const ROOM_FOR_NAME = 12;
 /** The body around the tool that is cut, in half widths: the rest is out of sight. */
@@ -436,13 +436,17 @@ export class LensView {
 
   /** Where the names of the layers stand, at the left edge. */
   private names(): LensPicture['names'] {
-    const { positions, layers } = this.section;
+    const { positions: { data: p }, indices, layers } = this.section;
     const low: number[] = [], high: number[] = [];
-    for (let i = 0; i < layers.length; i++) {
-      const x = this.x(positions.data, 3 * i);
-      if (x < 0 || x > NAMES * this.width) continue;
-      const y = Math.min(Math.max(this.y(positions.data, 3 * i), 0), this.height);
-      const layer = layers.data[i];
+    // Where the triangles cross an upright line: a coarse mesh may have no corner near the edge.
+    const line = NAMES * this.width;
+    for (let t = 0; t < indices.length; t++) {
+      const a = indices.data[t], b = indices.data[t % 3 === 2 ? t - 2 : t + 1];
+      const ax = this.x(p, 3 * a), bx = this.x(p, 3 * b);
+      if (ax >= line === bx >= line) continue;
+      const ay = this.y(p, 3 * a), by = this.y(p, 3 * b);
+      const y = Math.min(Math.max(ay + ((line - ax) / (bx - ax)) * (by - ay), 0), this.height);
+      const layer = layers.data[a];
       low[layer] = Math.min(low[layer] ?? Infinity, y);
       high[layer] = Math.max(high[layer] ?? -Infinity, y);
     }
