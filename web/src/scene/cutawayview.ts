@@ -36,11 +36,12 @@ export class CutawayView {
   readonly planes: Plane[] = [];
   readonly section: SectionView;
   readonly grip: PlaneGrip;
+  /** Whether a user moves the plane, which otherwise follows the tool. Set at once, not with the next picture: a press may
+   * come before it. */
+  isMovable = true;
   private readonly clip = new Plane();
   private readonly frame = new Lines(1.2);
   private cut: Cut | null = null;
-  /** Whether a user moves the plane, which otherwise follows the tool. */
-  private isMovable = true;
   private areaKey = '';
   /** Areas of the section; null while nothing is cut. */
   area: SectionArea | null = null;
@@ -83,7 +84,6 @@ export class CutawayView {
       return;
     }
     this.cut = cutOf(cutaway, body.box, this.rig.axes().forward, tool);
-    this.isMovable = cutaway.axis !== 'tool';
     const { plane, corners } = this.cut;
     clippingPlane(plane, this.clip);
     if (this.planes.length === 0) this.planes.push(this.clip);

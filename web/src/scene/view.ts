@@ -194,6 +194,7 @@ export class BodyView {
     const before = this.options;
     this.options = { ...before, ...options };
     this.rig.reducedMotion = this.options.reducedMotion;
+    this.cutaway.isMovable = this.options.cutaway.axis !== 'tool';
     this.nameParts();
     if (before.theme !== this.options.theme) {
       this.theme = this.stage.theme(this.options.theme);
