@@ -35,8 +35,7 @@ after(endNewcomers);
 
 /** The place that the hint points to. @param {PalpaPage} palpa @returns {Promise<[number, number]>} */
 async function pointedAt(palpa) {
-  const ring = await palpa.page.locator('.first-ring').boundingBox();
-  assert.ok(ring, 'the hint points somewhere');
+  const ring = await until('the hint points somewhere', () => palpa.page.locator('.first-ring').boundingBox());
   return [ring.x + ring.width / 2, ring.y + ring.height / 2];
 }
 
@@ -255,7 +254,7 @@ test('the shadow on the ground is that of what a cutaway leaves', async () => {
   const brightness = async () => {
     const png = await palpa.page.screenshot({ clip: { x: x - 4, y: y - 4, width: 8, height: 8 } });
     return palpa.page.evaluate(async (data) => {
-      const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
+      const image = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
       const g = /** @type {CanvasRenderingContext2D} */ (Object.assign(document.createElement('canvas'), { width: image.width, height: image.height }).getContext('2d'));
       g.drawImage(image, 0, 0);
       const { data: pixels } = g.getImageData(0, 0, image.width, image.height);

@@ -1,9 +1,10 @@
 // One viewer, one browser and one page that all tests share, because each of them
 // takes seconds to start.
 
-import { after } from 'node:test';
+import { after, afterEach } from 'node:test';
 import { launch } from './browser.mjs';
 import { PalpaPage } from './page.mjs';
+import { savePage } from './shots.mjs';
 import { Viewer } from './viewer.mjs';
 
 /** @type {Promise<Viewer> | undefined} */
@@ -38,6 +39,15 @@ export async function sharedPage() {
   await palpa.running();
   return palpa;
 }
+
+// What the page showed when a test failed, before the next one changes it.
+afterEach(async (context) => {
+  // Node's types lack `passed`.
+  const test = /** @type {import('node:test').TestContext & { passed: boolean }} */ (context);
+  if (test.passed || !page) return;
+  const shown = await page.catch(() => undefined);
+  if (shown) test.diagnostic(await savePage(shown, `failed-${test.name}`));
+});
 
 async function open() {
   const palpa = await PalpaPage.open(await sharedBrowser(), await sharedViewer());

@@ -22,3 +22,16 @@ export async function saveShot(palpa, name) {
   }
   await palpa.by('theme').selectOption('auto');
 }
+
+/**
+ * One picture of the page as it is. Returns its path, and what the page says over the body.
+ * @param {import('./page.mjs').PalpaPage} palpa
+ * @param {string} name
+ */
+export async function savePage(palpa, name) {
+  mkdirSync(FOLDER, { recursive: true });
+  const path = join(FOLDER, `${name.replaceAll(/[^\p{L}\d]+/gu, '-')}.png`);
+  await palpa.page.screenshot({ path });
+  const words = await palpa.page.locator('.stage .chip, .toast').allInnerTexts();
+  return `${path}: ${JSON.stringify({ ...(await palpa.readout()), words })}`;
+}

@@ -88,6 +88,7 @@ export class BodyView {
   private surfaces: Surfaces | null = null;
   private waitingMesh: MeshSnapshot | null = null;
   private meshTimer = 0;
+  private expected: { pose: CameraPose; until: number } | null = null;
   private frame: FrameSnapshot | null = null;
   private map: MapSnapshot | null = null;
   private isFirst = true;
@@ -239,6 +240,11 @@ export class BodyView {
     if (this.body && pose) this.rig.setPose(pose, this.body.centre);
   }
 
+  /** Another body that comes within this time, ms, is seen by this camera, and not from its own side. */
+  expectCamera(pose: CameraPose, time: number): void {
+    this.expected = { pose, until: performance.now() + time };
+  }
+
   /** The view as a PNG, with the scale bar and, if there is one, a legend. */
   image(legend: PictureLegend | null): Promise<Blob> {
     this.draw({ ratio: Math.max(window.devicePixelRatio || 1, 1), shadows: true, grain: true });
@@ -257,8 +263,10 @@ export class BodyView {
     return this.body && pickNoSkin(this.rayAt(clientX, clientY), this.body, this.pickable());
   }
 
+  /** What a click may meet, as the options say now: a plane that was just set may not be in the picture yet. */
   private pickable() {
-    const { cutaway, options } = this;
+    const { cutaway, options, body, surfaces } = this;
+    if (this.loop.changed.style && body && surfaces) this.slice(body, surfaces);
     const section = cutaway.plane && { section: cutaway.section.section, plane: cutaway.plane };
     return { section, bones: options.bones, isKept: cutaway.isKept() };
   }
@@ -273,7 +281,7 @@ export class BodyView {
   /** The skin at rest under a place of the picture: it stays where it is while
    * the skin gives way. */
   pickRest(clientX: number, clientY: number): { point: Vec3; normal: Vec3 } | null {
-    return this.body && pickSkin(this.rayAt(clientX, clientY), this.body, true, this.cutaway.isKept());
+    return this.body && pickSkin(this.rayAt(clientX, clientY), this.body, true, this.pickable().isKept);
   }
 
   /** The place of the skin at rest that is nearest to a point. */
@@ -372,6 +380,9 @@ export class BodyView {
     if (isOther) {
       this.tool.group.visible = false;
       this.rig.fit(this.body.box, this.homeSide(), false);
+      const { pose, until } = this.expected ?? { pose: null, until: 0 };
+      if (performance.now() < until) this.camera = pose;
+      this.expected = null;
     }
     this.loop.invalidate('style');
   }

@@ -6,7 +6,8 @@
 import { effect, signal, untracked } from '@preact/signals';
 import type { SceneTable } from '../generated/scene';
 import { t } from '../i18n';
-import { ask, isController, notify, onMesh, state } from '../store';
+import { ask, isController, notify, state } from '../store';
+import { bodyView } from './body';
 import { applyLook, presentLook, readLook, type Look } from './look';
 import { LEVELS, LUMPS, ROUNDS, tab, wantedLevel, wantedLumps, wantedRounds, wantedSeed } from './settings';
 
@@ -159,9 +160,9 @@ async function open({ key, scene, seed, game, look }: Content): Promise<void> {
     tab.value = 'game';
   }
   if (look !== undefined) {
-    // The mesh of another body, which may still come, is shown from its own side at first.
-    const stop = onMesh(() => queueMicrotask(() => applyLook(look)));
-    window.setTimeout(stop, MESH_WAIT);
+    applyLook(look);
+    // Its mesh may still come.
+    if (!isThere && look.camera !== null) bodyView.peek()?.expectCamera(look.camera, MESH_WAIT);
   }
   notify('info', t('share.opened'));
 }

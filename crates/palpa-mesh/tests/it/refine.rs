@@ -1,6 +1,7 @@
 //! Refinement: the same geometry, conforming, angles kept, fields carried.
 
 use std::cell::Cell;
+use std::f64::consts::PI;
 
 use palpa_mesh::generate::patch::{centre_vertex, patch};
 use palpa_mesh::generate::{GradedBlock, LevelStack, Outline, cylinder, forearm, graded_block};
@@ -70,23 +71,18 @@ fn longest_edges(skin: &Surface) -> impl Iterator<Item = (f64, Vec3)> + '_ {
     })
 }
 
-fn layers() -> Vec<LayerSpec> {
-    let layer = |name: &str, thickness: Option<f64>, n_levels| LayerSpec {
+fn layer(name: &str, thickness: Option<f64>, n_levels: usize) -> LayerSpec {
+    LayerSpec {
         name: name.to_owned(),
         thickness: thickness.map(Thickness::Constant),
         n_levels,
         min_thickness: 1e-4,
-    };
-    vec![
-        layer("skin", Some(1.5e-3), 1),
-        layer("fat", Some(4e-3), 2),
-        layer("muscle", None, 3),
-    ]
+    }
 }
 
-pub(crate) fn grown(skin: &Surface, bones: &[Surface]) -> LayeredBody {
+fn grown_as(skin: &Surface, bones: &[Surface], layers: Vec<LayerSpec>) -> LayeredBody {
     let params = GrowthParams {
-        layers: layers(),
+        layers,
         cut_out: None,
         coarsening: None,
         max_nodes: palpa_mesh::growth::MAX_NODES,
@@ -94,20 +90,18 @@ pub(crate) fn grown(skin: &Surface, bones: &[Surface]) -> LayeredBody {
     grow(skin, bones, &params).unwrap().body
 }
 
+pub(crate) fn grown(skin: &Surface, bones: &[Surface]) -> LayeredBody {
+    let layers = vec![
+        layer("skin", Some(1.5e-3), 1),
+        layer("fat", Some(4e-3), 2),
+        layer("muscle", None, 3),
+    ];
+    grown_as(skin, bones, layers)
+}
+
 /// A flat skin with straight columns.
 pub(crate) fn flat(skin: &Surface) -> LayeredBody {
-    let params = GrowthParams {
-        layers: vec![LayerSpec {
-            name: "muscle".to_owned(),
-            thickness: Some(Thickness::Constant(0.01)),
-            n_levels: 2,
-            min_thickness: 1e-4,
-        }],
-        cut_out: None,
-        coarsening: None,
-        max_nodes: palpa_mesh::growth::MAX_NODES,
-    };
-    grow(skin, &[], &params).unwrap().body
+    grown_as(skin, &[], vec![layer("muscle", Some(0.01), 2)])
 }
 
 #[test]
@@ -384,5 +378,49 @@ proptest! {
         prop_assert!(smallest_angle(&refined.body.skin) > 0.3 * before);
         let again = refine(&body, &RefineParams::default(), near_points(&points, 1e-3, h, growth));
         prop_assert_eq!(refined, again);
+    }
+}
+
+/// A closed body with poles, as from a modelling program: slices along x, thin triangles at both ends.
+fn pointed(axes: [f64; 3], around: usize, along: usize) -> Surface {
+    let tip = |x: f64| Vec3::new(x, 0.0, 0.0);
+    let mut points = vec![tip(-axes[0])];
+    for i in 1..along {
+        let (sin, cos) = (PI * i as f64 / along as f64).sin_cos();
+        points.extend((0..around).map(|k| {
+            let (s, c) = (2.0 * PI * k as f64 / around as f64).sin_cos();
+            Vec3::new(-axes[0] * cos, axes[1] * sin * c, axes[2] * sin * s)
+        }));
+    }
+    points.push(tip(axes[0]));
+    let last = points.len() as u32 - 1;
+    let at = |i: usize, k: usize| (1 + (i - 1) * around + k % around) as u32;
+    let mut triangles = Vec::new();
+    for k in 0..around {
+        triangles.push([0, at(1, k + 1), at(1, k)]);
+        triangles.push([last, at(along - 1, k), at(along - 1, k + 1)]);
+        for i in 1..along - 1 {
+            triangles.push([at(i, k), at(i, k + 1), at(i + 1, k)]);
+            triangles.push([at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)]);
+        }
+    }
+    Surface { points, triangles }
+}
+
+/// At pointed ends, layers hardly have room. What growth lets pass there must stay valid in each part.
+#[test]
+fn a_body_with_pointed_ends_can_be_divided() {
+    for fat in [7e-3, 8e-3] {
+        let layers = [("skin", 1.5e-3), ("fat", fat), ("muscle", 15e-3)];
+        let layers = layers.map(|(name, thickness)| layer(name, Some(thickness), 1));
+        let skin = pointed([0.11, 0.038, 0.034], 20, 18);
+        let body = grown_as(&skin, &[], layers.into());
+        let split = split_levels(&body, &vec![vec![0.3, 0.3, 0.4]; body.n_levels - 1]);
+        assert_eq!(split.n_invalid, 0, "{fat}");
+        assert_sound(&split.body);
+        let near_the_end = near_points(&[skin.points[0]], 0.01, 2e-3, 0.6);
+        let refined = refine(&split.body, &RefineParams::default(), near_the_end);
+        assert_eq!(refined.n_invalid, 0, "{fat}");
+        assert_sound(&refined.body);
     }
 }

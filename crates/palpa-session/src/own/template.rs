@@ -30,6 +30,8 @@ pub(super) struct Dimensions {
     pub(super) diagonal: f64,
     /// Radius of the long cylinder with the same volume for its area; `None` for a sheet.
     pub(super) radius: Option<f64>,
+    /// Where a closed body is pressed at first; `None` for a sheet, which is pressed in its middle.
+    pub(super) press: Option<[f64; 3]>,
 }
 
 impl Dimensions {
@@ -38,6 +40,7 @@ impl Dimensions {
         Self {
             diagonal: self.diagonal * factor,
             radius: self.radius.map(|radius| radius * factor),
+            press: self.press.map(|p| p.map(|x| x * factor)),
         }
     }
 
@@ -183,11 +186,15 @@ impl Body<'_> {
         let radius = self.size.radius.unwrap_or(0.25 * self.size.diagonal);
         let tool = (TOOL_SHARE * radius).clamp(TOOL.0, TOOL.1);
         let depth = (PRESS_SHARE * total).min(MOST_PRESS);
+        let mut press = json!({ "depth": mm(depth) });
+        if let Some(point) = self.size.press {
+            press["at"] = json!(point.map(mm));
+        }
         let scene = json!({
             "body": { "surface": self.skin, "bones": self.bones, "unit": self.unit },
             "layer": layers,
             "tool": { "shape": "sphere", "radius": mm(tool) },
-            "press": { "depth": mm(depth) },
+            "press": press,
             "mesh": { "moves": true },
             "device": { "preset": "falcon", "grip": "medium" },
             "motion": { "kind": "press", "depth": mm(depth), "speed": "30 mm/s", "hold": "1 s", "length": "20 mm", "along": "x" },
@@ -199,11 +206,13 @@ impl Body<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpa_scene::Target;
 
     fn closed(radius: f64) -> Dimensions {
         Dimensions {
             diagonal: 5.0 * radius,
             radius: Some(radius),
+            press: Some([0.0, 0.0, radius]),
         }
     }
 
@@ -212,6 +221,7 @@ mod tests {
         let sheet = Dimensions {
             diagonal: 0.3,
             radius: None,
+            press: None,
         };
         let sizes = [
             closed(1e-4),
@@ -235,6 +245,7 @@ mod tests {
                 assert_eq!(written, said);
                 let sum: f64 = info.layers.iter().map(|l| l.thickness).sum();
                 assert!(scene.press.depth < 0.5 * sum, "{size:?} {info:?}");
+                assert_eq!(scene.press.target == Target::Middle, size.press.is_none());
                 let bones = ["bone.ply".to_owned()];
                 let body = Body {
                     bones: &bones,
