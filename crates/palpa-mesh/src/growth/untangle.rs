@@ -308,7 +308,7 @@ impl<'a> Surroundings<'a> {
     /// Tries the mean of the node's neighbours, then small steps along the axes. Returns whether
     /// the node moved.
     fn improve_node(&self, body: &mut LayeredBody, v: usize, l: usize) -> bool {
-        let before = self.worst_around(body, v, l);
+        let before = self.worst_around(body, v, l, f64::NEG_INFINITY);
         if before >= GOOD_ENOUGH {
             return false;
         }
@@ -337,7 +337,7 @@ impl<'a> Surroundings<'a> {
                 continue;
             };
             body.positions[node] = at;
-            let worth = self.worst_around(body, v, l);
+            let worth = self.worst_around(body, v, l, best_worth);
             if worth > best_worth {
                 (best, best_worth) = (at, worth);
             }
@@ -347,8 +347,8 @@ impl<'a> Surroundings<'a> {
     }
 
     /// The worst scaled Jacobian of the prisms at node (v, l). At most 0 if one of them is invalid
-    /// inside.
-    fn worst_around(&self, body: &LayeredBody, v: usize, l: usize) -> f64 {
+    /// inside. The search ends at the first prism that is no better than `enough`.
+    fn worst_around(&self, body: &LayeredBody, v: usize, l: usize, enough: f64) -> f64 {
         let intervals = l.saturating_sub(1)..(l + 1).min(body.n_levels - 1);
         let mut worst = f64::INFINITY;
         for &t in &self.triangles_at[v] {
@@ -360,6 +360,9 @@ impl<'a> Surroundings<'a> {
                     shape.scaled_jacobian.min(0.0)
                 };
                 worst = worst.min(worth);
+                if worst <= enough {
+                    return worst;
+                }
             }
         }
         worst
