@@ -103,6 +103,7 @@ export class LensView {
   private zoom = 1;
   private width = 1;
   private height = 1;
+  private place: LensPicture['place'] = { x: 0, y: 0, width: 0, height: 0 };
 
   constructor() {
     this.canvas.className = 'scene-lens';
@@ -132,9 +133,15 @@ export class LensView {
     this.canvas.hidden = true;
   }
 
+  /** Whether the lens lies over a place of the picture, px. */
+  covers(at: { x: number; y: number }): boolean {
+    const { x, y, width, height } = this.place;
+    return !this.canvas.hidden && at.x > x && at.x < x + width && at.y > y && at.y < y + height;
+  }
+
   /** Cuts the body as it lies now and draws it. `size` is that of the picture, px; `axes` are its directions. */
   draw(body: Body, frame: FrameSnapshot, look: LensLook, axes: { right: Vector3; up: Vector3 }, size: Vector2): LensPicture {
-    const place = placeIn(size);
+    const place = (this.place = placeIn(size));
     const g = this.begin(place, look.colours.background);
     const tip = new Vector3().fromArray(frame.tool);
     const orientation = new Quaternion().fromArray(frame.orientation);

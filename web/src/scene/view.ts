@@ -451,7 +451,9 @@ export class BodyView {
       const values = Colouring.isMap(options.colourBy) ? (surfaces.value.array as Float32Array) : null;
       this.onProbe(this.probe.read(body, this.frame, values, (p) => this.onScreen(p)));
     }
-    this.forceTag.update(arrow && this.onScreen(arrow.at), arrow?.force ?? 0);
+    const tagAt = arrow && this.onScreen(arrow.at);
+    // The lens says the same.
+    this.forceTag.update(tagAt && !this.lens.covers(tagAt) ? tagAt : null, arrow?.force ?? 0);
     this.scaleBar.update(pixel);
     this.gizmo.update(this.rig.axes());
     this.cutaway.placeGrip(this.size, options.cutaway.position);

@@ -24,7 +24,7 @@ export function GhostChip() {
 export function FirstHint() {
   const isTurn = ghost.value === 'done';
   const isWanted = isTurn || (ghost.value === 'off' && !hasPressed.value);
-  const isPossible = isController.value && !isReplaying.value && picking.value === null && state.value?.phase === 'running' && state.value.game == null;
+  const isPossible = isController.value && !isReplaying.value && picking.value === null && state.value?.phase === 'running' && !state.value.is_motion_running && state.value.game == null;
   return isWanted && isPossible ? <Hint isTurn={isTurn} /> : null;
 }
 

@@ -101,6 +101,36 @@ fn after_jobs_that_are_lost_the_body_catches_up() {
     }
 }
 
+/// After a job that took long, a hand that hurries to another place gets a zone of the usual size: with one that covers
+/// all of its way, jobs would take ever longer.
+#[test]
+fn a_hand_that_hurries_after_a_slow_job_gets_no_huge_zone() {
+    const SLOW: usize = 60;
+    let model = model_of(25, false, None);
+    let start = at(sphere(0.0), -15e-3, 0.0, -1e-3);
+    let mut live = Live::new(model, &start, params(ExteriorMode::Linear)).unwrap();
+    let usual = live.n_columns()[0];
+    let mut out: Option<(usize, Rebuilt)> = None;
+    let (mut largest, mut n_zones) = (0, 0);
+    for k in 0..400_usize {
+        if let Some((_, done)) = out.take_if(|(due, _)| *due <= k) {
+            live.install(done);
+        }
+        // To and fro over 30 mm, ten times a second.
+        let phase = k as f64 * DT / 0.1;
+        let along = 30e-3 * (phase % 2.0 - 1.0).abs() - 15e-3;
+        let report = live.step(&at(sphere(0.0), along, 0.0, -1e-3), DT);
+        n_zones = report.zone;
+        largest = largest.max(live.n_columns()[0]);
+        if let Some(job) = live.take_job() {
+            out = Some((k + SLOW, job.run()));
+        }
+    }
+    println!("zones of {usual} columns at first, {largest} at most, {n_zones} zones");
+    assert!(n_zones > 3);
+    assert!(largest as f64 <= 1.6 * usual as f64, "{usual} {largest}");
+}
+
 /// A zone is made for the place where the tool will be while it serves, so jobs may take as long as the tool
 /// needs for a quarter of the zone's radius. Where one comes later, as when the tool begins to stroke while a long job
 /// is under way, the steps with a wrong force say so.

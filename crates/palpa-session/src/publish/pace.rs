@@ -12,6 +12,12 @@ const UNSEEN_TURN: f64 = 3e-4;
 const STILL_AFTER: f64 = 1.0;
 /// Time between two frames at rest, s.
 const REST_PERIOD: f64 = 0.5;
+/// Share of a core that frames of a moving body may take, and the longest time between two, s: the displacements of a
+/// body of 10,000 nodes cost some milliseconds, which the tissue needs more.
+const MOST_LOAD: f64 = 0.12;
+const LONGEST_PERIOD: f64 = 0.05;
+/// Weight of the last frame in the mean cost.
+const NEWEST: f64 = 0.2;
 
 /// The part of a frame that shows whether something moves, without the nodes.
 #[derive(Debug, Clone, Copy, Default)]
@@ -71,9 +77,16 @@ pub(super) struct Pace {
     still_for: f64,
     /// Time since the last frame that was due, s.
     undue_for: f64,
+    /// Mean CPU time of a frame, s.
+    cost: f64,
 }
 
 impl Pace {
+    /// A frame has cost this CPU time, s.
+    pub(super) fn spend(&mut self, cost: f64) {
+        self.cost += NEWEST * (cost - self.cost);
+    }
+
     /// Something has changed that a tick does not show.
     pub(super) fn wake(&mut self) {
         self.still_for = 0.0;
@@ -89,7 +102,14 @@ impl Pace {
             self.changed = sight;
         }
         self.undue_for += dt;
-        let is_due = self.still_for < STILL_AFTER || self.undue_for >= REST_PERIOD;
+        let period = (self.cost / MOST_LOAD).min(LONGEST_PERIOD);
+        // To the nearest call.
+        let is_affordable = self.undue_for + 0.5 * dt >= period;
+        let is_due = if self.still_for < STILL_AFTER {
+            is_affordable
+        } else {
+            self.undue_for >= REST_PERIOD
+        };
         if is_due {
             self.undue_for = 0.0;
         }
@@ -123,6 +143,30 @@ mod tests {
         due_in(&mut pace, &frame, 3.0);
         pace.wake();
         assert_eq!(due_in(&mut pace, &frame, 0.5), 30);
+    }
+
+    #[test]
+    fn frames_that_cost_much_come_less_often_but_at_once_after_rest() {
+        let mut pace = Pace::default();
+        let mut frame = FrameSnapshot::default();
+        for (cost, least, most) in [(1e-3, 60, 60), (4e-3, 28, 32), (0.1, 20, 20)] {
+            for _ in 0..50 {
+                pace.spend(cost);
+            }
+            pace.wake();
+            let n = due_in(&mut pace, &frame, 0.9);
+            assert!(
+                (least * 9 / 10..=most * 9 / 10 + 1).contains(&n),
+                "{cost}: {n}"
+            );
+        }
+        due_in(&mut pace, &frame, 1.2);
+        while pace.is_due(&frame, DT) {}
+        for _ in 0..4 {
+            pace.is_due(&frame, DT);
+        }
+        frame.force[2] = 1.0;
+        assert!(pace.is_due(&frame, DT));
     }
 
     #[test]

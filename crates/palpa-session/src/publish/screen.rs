@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use palpa::live::Seen;
 use palpa_mesh::Vec3;
+use palpa_rt::thread_cpu;
 use palpa_viewer::Publisher;
 use palpa_viewer::control::Field;
 use palpa_viewer::wire::{FrameSnapshot, MapSnapshot};
@@ -98,6 +99,7 @@ impl Screen {
         shows_lumps: bool,
         field: Field,
     ) -> Option<(&FrameSnapshot, &MeshBytes)> {
+        let begin = thread_cpu();
         let look = live.look();
         let (settled, model, contacts);
         let displacements: &[Vec3] = match look.body.as_ref()? {
@@ -134,6 +136,7 @@ impl Screen {
             self.fields.of(mesh, field, &model, displacements)
         });
         frame::put_field(&mut self.frame, field);
+        self.pace.spend(thread_cpu() - begin);
         Some((&self.frame, &self.mesh))
     }
 

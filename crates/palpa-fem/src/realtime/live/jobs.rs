@@ -209,7 +209,10 @@ impl Live {
         let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
         (is_leaving || reaches_ring).then(|| {
             let reach = self.reach();
+            // A hand that hurries to another place after a slow job would make the whole body a zone, and each job
+            // slower than the one before.
             let even = self.course.pace.velocity().norm() * self.jobs.latency;
+            let even = even.min(LONGEST_AHEAD * self.params.zone_radius);
             let on_its_way = reach + (AHEAD - 1.0) * even;
             let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
             (centres, [INNER * on_its_way, radius])
