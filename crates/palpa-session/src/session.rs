@@ -1,4 +1,4 @@
-//! The session and its thread: takes orders and makes sixty frames a second.
+//! The session and its thread: takes orders and makes up to sixty frames a second.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

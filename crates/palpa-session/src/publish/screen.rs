@@ -1,4 +1,4 @@
-//! The picture of the body: its mesh, and a frame of it sixty times a second.
+//! The picture of the body: its mesh, and a frame of it up to sixty times a second.
 
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ impl Screen {
         self.pace.wake();
     }
 
-    /// Whether a frame is due, `dt` seconds after the last call: each time while something moves, twice a
+    /// Whether a frame is due, `dt` seconds after the last call: each time that is affordable while something moves, twice a
     /// second at rest. `recorded` is the frame of a recording that is shown instead of the body.
     pub(crate) fn is_due(&mut self, recorded: Option<&FrameSnapshot>, dt: f64) -> bool {
         self.pace.is_due(recorded.unwrap_or(&self.frame), dt)
