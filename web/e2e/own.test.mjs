@@ -72,7 +72,7 @@ test('a closed STL in millimetres is dropped, checked, grown, touched, changed, 
   t.diagnostic(`pressed with ${(await touched(palpa)).toFixed(2)} N`);
   await saveShot(palpa, 'own-grown');
   await palpa.tab('tissues');
-  await palpa.type('layer-1-thickness', '6 mm', ({ layers }) => Math.abs(layers[1].thickness - 6e-3) < 5e-4);
+  await palpa.type('layer-1-thickness', '5 mm', ({ layers }) => Math.abs(layers[1].thickness - 5e-3) < 3e-4);
 
   await palpa.tab('scene');
   const bytes = await saved(palpa, 'scene-save-zip');

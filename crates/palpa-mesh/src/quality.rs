@@ -52,13 +52,11 @@ impl PrismShape {
                 0.0
             });
         }
+        // The edges across do not depend on the column.
+        let [upper, lower] = [0, 3].map(|base| [x[base + 1] - x[base], x[base + 2] - x[base]]);
+        let across = upper[0].cross(&lower[1]) + lower[0].cross(&upper[1]);
         let min_jacobian = (0..3)
             .map(|i| {
-                let [upper, lower] = [0, 3].map(|base| {
-                    let at = x[base + i];
-                    [x[base + (i + 1) % 3] - at, x[base + (i + 2) % 3] - at]
-                });
-                let across = upper[0].cross(&lower[1]) + lower[0].cross(&upper[1]);
                 let middle = -0.5 * across.dot(&(x[i + 3] - x[i]));
                 least_of_parabola([ends[i], middle, ends[i + 3]])
             })

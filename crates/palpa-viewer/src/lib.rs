@@ -24,7 +24,7 @@
 //!         Ok(None)
 //!     }
 //!     fn upload(&self, _: &str, _: Vec<u8>) -> Result<Uploaded, String> {
-//!         Err("this session takes no files".to_owned())
+//!         Err("no files are taken here".to_owned())
 //!     }
 //!     fn check_uploaded(&self, _: u32, _: LengthUnit) -> Option<Uploaded> {
 //!         None

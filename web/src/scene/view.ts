@@ -88,6 +88,8 @@ export class BodyView {
   private surfaces: Surfaces | null = null;
   private waitingMesh: MeshSnapshot | null = null;
   private meshTimer = 0;
+  /** Whether the section is that of a plane or body before the present ones. */
+  private isCutStale = true;
   private expected: { pose: CameraPose; until: number } | null = null;
   private frame: FrameSnapshot | null = null;
   private map: MapSnapshot | null = null;
@@ -196,6 +198,7 @@ export class BodyView {
     this.options = { ...before, ...options };
     this.rig.reducedMotion = this.options.reducedMotion;
     this.cutaway.isMovable = this.options.cutaway.axis !== 'tool';
+    if (before.cutaway !== this.options.cutaway) this.isCutStale = true;
     this.nameParts();
     if (before.theme !== this.options.theme) {
       this.theme = this.stage.theme(this.options.theme);
@@ -266,7 +269,7 @@ export class BodyView {
   /** What a click may meet, as the options say now: a plane that was just set may not be in the picture yet. */
   private pickable() {
     const { cutaway, options, body, surfaces } = this;
-    if (this.loop.changed.style && body && surfaces) this.slice(body, surfaces);
+    if (this.isCutStale && body && surfaces) this.slice(body, surfaces);
     const section = cutaway.plane && { section: cutaway.section.section, plane: cutaway.plane };
     return { section, bones: options.bones, isKept: cutaway.isKept() };
   }
@@ -377,11 +380,11 @@ export class BodyView {
     this.stage.scene.add(this.surfaces.group);
     this.stage.setBody(this.body);
     this.frame = null;
+    this.isCutStale = true;
     if (isOther) {
       this.tool.group.visible = false;
       this.rig.fit(this.body.box, this.homeSide(), false);
-      const { pose, until } = this.expected ?? { pose: null, until: 0 };
-      if (performance.now() < until) this.camera = pose;
+      if (this.expected && performance.now() < this.expected.until) this.camera = this.expected.pose;
       this.expected = null;
     }
     this.loop.invalidate('style');
@@ -585,6 +588,7 @@ export class BodyView {
   }
 
   private slice(body: Body, surfaces: Surfaces): void {
+    this.isCutStale = false;
     const { options, frame, state } = this;
     const tool = frame && { tip: new Vector3().fromArray(frame.tool), axis: new Vector3(0, 0, 1).applyQuaternion(new Quaternion().fromArray(frame.orientation)) };
     this.cutaway.slice(body, {

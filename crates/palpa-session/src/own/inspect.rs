@@ -31,7 +31,8 @@ pub(super) fn inspected(
             note: note.clone(),
         })
     });
-    let size = dimensions_of(report, &file.surface, unit);
+    let top = top_of(&file.surface, [lower, upper]).map(|p| (p * unit.metres()).into());
+    let size = dimensions_of(report, top);
     let info = SurfaceInfo {
         format: check.format.to_string(),
         n_vertices: report.n_vertices as u32,
@@ -95,7 +96,7 @@ fn place(spot: &Spot, surface: &Surface, unit: LengthUnit) -> Option<[f64; 3]> {
 }
 
 /// The dimensions by which a template chooses its layers, m.
-fn dimensions_of(report: &SurfaceReport, surface: &Surface, unit: LengthUnit) -> Dimensions {
+fn dimensions_of(report: &SurfaceReport, top: Option<[f64; 3]>) -> Dimensions {
     let diagonal = (Vec3::from(report.upper) - Vec3::from(report.lower)).norm();
     let part = report.parts.first();
     // A sheet encloses no volume: capped, its volume says nothing about its thickness.
@@ -106,16 +107,15 @@ fn dimensions_of(report: &SurfaceReport, surface: &Surface, unit: LengthUnit) ->
     Dimensions {
         diagonal: if diagonal.is_finite() { diagonal } else { 0.0 },
         radius,
-        press: radius.and_then(|_| top_of(surface, unit)),
+        press: radius.and(top),
     }
 }
 
-/// The highest place over the middle of a closed body, m; of a body that stands upright, the foremost before it.
+/// The highest place over the middle of a surface with these bounds; if it stands upright, the foremost before it.
 /// `None` if nothing is there.
-fn top_of(surface: &Surface, unit: LengthUnit) -> Option<[f64; 3]> {
+fn top_of(surface: &Surface, [lower, upper]: [Vec3; 2]) -> Option<Vec3> {
     /// From the middle at most this share of the width.
     const NEAR: f64 = 0.2;
-    let (lower, upper) = finite_bounds(surface);
     let size = upper - lower;
     let (up, sign) = if size.z > size.x.max(size.y) {
         (1, -1.0)
@@ -126,7 +126,7 @@ fn top_of(surface: &Surface, unit: LengthUnit) -> Option<[f64; 3]> {
     let is_near = |p: &&Vec3| (0..3).all(|c| c == up || (p[c] - middle[c]).abs() <= NEAR * size[c]);
     (surface.points.iter().filter(is_near))
         .max_by(|p, q| (sign * p[up]).total_cmp(&(sign * q[up])))
-        .map(|&p| (p * unit.metres()).into())
+        .copied()
 }
 
 /// The surface for a picture, with its middle at the origin. Triangles that cannot be drawn are left out.

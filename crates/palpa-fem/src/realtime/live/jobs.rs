@@ -7,7 +7,6 @@ use palpa_mesh::Vec3;
 
 use super::super::plan::Centres;
 use super::kept::Kept;
-use super::params::LONGEST_AHEAD;
 use super::pressed::{Pressed, nearest_point};
 use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
 use super::{ExteriorMode, Live};
@@ -212,7 +211,7 @@ impl Live {
             // A hand that hurries to another place after a slow job would make the whole body a zone, and each job
             // slower than the one before.
             let even = self.course.pace.velocity().norm() * self.jobs.latency;
-            let even = even.min(LONGEST_AHEAD * self.params.zone_radius);
+            let even = even.min(self.params.longest_ahead());
             let on_its_way = reach + (AHEAD - 1.0) * even;
             let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
             (centres, [INNER * on_its_way, radius])
@@ -240,7 +239,7 @@ impl Live {
     /// go until the zone is ready, and half of that.
     pub(super) fn next_centres(&self) -> Centres {
         let way = self.course.pace.way_in(AHEAD * self.jobs.latency);
-        let most = AHEAD * LONGEST_AHEAD * self.params.zone_radius;
+        let most = AHEAD * self.params.longest_ahead();
         let way = way * (most / way.norm()).min(1.0);
         Centres::new(self.course.tools.len(), |tool| self.centre_after(way, tool))
     }

@@ -1,7 +1,7 @@
 //! Parameters of the real-time step.
 
 /// The longest way of the tools for which a zone is made ahead of them, as a share of its radius: hands may turn.
-pub(super) const LONGEST_AHEAD: f64 = 0.5;
+const LONGEST_AHEAD: f64 = 0.5;
 
 /// Parameters of the real-time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,10 +44,15 @@ impl Default for LiveParams {
 }
 
 impl LiveParams {
+    /// The longest way of the tools for which a zone is made ahead of them, m.
+    pub(super) fn longest_ahead(&self) -> f64 {
+        LONGEST_AHEAD * self.zone_radius
+    }
+
     /// Distance that a tool may go while a job is under way, m: so far zones are made ahead of it. No farther
     /// than the stiffness of a followed exterior is valid.
     pub fn longest_way(&self) -> f64 {
-        let way = LONGEST_AHEAD * self.zone_radius;
+        let way = self.longest_ahead();
         match self.exterior {
             ExteriorMode::Followed => way.min(self.stale),
             ExteriorMode::Linear => way,
