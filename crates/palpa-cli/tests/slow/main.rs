@@ -9,7 +9,9 @@ mod lump_stroke;
 mod moving;
 mod palpation_map;
 mod slabs;
+mod slow_jobs;
 mod stable;
+mod strokes;
 mod verify;
 
 use std::path::{Path, PathBuf};

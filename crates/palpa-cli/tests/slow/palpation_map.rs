@@ -4,91 +4,23 @@
 use nalgebra::Point3;
 use palpa::live::{LiveScene, RehearsalParams, open_device, rehearse, servo_params};
 use palpa::map::{PalpationMap, Touch};
-use palpa_device::{LiveTarget, Vec3};
+use palpa_device::LiveTarget;
 use palpa_mesh::SurfaceIndex;
 use palpa_rt::StepStatus;
 use palpa_scene::{BuiltIn, Scene};
 
-const STEP_TIME: f64 = 4e-3;
+use crate::strokes::{STEP_TIME, Skin, strokes};
+
 /// A touch of the map every so many ticks, as a session makes them.
 const EVERY: usize = 16;
-const DEPTH: f64 = 6e-3;
-const ABOVE: f64 = 4e-3;
-const HALF: f64 = 25e-3;
-/// Between two strokes, m.
-const APART: f64 = 6e-3;
-/// Speeds, m/s: down and up, along the skin, and in the air.
-const DOWN: f64 = 0.04;
-const ALONG: f64 = 0.025;
-const AIR: f64 = 0.1;
-
-/// The way of the hand: places (along, across, depth), m, one for each step.
-fn way() -> Vec<[f64; 3]> {
-    let mut way = vec![[-HALF, -2.0 * APART, -ABOVE]; 200];
-    let go = |to: [f64; 3], speed: f64, way: &mut Vec<[f64; 3]>| {
-        let from = *way.last().unwrap();
-        let length = (0..3)
-            .map(|c| (to[c] - from[c]).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        let n = (length / (speed * STEP_TIME)).ceil().max(1.0) as usize;
-        way.extend((1..=n).map(|k| {
-            let share = k as f64 / n as f64;
-            [0, 1, 2].map(|c| from[c] + share * (to[c] - from[c]))
-        }));
-    };
-    for k in -2..=2 {
-        let across = f64::from(k) * APART;
-        let (from, to) = if k % 2 == 0 {
-            (-HALF, HALF)
-        } else {
-            (HALF, -HALF)
-        };
-        go([from, across, -ABOVE], AIR, &mut way);
-        go([from, across, DEPTH], DOWN, &mut way);
-        go([to, across, DEPTH], ALONG, &mut way);
-        go([to, across, -ABOVE], DOWN, &mut way);
-    }
-    way
-}
-
-struct Skin {
-    surface: palpa_mesh::Surface,
-    index: SurfaceIndex,
-    normals: Vec<Vec3>,
-}
-
-impl Skin {
-    fn nearest(&self, point: Vec3) -> (Vec3, Vec3) {
-        let closest = self.index.closest(point).unwrap();
-        let corners = self.surface.triangles[closest.triangle as usize];
-        let normal: Vec3 = (corners.iter().zip(closest.weights))
-            .map(|(&v, w)| self.normals[v as usize] * w)
-            .sum();
-        (closest.point, normal.normalize())
-    }
-}
+/// Speed of the strokes, m/s.
+const SPEED: f64 = 0.025;
 
 fn map_of(scene: &Scene) -> PalpationMap {
     let live = LiveScene::build(scene).unwrap();
-    let surface = live.prepared.grown.growth.body.skin.clone();
-    let skin = Skin {
-        index: SurfaceIndex::build(&surface),
-        normals: surface.vertex_normals(),
-        surface,
-    };
+    let skin = Skin::of(&live);
     let frame = live.scene_from_device;
-    let (home, up) = skin.nearest((frame * Point3::origin()).coords);
-    let along = Vec3::x();
-    let across = up.cross(&along).normalize();
-    let place = |[x, y, _]: [f64; 3]| skin.nearest(home + along * x + across * y + up * 5e-3);
-    let tips: Vec<Vec3> = (way().into_iter())
-        .map(|at| {
-            let (point, normal) = place(at);
-            let tip = point - normal * at[2];
-            (frame.inverse() * Point3::from(tip)).coords
-        })
-        .collect();
+    let tips = skin.tips(&live, &strokes(SPEED));
     let target = LiveTarget::new(tips[0]);
     let mut device = open_device(&scene.device, target.clone()).unwrap();
     let params = RehearsalParams {

@@ -7,7 +7,7 @@ use palpa_sparse::fronts::{
 use palpa_sparse::{Block, ColumnPattern};
 
 use super::plan::{Plan, Trouble};
-use crate::batch::{Batches, From, Pressure, Tangent};
+use crate::batch::{Batches, Pressure, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -16,6 +16,10 @@ use crate::state::Memory;
 pub(super) struct Outside {
     /// Number of the factor.
     pub(super) id: u64,
+    /// Whether the factor is that of a stiffness without the pressure of the volume, because the body's was not positive
+    /// definite. Displacements that come from another mesh do not keep the volume: their pressure is off by as much as
+    /// the shear modulus.
+    pub(super) is_altered: bool,
     /// Number of the zone that this is the exterior of.
     pub(super) plan: u64,
     pub(super) factor: Exterior<f32>,
@@ -29,6 +33,7 @@ impl Outside {
     pub(super) fn new(model: &Model, plan: &Plan) -> Self {
         Self {
             id: 0,
+            is_altered: false,
             plan: plan.id,
             factor: Exterior::new(&plan.tree),
             right: vec![0.0; model.structure.n_dofs()],
@@ -139,7 +144,7 @@ impl Outside {
     }
 
     /// Assembles and factors the exterior's stiffness at these displacements, and linearises about
-    /// them. `from` is what they were extrapolated from. Gives up once `is_wanted` says no.
+    /// them. Where it is not positive definite with this pressure, it has none. Gives up once `is_wanted` says no.
     #[expect(
         clippy::too_many_arguments,
         reason = "a model, its zone and two rooms to work in"
@@ -153,24 +158,31 @@ impl Outside {
         follower: &mut Follower,
         workshop: &mut Workshop,
         displacements: &[Vec3],
-        from: Option<From<'_>>,
+        pressure: Pressure<'_>,
         is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Trouble> {
-        let pressure = from.map_or(Pressure::Own, Pressure::Predicted);
+        self.is_altered = false;
         if !plan.exterior.is_empty() {
-            workshop.blocks.fill([0.0; 9]);
-            follower.batches.add_stiffness(
-                model,
-                memory,
-                displacements,
-                &mut workshop.blocks,
-                pressure,
-            )?;
-            plan.support(model, pattern, false, &mut workshop.blocks);
-            let (blocks, scratch) = (&workshop.blocks, &mut workshop.scratch);
-            let factor = &mut self.factor;
-            if !factor.factor_while(&plan.tree, blocks, scratch, is_wanted)? {
-                return Err(Trouble::GivenUp);
+            let mut factor = |pressure| {
+                let blocks = &mut workshop.blocks;
+                blocks.fill([0.0; 9]);
+                let batches = &mut follower.batches;
+                batches.add_stiffness(model, memory, displacements, blocks, pressure)?;
+                plan.support(model, pattern, false, blocks);
+                let scratch = &mut workshop.scratch;
+                let is_made = (self.factor).factor_while(&plan.tree, blocks, scratch, is_wanted)?;
+                if is_made {
+                    Ok(())
+                } else {
+                    Err(Trouble::GivenUp)
+                }
+            };
+            match factor(pressure) {
+                Err(Trouble::Singular) => {
+                    factor(Pressure::None)?;
+                    self.is_altered = true;
+                }
+                other => other?,
             }
         }
         // The stiffness is that of the present state, so no forces can have reversed.

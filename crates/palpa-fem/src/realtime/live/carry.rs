@@ -74,6 +74,17 @@ impl Come {
 }
 
 impl Come {
+    /// This state with a share of its displacements from rest (m, `[n_nodes]`).
+    pub(super) fn nearer_to(&self, rest: &[Vec3], share: f64) -> Self {
+        let mut come = self.clone();
+        if share < 1.0 {
+            for (u, rest) in come.state.displacements.iter_mut().zip(rest) {
+                *u = rest + (*u - rest) * share;
+            }
+        }
+        come
+    }
+
     /// Adds a multiple of the last elastic stresses of another state.
     fn add_last(&mut self, by: f64, other: &Self) {
         for (into, from) in self.state.history.iter_mut().zip(&other.state.history) {

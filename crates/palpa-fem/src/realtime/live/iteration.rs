@@ -12,6 +12,9 @@ use crate::model::Model;
 
 /// If less than this share of an iteration can be taken, it has failed.
 const LEAST_SHARE: f64 = 0.05;
+/// Length of an iteration that is none any more, as a multiple of the longest way that tools may go in a step: its
+/// stiffness is hardly positive definite.
+const WILD: f64 = 3.0;
 /// A body without contact counts as still if an iteration moves its zone by no more than this, m,
 /// and its residual is within this share of the tolerance.
 const STILL: f64 = 1e-8;
@@ -38,9 +41,23 @@ pub(super) enum Pass {
     Follow,
     /// A later one, with a new stiffness and new candidates.
     Anew,
+    /// As `Anew`, with a stiffness without the pressure of the volume, after one that led nowhere.
+    Firm,
     /// A later one near equilibrium, with the factor, compliance and candidates of the previous
     /// one.
     Near,
+}
+
+impl Pass {
+    /// What may lead on from where this one leads nowhere: its stiffness is of another state, or hardly positive
+    /// definite.
+    pub(super) fn firmer(self) -> Option<Self> {
+        match self {
+            Self::First | Self::Follow | Self::Near => Some(Self::Anew),
+            Self::Anew => Some(Self::Firm),
+            Self::Firm => None,
+        }
+    }
 }
 
 /// Scratch arrays of the iterations.
@@ -92,8 +109,9 @@ impl Live {
                 report.residual = residual;
                 return Ok(());
             }
-            if pass == Pass::Anew || !self.keeps_factor() {
-                self.refactor(report)?;
+            let is_firm = pass == Pass::Firm;
+            if is_firm || pass == Pass::Anew || !self.keeps_factor() {
+                self.refactor(is_firm, report)?;
             }
         }
         // Where the tool has moved along the skin, its pressure turns before anything else changes.
@@ -144,19 +162,23 @@ impl Live {
             self.ws.before[node as usize] = self.state.displacements[node as usize];
         }
         self.beyond.is_settled = false;
-        let mut share = 1.0;
-        loop {
-            self.take(share);
-            if self.internal_forces().is_ok() {
-                return Ok(share);
+        let zone = self.plan.zone.iter();
+        let longest = zone.flat_map(|&[_, dof]| &self.ws.x[dof as usize..dof as usize + 3]);
+        let longest = longest.fold(0.0, |most: f32, x| most.max(x.abs()));
+        if f64::from(longest) <= WILD * self.params.longest_way() {
+            let mut share = 1.0;
+            while share >= LEAST_SHARE {
+                self.take(share);
+                if self.internal_forces().is_ok() {
+                    return Ok(share);
+                }
+                share *= 0.5;
+                report.outcome = StepOutcome::BackedOff;
             }
-            share *= 0.5;
-            report.outcome = StepOutcome::BackedOff;
-            if share < LEAST_SHARE {
-                self.take(0.0);
-                return Err(Trouble::Singular);
-            }
+            self.take(0.0);
+            self.known = Known::Nothing;
         }
+        Err(Trouble::Singular)
     }
 
     /// Applies a share of the step in `x` to the displacements before it.
@@ -169,7 +191,7 @@ impl Live {
     }
 
     /// Internal forces of the zone's prisms at the present displacements.
-    fn internal_forces(&mut self) -> Result<(), Trouble> {
+    pub(super) fn internal_forces(&mut self) -> Result<(), Trouble> {
         let levels = self.model.body.n_levels;
         for &v in &self.plan.vertices {
             let first = v as usize * levels;

@@ -27,6 +27,9 @@ const AHEAD: f64 = 1.5;
 const LAG_SHARE: f64 = 0.5;
 const LAGS: [f64; 2] = [0.01, 0.05];
 
+/// Shares of its displacements from rest that a new zone keeps where all of them would turn a prism inside out.
+const EASED: [f64; 4] = [0.9, 0.75, 0.5, 0.0];
+
 /// The background jobs of a body.
 #[derive(Debug)]
 pub(super) struct Jobs {
@@ -218,6 +221,15 @@ impl Live {
         })
     }
 
+    /// Centres at rest and radii of a zone as far ahead of the tools as it still holds what they press now, m. None of
+    /// that is of the ring.
+    pub(super) fn present_zone(&self) -> (Centres, [f64; 2]) {
+        let reach = INNER * self.reach();
+        let radius = self.params.zone_radius.max(ZONE_GROWTH * self.reach());
+        let way = self.next_way(radius - reach);
+        (self.centres_after(way), [reach + way.norm(), radius])
+    }
+
     /// Whether a vertex lies on the ring: the zone's outermost columns, which answer nearly linearly.
     pub(super) fn is_at_ring(&self, vertex: u32) -> bool {
         self.plan.tree.first_dof(vertex as usize) >= self.first_ring_dof()
@@ -237,10 +249,17 @@ impl Live {
 
     /// Centres at rest of a zone requested now, one for each tool, m: ahead of the tools by the way that they will
     /// go until the zone is ready, and half of that.
-    pub(super) fn next_centres(&self) -> Centres {
+    fn next_centres(&self) -> Centres {
+        self.centres_after(self.next_way(AHEAD * self.params.longest_ahead()))
+    }
+
+    /// The way that the tools will go until a zone requested now is ready, and half of that, but no more than `most`, m.
+    fn next_way(&self, most: f64) -> Vec3 {
         let way = self.course.pace.way_in(AHEAD * self.jobs.latency);
-        let most = AHEAD * self.params.longest_ahead();
-        let way = way * (most / way.norm()).min(1.0);
+        way * (most / way.norm()).min(1.0)
+    }
+
+    fn centres_after(&self, way: Vec3) -> Centres {
         Centres::new(self.course.tools.len(), |tool| self.centre_after(way, tool))
     }
 
@@ -402,10 +421,28 @@ impl Live {
             }
             room.retired.inside = Some(std::mem::replace(&mut self.inside, inside));
             room.retired.follower = self.exterior.replace_follower(follower);
+            self.ease_zone();
             self.keep_good();
         }
         self.forget_forces();
         self.kept = kept;
+    }
+
+    /// Brings a new zone nearer to rest if a prism in it is inside out: no step could go on from there. The old exterior
+    /// answers linearly, and where a tool presses deep beside the old zone, its answer may fold prisms.
+    fn ease_zone(&mut self) {
+        let mut before = 1.0;
+        for share in EASED {
+            if self.internal_forces().is_ok() {
+                break;
+            }
+            for &[node, _] in &self.plan.zone {
+                let rest = self.rest[node as usize];
+                let u = &mut self.state.displacements[node as usize];
+                *u = rest + (*u - rest) * (share / before);
+            }
+            before = share;
+        }
     }
 }
 

@@ -61,7 +61,7 @@ use super::inside::Inside;
 use super::local::LocalModel;
 use super::outside::{Follower, Outside};
 use super::plan::{Centres, Plan, Trouble};
-use crate::batch::{History, Tangent};
+use crate::batch::{History, Pressure, Tangent};
 use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
@@ -122,6 +122,17 @@ pub struct Live {
     ws: Scratch,
 }
 
+/// The state in which a body begins.
+#[derive(Debug)]
+struct Start {
+    /// Points of the skin at rest around which the first zone is, and its radii, m; see [`Plan::new`].
+    zone: (Centres, [f64; 2]),
+    /// Without a history the body has relaxed.
+    come: Come,
+    /// Zones are numbered from here on.
+    n_before: u64,
+}
+
 impl Live {
     /// A body at rest, with its first zone around the tools.
     ///
@@ -137,26 +148,31 @@ impl Live {
             let tools = tools.get(tool..=tool).unwrap_or(&[]);
             nearest_point(&model, &rest, tools, None).1
         });
-        let come = Come::rest(&model, &rest);
-        Self::at(model, tools, params, centres, come, rest, 0)
+        let start = Start {
+            zone: (centres, [0.0, params.zone_radius]),
+            come: Come::rest(&model, &rest),
+            n_before: 0,
+        };
+        Self::at(model, tools, params, start, rest)
     }
 
-    /// A body in a given state, with its first zone around points of the skin at rest. Without a
-    /// history it has relaxed. Zones are numbered from `n_before` on.
+    /// A body in a given state.
     fn at(
         model: Arc<Model>,
         tools: &[PosedTool],
         params: LiveParams,
-        centres: Centres,
-        come: Come,
+        start: Start,
         rest: Arc<[Vec3]>,
-        n_before: u64,
     ) -> Result<Self, FemError> {
+        let Start {
+            zone: (centres, radii),
+            come,
+            n_before,
+        } = start;
         let pattern = Arc::new(model.structure.pattern.clone());
         let mut state = come.state;
         let mut memory = Memory::new(&model);
         let n_zones = n_before + 1;
-        let radii = [0.0, params.zone_radius];
         let plan = Plan::new(&model, &pattern, n_zones, centres, radii)?;
         let mut inside = Box::new(Inside::new(&model, &memory, &pattern, &plan));
         let mut room = Room::new(&model, &pattern, &plan, come.history.as_ref());
@@ -199,7 +215,7 @@ impl Live {
             &pattern,
             &plan,
             &state.displacements,
-            None,
+            Pressure::Own,
             &|| true,
         )
         .map_err(|trouble| match trouble {

@@ -10,7 +10,7 @@ use palpa_sparse::fronts::{Half, SolveScratch, fronts_above};
 use super::super::inside::Inside;
 use super::super::outside::{Follower, Outside, Workshop};
 use super::super::plan::{Centres, Plan, Trouble};
-use crate::batch::{From, History, Tangent};
+use crate::batch::{From, History, Pressure, Tangent};
 use crate::model::Model;
 use crate::state::Memory;
 
@@ -139,7 +139,7 @@ impl Shop {
         std::mem::replace(&mut self.follower, follower)
     }
 
-    /// Factors an exterior at these displacements, extrapolated `from` others.
+    /// Factors an exterior at these displacements.
     #[expect(clippy::too_many_arguments, reason = "a model and its zone")]
     pub(super) fn refactor(
         &mut self,
@@ -149,7 +149,7 @@ impl Shop {
         pattern: &ColumnPattern,
         plan: &Plan,
         displacements: &[Vec3],
-        from: Option<From<'_>>,
+        pressure: Pressure<'_>,
         is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Trouble> {
         let (follower, workshop) = (&mut self.follower, &mut self.workshop);
@@ -161,7 +161,7 @@ impl Shop {
             follower,
             workshop,
             displacements,
-            from,
+            pressure,
             is_wanted,
         )
     }
@@ -243,10 +243,12 @@ impl Rebuild {
             ..
         } = &mut *room;
         let extrapolated = self.old.as_ref().filter(|_| self.is_pressed);
-        let from = extrapolated.map(|old| From {
-            displacements: &old.at,
-            is_known: &self.plan.is_inside,
-            n_levels: model.body.n_levels,
+        let pressure = extrapolated.map_or(Pressure::Own, |old| {
+            Pressure::Predicted(From {
+                displacements: &old.at,
+                is_known: &self.plan.is_inside,
+                n_levels: model.body.n_levels,
+            })
         });
         let result = shop.refactor(
             &mut outside,
@@ -255,7 +257,7 @@ impl Rebuild {
             &pattern,
             &plan,
             displacements,
-            from,
+            pressure,
             &|| !self.is_given_up.load(Ordering::Relaxed),
         );
         let zone = (is_new && result.is_ok())

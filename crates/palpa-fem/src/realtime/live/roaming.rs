@@ -8,7 +8,7 @@ use palpa_mesh::Vec3;
 use super::super::plan::Centres;
 use super::carry::{Carry, Come};
 use super::pressed::{Pressed, nearest_point};
-use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, StepOutcome, rest};
+use super::{Live, LiveParams, LiveReport, Rebuild, Rebuilt, Start, StepOutcome, rest};
 use crate::batch::History;
 use crate::error::FemError;
 use crate::model::Model;
@@ -16,7 +16,10 @@ use crate::posed_tool::PosedTool;
 
 /// Largest number of steps that bring a body to equilibrium on a new mesh, each with a new
 /// stiffness.
-const MOST_SETTLING: usize = 8;
+const MOST_SETTLING: usize = 5;
+/// Shares of the displacements from rest with which a body begins on a new mesh, until it settles: a deep dent may turn
+/// other prisms inside out.
+const SHARES: [f64; 3] = [1.0, 0.8, 0.5];
 /// Most steps that bring a body with tension to rest on a new mesh, each with a new stiffness, and
 /// the largest displacement in a step, m, at which it is at rest.
 const REST_STEPS: usize = 8;
@@ -109,7 +112,9 @@ struct Move {
     rest: Arc<[Vec3]>,
     tools: Vec<PosedTool>,
     params: LiveParams,
-    centres: Centres,
+    /// Centres at rest and radii of the first zone, which holds what the tools press: outside a zone, a body may not be
+    /// stable without its tools. m
+    zone: (Centres, [f64; 2]),
     lag: f64,
     n_before: u64,
 }
@@ -145,9 +150,28 @@ impl Move {
         let carry = Carry::new(&self.old, &self.new);
         let rest = self.rest_on(&carry)?;
         let come = carry.onto(&self.old, &self.come, &self.new, [&self.rest, &rest]);
+        let live = SHARES.iter().find_map(|&share| {
+            let come = come.nearer_to(&rest, share);
+            self.settled(come, Arc::clone(&rest))
+        })?;
+        Some(Box::new(Moved {
+            place: self.place,
+            live,
+            carry,
+            then: self.come,
+            lag: self.lag,
+        }))
+    }
+
+    /// The body on the new mesh in equilibrium with the tools, found from a state near it.
+    fn settled(&self, come: Come, rest: Arc<[Vec3]>) -> Option<Box<Live>> {
         let model = Arc::clone(&self.new);
-        let (params, n) = (self.params, self.n_before);
-        let live = Live::at(model, &self.tools, params, self.centres, come, rest, n).ok()?;
+        let start = Start {
+            zone: self.zone,
+            come,
+            n_before: self.n_before,
+        };
+        let live = Live::at(model, &self.tools, self.params, start, rest).ok()?;
         let mut live = Box::new(live);
         live.exterior.set_lag(self.lag);
         for round in 0..MOST_SETTLING {
@@ -155,19 +179,17 @@ impl Move {
             // exterior.
             live.jobs.ask_for_factor();
             let report = live.step(&self.tools, 0.0);
+            if matches!(report.outcome, StepOutcome::Held | StepOutcome::Failed) {
+                return None;
+            }
             let is_good = report.outcome == StepOutcome::Arrived
-                && report.residual <= params.tolerance
-                && report.iterations == 1;
+                && report.residual <= self.params.tolerance
+                && report.iterations == 1
+                && !live.outside.is_altered;
             // At least one step must have an exterior of this state.
             if round > 0 && is_good {
                 live.take_back_job();
-                return Some(Box::new(Moved {
-                    place: self.place,
-                    live,
-                    carry,
-                    then: self.come,
-                    lag: self.lag,
-                }));
+                return Some(live);
             }
             if let Some(job) = live.take_job() {
                 live.install(job.run());
@@ -195,7 +217,12 @@ impl Move {
         let model = Arc::clone(&self.new);
         let rest: Arc<[Vec3]> = carry.displacements(&model, &self.rest).into();
         let come = Come::rest(&model, &rest);
-        let mut live = Live::at(model, &[], self.params, self.centres, come, rest, 0).ok()?;
+        let start = Start {
+            zone: self.zone,
+            come,
+            n_before: 0,
+        };
+        let mut live = Live::at(model, &[], self.params, start, rest).ok()?;
         let mut before = live.state.displacements.clone();
         for _ in 0..REST_STEPS {
             live.jobs.ask_for_factor();
@@ -226,21 +253,8 @@ impl Moved {
         old.ease_beyond();
         old.settle();
         let mut live = self.live;
-        let (now, then) = (&old.state.displacements, &self.then.state.displacements);
-        let plan = Arc::clone(&live.plan);
         let model = Arc::clone(&live.model);
-        let is_followed = live.exterior.is_followed();
         for v in 0..model.body.n_vertices() {
-            // Displacements outside the zone follow from the exterior's.
-            let n_moved = if is_followed || plan.is_inside[v] {
-                model.structure.n_free_levels
-            } else {
-                0
-            };
-            for l in 0..n_moved {
-                let by = |u: &[Vec3]| self.carry.displacement(v, l, &model, u);
-                live.state.displacements[model.body.node(v, l)] += by(now) - by(then);
-            }
             let models = [&*old.model, &*model];
             let now = self.carry.touch(v, &old.skin, models);
             let before = self.carry.touch(v, &self.then.skin, models);
@@ -278,8 +292,39 @@ impl Moved {
         live.recovery.pace = old.recovery.pace;
         live.forget_forces();
         live.jobs.is_factored_at(old.depth());
-        live.keep_good();
+        live.add_change(&self.carry, &self.then.state.displacements, old);
         live
+    }
+}
+
+impl Live {
+    /// Adds how the displacements of the old mesh have changed, or a smaller share of it where all of it would turn a
+    /// prism inside out: what is missing then comes with the next steps. The state to return to remains the one in
+    /// which the body settled.
+    fn add_change(&mut self, carry: &Carry, then: &[Vec3], old: &Self) {
+        let (plan, model) = (Arc::clone(&self.plan), Arc::clone(&self.model));
+        let now = &old.state.displacements;
+        let is_followed = self.exterior.is_followed();
+        let mut added = 0.0;
+        for share in [1.0, 0.5, 0.0] {
+            for v in 0..model.body.n_vertices() {
+                // Displacements outside the zone follow from the exterior's.
+                let n_moved = if is_followed || plan.is_inside[v] {
+                    model.structure.n_free_levels
+                } else {
+                    0
+                };
+                for l in 0..n_moved {
+                    let by = |u: &[Vec3]| carry.displacement(v, l, &model, u);
+                    let change = (by(now) - by(then)) * (share - added);
+                    self.state.displacements[model.body.node(v, l)] += change;
+                }
+            }
+            added = share;
+            if self.internal_forces().is_ok() {
+                break;
+            }
+        }
     }
 }
 
@@ -404,7 +449,7 @@ impl Roaming {
                 rest: Arc::clone(&self.live.rest),
                 tools: self.live.course.tools.clone(),
                 params: self.params,
-                centres: self.live.next_centres(),
+                zone: self.live.present_zone(),
                 lag: self.live.exterior.lag(),
                 n_before: self.live.jobs.n_zones.max(self.live.jobs.n_asked),
             })));

@@ -83,10 +83,19 @@ impl Springs {
 
 impl Live {
     /// Assembles and factors the zone's stiffness, with springs as soft as possible. Where it is not positive
-    /// definite, it loses the pressure of the volume; where that is not enough, it has stiffer springs, and its
-    /// diagonal is raised: three factors at most.
-    pub(super) fn refactor(&mut self, report: &mut LiveReport) -> Result<(), Trouble> {
-        self.assemble(Pressure::Own)?;
+    /// definite, or if it must be firm, it loses the pressure of the volume; where that is not enough, it has
+    /// stiffer springs, and its diagonal is raised: three factors at most.
+    pub(super) fn refactor(
+        &mut self,
+        is_firm: bool,
+        report: &mut LiveReport,
+    ) -> Result<(), Trouble> {
+        let first = if is_firm {
+            Pressure::None
+        } else {
+            Pressure::Own
+        };
+        self.assemble(first)?;
         let pressed = self.problem.pressing().filter(|c| !c.is_far);
         let pressed = pressed.map(|c| c.vertex);
         let size = self.inside.skin_stiffness(&self.pattern, pressed);
@@ -94,16 +103,18 @@ impl Live {
         let usual = self.springs.share;
         self.hold_pressed(size, 0.0);
         let mut n_raised = 0;
-        let is_altered = !self.has_factored(report);
-        if is_altered {
+        let mut has_factored = self.has_factored(report);
+        let is_altered = is_firm || !has_factored;
+        if !is_firm && !has_factored {
             self.assemble(Pressure::None)?;
             self.hold_pressed(size, 0.0);
-            if !self.has_factored(report) {
-                self.springs.stiffen(was_eased);
-                self.hold_pressed(size, usual * size);
-                report.n_factors += 1;
-                n_raised = self.inside.factor_raised(&self.plan, &self.outside)?;
-            }
+            has_factored = self.has_factored(report);
+        }
+        if !has_factored {
+            self.springs.stiffen(was_eased);
+            self.hold_pressed(size, usual * size);
+            report.n_factors += 1;
+            n_raised = self.inside.factor_raised(&self.plan, &self.outside)?;
         }
         report.n_raised = report.n_raised.max(n_raised);
         report.spring = self.springs.share;

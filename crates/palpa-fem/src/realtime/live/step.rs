@@ -1,5 +1,6 @@
 //! One step: the tools move, the body follows, and the result is judged.
 
+use super::super::plan::Trouble;
 use super::iteration::{Known, Pass};
 use super::report::{LiveReport, StepOutcome};
 use super::{ExteriorState, Live};
@@ -123,12 +124,15 @@ impl Live {
     /// Runs Newton iterations until the zone is in balance or the limit is reached.
     fn iterations(&mut self, dt: f64, report: &mut LiveReport) {
         let mut before = f64::INFINITY;
+        let mut firmer = None;
         while report.iterations < self.params.max_iterations {
-            let pass = if report.iterations == 0 {
-                self.first_pass()
-            } else {
-                let left = self.params.max_iterations - report.iterations;
-                self.next_pass(report.residual, before, left)
+            let pass = match firmer.take() {
+                Some(pass) => pass,
+                None if report.iterations == 0 => self.first_pass(),
+                None => {
+                    let left = self.params.max_iterations - report.iterations;
+                    self.next_pass(report.residual, before, left)
+                }
             };
             before = if report.iterations == 0 {
                 f64::INFINITY
@@ -139,9 +143,12 @@ impl Live {
             match self.iterate(dt, pass, report) {
                 Ok(()) if report.residual <= self.params.tolerance => break,
                 Ok(()) => {}
-                Err(_) => {
-                    report.outcome = StepOutcome::Failed;
-                    break;
+                Err(trouble) => {
+                    firmer = pass.firmer().filter(|_| trouble == Trouble::Singular);
+                    if firmer.is_none() || report.iterations == self.params.max_iterations {
+                        report.outcome = StepOutcome::Failed;
+                        break;
+                    }
                 }
             }
         }
