@@ -103,6 +103,9 @@ fn a_patch_that_comes_late_is_a_stall_and_no_jump() {
         until("the late patch came", || {
             engine.tissue_stats().wall.max() > 0.2
         });
+        // The loop has taken the late patch up before the next one begins to be late: a force that fades is felt
+        // for a while.
+        go_on(engine, 5, 2, 0);
         until_felt(hand);
         // One that is so late that it must not be felt at all.
         engine.faults().delay_tissue(0.9);
