@@ -16,10 +16,6 @@ use crate::state::Memory;
 pub(super) struct Outside {
     /// Number of the factor.
     pub(super) id: u64,
-    /// Whether the factor is that of a stiffness without the pressure of the volume, because the body's was not positive
-    /// definite. Displacements that come from another mesh do not keep the volume: their pressure is off by as much as
-    /// the shear modulus.
-    pub(super) is_altered: bool,
     /// Number of the zone that this is the exterior of.
     pub(super) plan: u64,
     pub(super) factor: Exterior<f32>,
@@ -33,7 +29,6 @@ impl Outside {
     pub(super) fn new(model: &Model, plan: &Plan) -> Self {
         Self {
             id: 0,
-            is_altered: false,
             plan: plan.id,
             factor: Exterior::new(&plan.tree),
             right: vec![0.0; model.structure.n_dofs()],
@@ -161,7 +156,6 @@ impl Outside {
         pressure: Pressure<'_>,
         is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Trouble> {
-        self.is_altered = false;
         if !plan.exterior.is_empty() {
             let mut factor = |pressure| {
                 let blocks = &mut workshop.blocks;
@@ -178,10 +172,7 @@ impl Outside {
                 }
             };
             match factor(pressure) {
-                Err(Trouble::Singular) => {
-                    factor(Pressure::None)?;
-                    self.is_altered = true;
-                }
+                Err(Trouble::Singular) => factor(Pressure::None)?,
                 other => other?,
             }
         }

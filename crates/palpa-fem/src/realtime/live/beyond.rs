@@ -18,6 +18,8 @@ use crate::model::Model;
 const MOST_TAKEN_UP: f64 = 1.5e-3;
 /// Pace at which deeper tools are followed from there, as a share of the longest move.
 const EASY_PACE: f64 = 0.125;
+/// Most steps that this takes.
+const MOST_CATCHING_UP: u32 = 20;
 
 /// Contact outside the zone.
 #[derive(Debug)]
@@ -34,6 +36,8 @@ pub(super) struct Beyond {
     pub(super) clearance: f64,
     /// Whether a tool may touch outside the zone: it presses there, or nowhere. `[n_tools]`
     may_touch: Vec<bool>,
+    /// Steps that tools which were taken back may still take to their targets; 0 if none was.
+    catching_up: u32,
 }
 
 impl Beyond {
@@ -45,7 +49,19 @@ impl Beyond {
             triangles: Vec::with_capacity(model.body.skin.triangles.len()),
             clearance: f64::INFINITY,
             may_touch: vec![false; n_tools],
+            catching_up: 0,
         }
+    }
+
+    /// Counts a step. Returns whether tools that were taken back are still on their way to their targets, which they
+    /// stay `is_short` of.
+    pub(super) fn is_catching_up(&mut self, is_short: bool) -> bool {
+        self.catching_up = if is_short {
+            self.catching_up.saturating_sub(1)
+        } else {
+            0
+        };
+        self.catching_up > 0
     }
 
     /// The load on the exterior, if any.
@@ -132,6 +148,7 @@ impl Live {
             let back = along.normalize() * (depth - MOST_TAKEN_UP);
             self.course.tools[t].pose.translation.vector -= back;
             self.recovery.pace = self.recovery.pace.min(EASY_PACE);
+            self.beyond.catching_up = MOST_CATCHING_UP;
         }
         self.course.clearance = 0.0;
         self.load_exterior();

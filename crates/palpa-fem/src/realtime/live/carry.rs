@@ -74,6 +74,11 @@ impl Come {
 }
 
 impl Come {
+    /// Whether nothing touches the body, and it has no memory: then it is at rest.
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.history.is_none() && self.skin.pressures.iter().all(|pressure| *pressure == 0.0)
+    }
+
     /// This state with a share of its displacements from rest (m, `[n_nodes]`).
     pub(super) fn nearer_to(&self, rest: &[Vec3], share: f64) -> Self {
         let mut come = self.clone();

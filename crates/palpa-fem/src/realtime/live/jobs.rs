@@ -8,7 +8,7 @@ use palpa_mesh::Vec3;
 use super::super::plan::Centres;
 use super::kept::Kept;
 use super::pressed::{Pressed, nearest_point};
-use super::rebuild::{Made, Rebuild, Rebuilt, Room, Target};
+use super::rebuild::{Made, Rebuild, Rebuilt, Room, Shop, Target};
 use super::{ExteriorMode, Live};
 use crate::batch::History;
 use crate::law::Prony;
@@ -94,14 +94,17 @@ impl Jobs {
         }
     }
 
+    /// The prisms of the exterior, if no job has them.
+    pub(super) fn shop(&mut self) -> Option<&mut Shop> {
+        match &mut self.job {
+            Job::Idle(room) => room.as_mut().map(|room| &mut room.shop),
+            Job::Waiting(_) | Job::Out { .. } => None,
+        }
+    }
+
     /// Requests a new factor of the exterior.
     pub(super) fn ask_for_factor(&mut self) {
         self.depth_at_factor = f64::INFINITY;
-    }
-
-    /// Records the indentation (m) at the last factor.
-    pub(super) fn is_factored_at(&mut self, depth: f64) {
-        self.depth_at_factor = depth;
     }
 }
 
@@ -254,7 +257,11 @@ impl Live {
     }
 
     /// The way that the tools will go until a zone requested now is ready, and half of that, but no more than `most`, m.
+    /// None in the air, where a hand that sets out would get a zone for a place on its way.
     fn next_way(&self, most: f64) -> Vec3 {
+        if self.problem.pressing().next().is_none() {
+            return Vec3::zeros();
+        }
         let way = self.course.pace.way_in(AHEAD * self.jobs.latency);
         way * (most / way.norm()).min(1.0)
     }

@@ -156,7 +156,9 @@ impl Live {
         Self::at(model, tools, params, start, rest)
     }
 
-    /// A body in a given state.
+    /// A body in a given state. If that is not rest, the exterior has the stiffness without the pressure of the volume:
+    /// displacements that come from another mesh do not keep the volume, so that their pressure is off by as much as the
+    /// shear modulus, and with it the stiffness is mostly not positive definite.
     fn at(
         model: Arc<Model>,
         tools: &[PosedTool],
@@ -208,6 +210,11 @@ impl Live {
         }
         let mut outside = Outside::new(&model, &plan);
         outside.id = n_before;
+        let pressure = if *state.displacements == *rest {
+            Pressure::Own
+        } else {
+            Pressure::None
+        };
         shop.refactor(
             &mut outside,
             &model,
@@ -215,7 +222,7 @@ impl Live {
             &pattern,
             &plan,
             &state.displacements,
-            Pressure::Own,
+            pressure,
             &|| true,
         )
         .map_err(|trouble| match trouble {

@@ -14,9 +14,13 @@ use crate::error::FemError;
 use crate::model::Model;
 use crate::posed_tool::PosedTool;
 
-/// Largest number of steps that bring a body to equilibrium on a new mesh, each with a new
-/// stiffness.
-const MOST_SETTLING: usize = 5;
+/// Largest number of steps that bring a body to equilibrium on a new mesh, and number of those after which the exterior
+/// gets a new stiffness instead of another linearisation only.
+const MOST_SETTLING: usize = 7;
+const KEEPS_STIFFNESS: usize = 4;
+/// Unbalanced forces of the exterior with which a body is taken up there, as a share of the tools' force. The answer of
+/// the exterior corrects them to first order.
+const MOST_OUTSIDE: f64 = 0.05;
 /// Shares of the displacements from rest with which a body begins on a new mesh, until it settles: a deep dent may turn
 /// other prisms inside out.
 const SHARES: [f64; 3] = [1.0, 0.8, 0.5];
@@ -29,6 +33,9 @@ const REST_CHANGE: f64 = 1e-8;
 /// move again; both as a share of the radius of the fine part.
 const LEAVE: f64 = 0.45;
 const LEAD: f64 = 0.35;
+/// Speed of tools in the air above which no job is worth while: where they come down is not known yet, and a job would
+/// only keep the one waiting that is needed there. m/s
+const FAST: f64 = 0.05;
 /// Speed of the tools below which they head nowhere, m/s.
 const SLOWEST: f64 = 1e-3;
 
@@ -149,7 +156,11 @@ impl Move {
     fn run(self) -> Option<Box<Moved>> {
         let carry = Carry::new(&self.old, &self.new);
         let rest = self.rest_on(&carry)?;
-        let come = carry.onto(&self.old, &self.come, &self.new, [&self.rest, &rest]);
+        let come = if self.come.is_at_rest() {
+            Come::rest(&self.new, &rest)
+        } else {
+            carry.onto(&self.old, &self.come, &self.new, [&self.rest, &rest])
+        };
         let live = SHARES.iter().find_map(|&share| {
             let come = come.nearer_to(&rest, share);
             self.settled(come, Arc::clone(&rest))
@@ -174,25 +185,30 @@ impl Move {
         let live = Live::at(model, &self.tools, self.params, start, rest).ok()?;
         let mut live = Box::new(live);
         live.exterior.set_lag(self.lag);
-        for round in 0..MOST_SETTLING {
-            // The whole body must be in balance, so each step requests a new stiffness of the
-            // exterior.
-            live.jobs.ask_for_factor();
+        // The whole body must be in balance, so each step is followed by another linearisation of the exterior. Its
+        // unbalanced forces, N; infinite before the first.
+        let mut outside = f64::INFINITY;
+        for round in 1..=MOST_SETTLING {
             let report = live.step(&self.tools, 0.0);
+            live.take_back_job();
             if matches!(report.outcome, StepOutcome::Held | StepOutcome::Failed) {
                 return None;
             }
             let is_good = report.outcome == StepOutcome::Arrived
                 && report.residual <= self.params.tolerance
-                && report.iterations == 1
-                && !live.outside.is_altered;
-            // At least one step must have an exterior of this state.
-            if round > 0 && is_good {
-                live.take_back_job();
+                && report.iterations == 1;
+            if is_good && outside <= MOST_OUTSIDE * live.tools_force() {
                 return Some(live);
             }
-            if let Some(job) = live.take_job() {
-                live.install(job.run());
+            let keeps = round <= KEEPS_STIFFNESS;
+            let found = if keeps { live.linearise_again() } else { None };
+            outside = found.unwrap_or(0.0);
+            if found.is_none() {
+                live.jobs.ask_for_factor();
+                live.ask(0.0);
+                if let Some(job) = live.take_job() {
+                    live.install(job.run());
+                }
             }
         }
         None
@@ -291,13 +307,41 @@ impl Moved {
         live.jobs.latency = old.jobs.latency;
         live.recovery.pace = old.recovery.pace;
         live.forget_forces();
-        live.jobs.is_factored_at(old.depth());
+        // The stiffness of the exterior is that of a state on the way.
+        live.jobs.ask_for_factor();
         live.add_change(&self.carry, &self.then.state.displacements, old);
         live
     }
 }
 
 impl Live {
+    /// Brings the exterior up to the zone, and linearises it about that state with the stiffness that it has, if no job
+    /// is out. Returns its unbalanced forces, N; `None` if that cannot be done: it needs a new stiffness then. Cost: two
+    /// substitutions and the forces of the exterior's prisms.
+    fn linearise_again(&mut self) -> Option<f64> {
+        if self.model.has_memory || !self.exterior.answers_linearly() {
+            return None;
+        }
+        self.load_exterior();
+        if self.presses_beyond() {
+            return None;
+        }
+        self.settle();
+        let outside = Arc::get_mut(&mut self.outside)?;
+        let shop = self.jobs.shop()?;
+        let residual = outside.follow(
+            &self.model,
+            &self.memory,
+            &self.plan,
+            &mut shop.follower,
+            &self.state.displacements,
+        );
+        let kept = self.kept;
+        self.forget_forces();
+        self.kept = kept;
+        residual.ok()
+    }
+
     /// Adds how the displacements of the old mesh have changed, or a smaller share of it where all of it would turn a
     /// prism inside out: what is missing then comes with the next steps. The state to return to remains the one in
     /// which the body settled.
@@ -413,13 +457,17 @@ impl Roaming {
         (pressed.middle - self.place).norm() + reach > bodies.radius()
     }
 
-    /// A job for the background thread, if one is due. Give its result to [`Self::install`]. Zones
-    /// and meshes take turns; a finished mesh is taken up first.
+    /// A job for the background thread, if one is due. Give its result to [`Self::install`]. Zones and meshes take
+    /// turns under contact; a finished mesh is taken up first. In the air a mesh comes first: it brings a zone.
     pub fn take_job(&mut self) -> Option<RoamJob> {
         if self.is_job_out {
             return None;
         }
-        let is_mesh_first = self.next.is_some() || self.was_zone;
+        let is_in_air = self.live.problem.pressing().next().is_none();
+        if is_in_air && self.bodies.is_some() && self.live.course.pace.velocity().norm() > FAST {
+            return None;
+        }
+        let is_mesh_first = self.next.is_some() || self.was_zone || is_in_air;
         let zone = |live: &mut Live| live.take_job().map(Kind::Zone);
         // Without contact this check searches the skin, so it is made once a step.
         let kind = if is_mesh_first {

@@ -115,6 +115,7 @@ impl Live {
             is_contact_settled: true,
             n_raised: 0,
             is_altered: false,
+            is_catching_up: self.beyond.is_catching_up(is_short),
             spring: 0.0,
             zone: self.plan.id,
             factor: self.outside.id,
