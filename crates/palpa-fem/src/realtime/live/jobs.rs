@@ -16,6 +16,8 @@ use crate::model::Model;
 
 /// Radius of a zone at least, as a multiple of that of the contact: it may grow until the zone is ready.
 const ZONE_GROWTH: f64 = 1.3;
+/// Radius of a zone above which another one is made, as a multiple of the one that is needed.
+const WIDE: f64 = 1.4;
 /// Radius within which no vertex is of the ring, as a multiple of that of the contact on its way until the
 /// next zone.
 const INNER: f64 = 1.1;
@@ -105,6 +107,11 @@ impl Jobs {
     /// Requests a new factor of the exterior.
     pub(super) fn ask_for_factor(&mut self) {
         self.depth_at_factor = f64::INFINITY;
+    }
+
+    /// Records the indentation (m) at the last factor.
+    pub(super) fn is_factored_at(&mut self, depth: f64) {
+        self.depth_at_factor = depth;
     }
 }
 
@@ -212,15 +219,17 @@ impl Live {
         let radius = self.plan.radius;
         let centres = self.next_centres();
         let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
-        (is_leaving || reaches_ring).then(|| {
-            let reach = self.reach();
+        let reach = self.reach();
+        // Wider than it needs to be: made for coarser triangles, or for a deeper press.
+        let needed = self.params.zone_radius.max(ZONE_GROWTH * reach);
+        let is_wide = radius.is_finite() && radius > WIDE * needed;
+        (is_leaving || reaches_ring || is_wide).then(|| {
             // A hand that hurries to another place after a slow job would make the whole body a zone, and each job
             // slower than the one before.
             let even = self.course.pace.velocity().norm() * self.jobs.latency;
             let even = even.min(self.params.longest_ahead());
             let on_its_way = reach + (AHEAD - 1.0) * even;
-            let radius = self.params.zone_radius.max(ZONE_GROWTH * reach);
-            (centres, [INNER * on_its_way, radius])
+            (centres, [INNER * on_its_way, needed])
         })
     }
 
