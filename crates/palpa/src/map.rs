@@ -40,8 +40,8 @@ const TREND_REACH: f64 = 2.0 * TREND;
 /// where nothing is known of the direction across. More of it would flatten the trend beside bone.
 const STIFF_SLOPE: f64 = 1e-4;
 const STIFF_CURVATURE: f64 = 1e-3;
-/// Width of a lump's bump (standard deviation), as a share of the contact's radius: what is felt is the lump seen through
-/// the contact.
+/// Width of a lump's bump (standard deviation), as a share of the contact's radius. A contact spreads what a lump adds
+/// over its own width.
 const BUMP_WIDTH: f64 = 1.3;
 /// Resistance of a bump to its height, in spots' weights: a spread of 5 % against heights of 15 %. It keeps the ends of
 /// strokes from standing out, where bump and trend can hardly be told apart.
@@ -49,9 +49,9 @@ const STIFF_BUMP: f64 = 0.11;
 /// Fewest neighbours from which a trend is known, and the least width of the touched area around it, m.
 const LEAST_NEIGHBOURS: usize = 8;
 const LEAST_WIDTH: f64 = 20e-3;
-/// A place stands out if it is stiffer than its surroundings by this share, and by so many standard deviations of what is
-/// left around it without its bump. Measured with five strokes over a forearm made by formula, meshes of 7 to 12 mm, two
-/// speeds and slow jobs: 3.5 to 5.0 with a lump, 0.9 to 2.7 without it.
+/// A place stands out if its bump is at least this share of the trend, and if it is so many times the standard deviation
+/// of the bumps that are left around it once its own is taken away. Measured with five strokes over a forearm made by
+/// formula, meshes of 7 to 12 mm, two speeds and slow jobs: 3.5 to 5.0 with a lump, 0.9 to 2.7 without it.
 const STANDS_OUT: f64 = 0.025;
 const STANDS_OUT_BY: f64 = 3.1;
 /// Of how many places around it at most this is taken.

@@ -12,7 +12,7 @@ use crate::strokes::{STEP_TIME, Skin, strokes};
 const JOB_STEPS: u32 = 40;
 /// Speed of the strokes, m/s.
 const SPEED: f64 = 0.06;
-/// Largest share of the steps that hold the last good state; 0.011 was measured.
+/// Largest share of the steps that hold the last good state; 0.015 was measured.
 const MOST_HELD: f64 = 0.02;
 
 #[test]

@@ -203,7 +203,7 @@ impl Tissue for LiveTissue {
             StepOutcome::Held if self.local_from.is_some() => StepStatus::Behind,
             StepOutcome::Held | StepOutcome::Failed => StepStatus::Failed,
         };
-        // The local model before is still near what is felt, and that of a lesser depth is not.
+        // The tools are not back at their depth yet: a local model of this step would give too small a force.
         let keeps_local = report.is_catching_up && self.local_from.is_some();
         if report.outcome == StepOutcome::Held || (keeps_local && status.has_patch()) {
             self.local_from = self.local_from.map(|_| input.sampled_at);

@@ -221,7 +221,7 @@ impl Live {
         let is_leaving = centres.farthest_from(&self.plan.centres) > self.params.leave * radius;
         let reach = self.reach();
         // Wider than it needs to be: made for coarser triangles, or for a deeper press.
-        let needed = self.params.zone_radius.max(ZONE_GROWTH * reach);
+        let needed = self.radius_for(reach);
         let is_wide = radius.is_finite() && radius > WIDE * needed;
         (is_leaving || reaches_ring || is_wide).then(|| {
             // A hand that hurries to another place after a slow job would make the whole body a zone, and each job
@@ -236,10 +236,15 @@ impl Live {
     /// Centres at rest and radii of a zone as far ahead of the tools as it still holds what they press now, m. None of
     /// that is of the ring.
     pub(super) fn present_zone(&self) -> (Centres, [f64; 2]) {
-        let reach = INNER * self.reach();
-        let radius = self.params.zone_radius.max(ZONE_GROWTH * self.reach());
-        let way = self.next_way(radius - reach);
-        (self.centres_after(way), [reach + way.norm(), radius])
+        let reach = self.reach();
+        let (inner, radius) = (INNER * reach, self.radius_for(reach));
+        let way = self.next_way(radius - inner);
+        (self.centres_after(way), [inner + way.norm(), radius])
+    }
+
+    /// Radius of a zone for tools whose contact reaches so far, m.
+    fn radius_for(&self, reach: f64) -> f64 {
+        self.params.zone_radius.max(ZONE_GROWTH * reach)
     }
 
     /// Whether a vertex lies on the ring: the zone's outermost columns, which answer nearly linearly.

@@ -51,8 +51,8 @@ pub struct LiveReport {
     /// Whether the compliance of the local model is not the body's, because the stiffness at the end of the step
     /// was not positive definite either, and had to be altered. The forces are right.
     pub is_altered: bool,
-    /// Whether the tools pressed outside the zone until a zone came there, and are still on their way back to where
-    /// they were. The local model before that is nearer to what is felt.
+    /// Whether the tools pressed outside the zone until a zone came there, and are still on their way back to the depth
+    /// that they had. Until they have it, the local model of the last step before the zone came has the better force.
     pub is_catching_up: bool,
     /// Stiffness of the springs that held the vertices under the tools during the solve, relative
     /// to the skin's own stiffness. Their forces have been removed from the result.
