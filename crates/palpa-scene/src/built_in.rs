@@ -1,7 +1,7 @@
 //! The built-in scenes: those of the page's gallery, those that commands use if none is named, and
 //! starts for scenes of one's own.
 //!
-//! To add one: put its file into `scenes/`, and a row into [`SCENES`]. A scene of the gallery also
+//! To add one: put its file into `scenes/`, and a row into `SCENES`. A scene of the gallery also
 //! gets a name for each language of the page, in `web/src/i18n`.
 
 use std::path::Path;

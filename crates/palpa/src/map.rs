@@ -163,7 +163,7 @@ impl PalpationMap {
 
     /// Compares at most `most` spots with their surroundings, of those whose surroundings have changed. Returns
     /// whether all are up to date. Cost of a spot: a fit to its neighbours, of which there are up to a thousand where
-    /// strokes are dense; when all are compared, [`MOST_AROUND`] more.
+    /// strokes are dense; when all are compared, a hundred and fifty more.
     pub fn update(&mut self, most: usize) -> bool {
         let n = self.spots.len();
         let mut left = most;
