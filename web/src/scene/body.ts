@@ -1,6 +1,6 @@
 // A body as it is drawn: its nodes at rest and deformed, the normals of its levels, its open rims.
 
-import { Box3, Vector3 } from 'three';
+import { Box3, BufferAttribute, BufferGeometry, Vector3 } from 'three';
 import type { FrameSnapshot, MeshSnapshot } from '../generated/wire';
 import { fillLoop } from './contour';
 
@@ -33,11 +33,14 @@ export class Body {
   readonly stiffness: Float32Array;
   readonly bonePositions: Float32Array;
   readonly boneTriangles: Uint32Array;
+  /** Smooth normals of the bones, three numbers a point. */
+  readonly boneNormals: ArrayLike<number>;
   readonly box = new Box3();
   readonly centre = new Vector3();
   readonly radius: number;
 
-  constructor(mesh: MeshSnapshot) {
+  /** `before` is the body on the mesh before; bones that are the same keep their normals. */
+  constructor(mesh: MeshSnapshot, before: Body | null = null) {
     this.id = mesh.mesh;
     this.nLevels = mesh.n_levels;
     this.rest = mesh.positions;
@@ -48,6 +51,8 @@ export class Body {
     this.stiffness = mesh.stiffness;
     this.bonePositions = mesh.bone_positions;
     this.boneTriangles = mesh.bone_triangles;
+    const isSame = before !== null && areEqual(before.bonePositions, this.bonePositions) && areEqual(before.boneTriangles, this.boneTriangles);
+    this.boneNormals = isSame ? before.boneNormals : smoothNormals(this.bonePositions, this.boneTriangles);
     this.nNodes = mesh.positions.length / 3;
     this.nVertices = this.nNodes / this.nLevels;
     this.nTriangles = mesh.triangles.length / 3;
@@ -119,6 +124,20 @@ export class Body {
       }
     }
   }
+}
+
+function areEqual(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
+}
+
+function smoothNormals(positions: Float32Array, triangles: Uint32Array): ArrayLike<number> {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(positions, 3));
+  geometry.setIndex(new BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
+  return geometry.getAttribute('normal').array;
 }
 
 /** Two triangles for every interval between two levels at every open edge. */

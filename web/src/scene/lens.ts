@@ -92,7 +92,8 @@ export class LensView {
   private readonly out = new Vector3(0, -1, 0);
   private readonly middle = new Vector3();
   private form = '';
-  private tool: BufferGeometry | null = null;
+  /** Corners of the convex parts of the tool, in its own frame, m. */
+  private parts: Vector3[][] = [];
   private reach = 5e-3;
   private half = LEAST_HALF;
   private scale = LEAST_SCALE;
@@ -119,8 +120,7 @@ export class LensView {
     this.scale = LEAST_SCALE;
     this.reach = form === null ? 5e-3 : reachOf(form);
     this.half = Math.min(Math.max(WIDTH_IN_TOOLS * this.reach, LEAST_HALF), MOST_HALF);
-    this.tool?.dispose();
-    this.tool = form === null ? null : toolGeometry(form, 6 * this.half);
+    this.parts = form === null ? [] : partsOf(toolGeometry(form, 6 * this.half));
   }
 
   /** Whether the tool touches, or did so just now. `now` in ms. */
@@ -171,7 +171,6 @@ export class LensView {
   }
 
   dispose(): void {
-    this.tool?.dispose();
     this.canvas.remove();
   }
 
@@ -374,25 +373,18 @@ export class LensView {
     return { at: point.toArray(), bar: point.clone().addScaledVector(out, height * pressure).toArray() };
   }
 
-  /** The tool as it is seen along the plane's normal: its outline in the plane, since all tools are convex. */
+  /** The tool as it is seen along the plane's normal: its parts are convex, so their outlines are those of their
+   * corners. */
   private drawTool(g: CanvasRenderingContext2D, tip: Vector3, orientation: Quaternion): void {
-    if (!this.tool) return;
-    const positions = this.tool.getAttribute('position').array;
-    const index = this.tool.index?.array;
-    const n = index?.length ?? positions.length / 3;
-    const p = new Float32Array(9);
     const corner = new Vector3();
+    const at: [number, number, number] = [0, 0, 0];
     const path = new Path2D();
-    for (let t = 0; t < n; t += 3) {
-      for (let k = 0; k < 3; k++) {
-        corner.fromArray(positions, 3 * (index ? index[t + k] : t + k)).applyQuaternion(orientation).add(tip).toArray(p, 3 * k);
-      }
-      // Only triangles towards the viewer: with the others, the windings would cancel.
-      const [ax, ay, bx, by, cx, cy] = [this.x(p, 0), this.y(p, 0), this.x(p, 3), this.y(p, 3), this.x(p, 6), this.y(p, 6)];
-      if ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay) >= 0) continue;
-      path.moveTo(ax, ay);
-      path.lineTo(bx, by);
-      path.lineTo(cx, cy);
+    for (const part of this.parts) {
+      const outline = hullOf(part.map((c) => {
+        corner.copy(c).applyQuaternion(orientation).add(tip).toArray(at);
+        return new Vector2(this.x(at), this.y(at));
+      }));
+      outline.forEach(({ x, y }, i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
       path.closePath();
     }
     // The outline is what a wider, dark tool shows around the light one.
@@ -465,6 +457,42 @@ export class LensView {
 function placeIn(size: Vector2): LensPicture['place'] {
   const width = Math.round(Math.min(Math.max(SHARE * size.x, LEAST_WIDTH), MOST_WIDTH, size.x - 2 * MARGIN.right, (MOST_HEIGHT * size.y) / ASPECT));
   return { x: Math.round(size.x - MARGIN.right - width), y: MARGIN.top, width, height: Math.round(ASPECT * width) };
+}
+
+/** The corners of each group of a geometry, each place once. */
+function partsOf(geometry: BufferGeometry): Vector3[][] {
+  const { index } = geometry;
+  const positions = geometry.getAttribute('position');
+  const whole = { start: 0, count: index?.count ?? positions.count };
+  const parts = (geometry.groups.length > 0 ? geometry.groups : [whole]).map(({ start, count }) => {
+    const found = new Map<string, Vector3>();
+    for (let i = start; i < start + count; i++) {
+      const corner = new Vector3().fromBufferAttribute(positions, index?.getX(i) ?? i);
+      found.set(corner.toArray().map((x) => Math.round(x * 1e6)).join(), corner);
+    }
+    return [...found.values()];
+  });
+  geometry.dispose();
+  return parts;
+}
+
+/** The corners of the convex hull of points in a plane, in order. */
+function hullOf(points: Vector2[]): Vector2[] {
+  points.sort((a, b) => a.x - b.x || a.y - b.y);
+  /** Of the points in this order, the chain on the right of the way. */
+  const chain = (along: Vector2[]) => {
+    const kept: Vector2[] = [];
+    for (const p of along) {
+      while (kept.length > 1) {
+        const [a, b] = kept.slice(-2);
+        if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > 0) break;
+        kept.pop();
+      }
+      kept.push(p);
+    }
+    return kept.slice(0, -1);
+  };
+  return [...chain(points), ...chain([...points].reverse())];
 }
 
 function apart(p: Float32Array, a: number, b: number): number {

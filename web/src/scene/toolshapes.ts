@@ -153,12 +153,12 @@ function cone({ radius: r, opening_angle, tip_radius: t, edge_radius: e }: FormO
   return withStem(new LatheGeometry(profile, 64).rotateX(Math.PI / 2), r, top, length);
 }
 
-/** A thin stem to hold the tool by; `radius` and `from` are the tool's radius and top, m. */
+/** A thin stem to hold the tool by, as a second group; `radius` and `from` are the tool's radius and top, m. */
 function withStem(geometry: BufferGeometry, radius: number, from: number, length: number): BufferGeometry {
   const r = Math.min(0.35 * radius, 0.035 * length);
   const h = Math.max(length - from, 0.4 * length);
   const stem = new CylinderGeometry(r, r, h, 24).rotateX(Math.PI / 2).translate(0, 0, from + h / 2 - 0.02 * radius);
-  const merged = mergeGeometries([geometry, stem].map((g) => (g.index ? g.toNonIndexed() : g)).map(bare));
+  const merged = mergeGeometries([geometry, stem].map((g) => (g.index ? g.toNonIndexed() : g)).map(bare), true);
   geometry.dispose();
   stem.dispose();
   return merged;

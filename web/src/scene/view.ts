@@ -375,7 +375,7 @@ export class BodyView {
     window.clearTimeout(this.meshTimer);
     const isOther = !this.body || this.isOther(mesh);
     this.surfaces?.dispose();
-    this.body = new Body(mesh);
+    this.body = new Body(mesh, this.body);
     this.surfaces = new Surfaces(this.body, this.shared, this.stage, this.cutaway.planes, this.materials);
     this.stage.scene.add(this.surfaces.group);
     this.stage.setBody(this.body);

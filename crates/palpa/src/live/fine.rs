@@ -16,7 +16,7 @@ use crate::press::mesh::CoarseBody;
 /// The fine part of the mesh is larger than what the tool presses by this margin, m: the tool may go
 /// about half of it until the mesh ahead of it must be ready. Beside the fine part, where there is no contact,
 /// edges grow as in a mesh that does not move.
-const MARGIN: f64 = 15e-3;
+const MARGIN: f64 = 9e-3;
 /// Number of parts of an edge of the grown body, between which there are places: with vertices only, a
 /// tool would be up to half an edge beside the middle of the fine part.
 const PARTS: f64 = 3.0;
