@@ -12,7 +12,7 @@ use crate::{
     fault::FaultHooks,
     findings::Board,
     late::LateTick,
-    mailbox::{Reader, mailbox},
+    mailbox::{Reader, Writer, mailbox},
     record::StepRecord,
     recorder::{LogFile, Recorder, RecorderParams},
     servo_loop::{LoopStats, Now, ServoLoop, TickEntry},
@@ -22,7 +22,7 @@ use crate::{
     tissue_thread::{Background, Pause, PoseSample, TissueStats, TissueThread, run_background},
 };
 use palpa_device::HapticDevice;
-use palpa_servo::{DeviceSpec, MAX_TOOLS, Servo, ServoParams};
+use palpa_servo::{DeviceSpec, MAX_TOOLS, Servo, ServoParams, Vec3};
 use rtrb::{Producer, RingBuffer};
 use std::{
     path::PathBuf,
@@ -54,6 +54,7 @@ pub struct Engine {
     findings: Board,
     tick_view: Reader<TickEntry>,
     step_view: Reader<StepRecord>,
+    aims: Writer<Option<Vec3>>,
     log: Option<PathBuf>,
     /// The threads in the order of their start: recorder, background, tissue, loop. They are
     /// stopped in reverse order, so that a receiver always outlives its senders.
@@ -120,6 +121,7 @@ impl Engine {
         let specs: Vec<DeviceSpec> = devices.iter().map(HapticDevice::spec).collect();
         let (tick_writer, tick_view) = mailbox([(); 3].map(|()| Box::<TickEntry>::default()));
         let (step_writer, step_view) = mailbox([(); 3].map(|()| Box::<StepRecord>::default()));
+        let (aims, aim_reader) = mailbox([(); 3].map(|()| Box::default()));
         let mut engine = Self {
             clock: RealClock::new(params.spin),
             granted: Vec::new(),
@@ -130,6 +132,7 @@ impl Engine {
             findings: Board::default(),
             tick_view,
             step_view,
+            aims,
             log: recorder.path.clone(),
             threads: Vec::new(),
             panicked: Vec::new(),
@@ -147,6 +150,7 @@ impl Engine {
             clock: engine.clock.clone(),
             params: params.tissue,
             poses: pose_reader,
+            aims: aim_reader,
             patches: patch_writer,
             view: step_writer,
             ring: rings.steps,
@@ -174,6 +178,13 @@ impl Engine {
             engine.memory_locked = lock_memory();
         }
         Ok((engine, servo_loop))
+    }
+
+    /// Tells the tissue where the hand of the first tool means to touch it, in the device's frame, m; `None` if that is not
+    /// known. Tissue that follows the tool then gets ready for that place before the tool is there.
+    pub fn set_aim(&mut self, place: Option<Vec3>) {
+        *self.aims.slot() = place;
+        self.aims.publish();
     }
 
     fn start_recorder(

@@ -124,6 +124,10 @@ record! {
         positions: [f64; 3 * palpa_servo::MAX_TOOLS],
         /// Orientations of the tools, quaternions i, j, k, w, one after the other.
         orientations: [f64; 4 * palpa_servo::MAX_TOOLS],
+        /// Whether it was known where the hand of the first tool meant to touch the tissue.
+        is_aimed: bool,
+        /// That place, in the device's frame, m.
+        aim: [f64; 3],
         /// Whether the result of a background job was installed before the step.
         installed: bool,
         /// Whether it became known before the step that a background job had panicked.

@@ -311,7 +311,7 @@ impl LogFile {
 }
 
 /// Version of the layout of logs.
-pub(crate) const FORMAT: u64 = 3;
+pub(crate) const FORMAT: u64 = 4;
 
 fn channel<R: Record>(writer: &mut Writer<BufWriter<File>>, topic: &str) -> McapResult<u16> {
     let schema = writer.add_schema(R::NAME, "ros1msg", R::schema().as_bytes())?;

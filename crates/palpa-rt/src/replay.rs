@@ -320,6 +320,7 @@ impl StepRecord {
                 )
             }),
             n_tools: self.n_tools as usize,
+            aim: self.is_aimed.then(|| self.aim.into()),
         }
     }
 }

@@ -24,6 +24,8 @@ pub struct TissueInput {
     pub poses: [Pose; MAX_TOOLS],
     /// Number of tools.
     pub n_tools: usize,
+    /// Where the hand of the first tool means to touch the tissue, in the device's frame, m; `None` if that is not known.
+    pub aim: Option<Vec3>,
 }
 
 impl TissueInput {

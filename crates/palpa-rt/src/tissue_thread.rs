@@ -100,6 +100,7 @@ pub(crate) struct TissueThread<T: Tissue, C: Clock> {
     pub(crate) clock: C,
     pub(crate) params: TissueParams,
     pub(crate) poses: Reader<PoseSample>,
+    pub(crate) aims: Reader<Option<Vec3>>,
     pub(crate) patches: Writer<ContactPatch>,
     pub(crate) view: Writer<StepRecord>,
     pub(crate) ring: Producer<StepRecord>,
@@ -233,6 +234,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
         let cpu_t0 = thread_cpu();
         let job_end = self.take_in_job(step);
         self.poses.take();
+        self.aims.take();
         let sample = *self.poses.current();
         let input = TissueInput {
             step,
@@ -243,6 +245,7 @@ impl<T: Tissue, C: Clock> TissueThread<T, C> {
             period,
             poses: std::array::from_fn(|k| ahead(sample.poses[k], &sample.velocities[k], period)),
             n_tools: sample.n_tools,
+            aim: *self.aims.current(),
         };
         if self.faults.take_panic() {
             self.speaker
@@ -386,6 +389,8 @@ pub(crate) fn step_record(
         dt: input.dt,
         period: input.period,
         n_tools: input.n_tools as u32,
+        is_aimed: input.aim.is_some(),
+        aim: input.aim.unwrap_or_default().into(),
         status: result.status as u8,
         published: result.is_published(),
         iterations: result.iterations,

@@ -73,6 +73,9 @@ impl Live {
         };
         let pose = self.hand.advance(&ground, dt, now);
         self.running.target.set_pose(&(frame.inverse() * pose));
+        let aim = self.hand.aim().map(Point3::from);
+        let aim = aim.map(|aim| frame.inverse_transform_point(&aim).coords);
+        self.running.engine.set_aim(aim);
     }
 
     /// The place of the skin under the tool.

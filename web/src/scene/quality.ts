@@ -25,7 +25,7 @@ const LONGEST = 150;
 const PAUSE = 0.8;
 /** Pictures that follow each other more slowly, because the engine was late: at most this many times, for at
  * least this time after it was late last, ms. */
-const MOST_YIELD = 8;
+const MOST_YIELD = 2;
 const YIELD_MS = 6000;
 /** While pictures yield, the least pause between two, ms; it grows with them. */
 const YIELD_PAUSE = 30;

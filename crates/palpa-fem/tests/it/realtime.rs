@@ -335,6 +335,87 @@ fn a_fine_mesh_moves_with_the_tool() {
     }
 }
 
+/// The tool flies to a place that it was told of, and comes down before its mesh could be made from where it was.
+#[test]
+fn the_mesh_of_the_place_that_a_tool_flies_to_is_made_meanwhile() {
+    const LATE: u32 = 6;
+    let tool = sphere(0.0);
+    let aim = Vec3::new(25e-3, 0.0, 0.0);
+    // 50 mm in 0.1 s, 1.5 mm over the skin.
+    let flight = (1..=20).map(|k| at(tool, -25e-3 + 2.5e-3 * f64::from(k), 0.0, -1.5e-3));
+    let run = |is_told: bool| {
+        let meshes = Meshes {
+            coarse: block(10, 0.1, None, &levels()),
+            prony: None,
+        };
+        let start = at(tool, -25e-3, 0.0, -1.5e-3);
+        let params = params((14e-3, ExteriorMode::Linear));
+        let mut body = Roaming::new(Arc::new(meshes), &start, params, -aim).unwrap();
+        let down = (1..=10).map(|k| at(tool, 25e-3, 0.0, -1.5e-3 + 0.35e-3 * f64::from(k)));
+        let (mut under, mut far) = (None, 0);
+        for (k, tools) in (0_u32..).zip(flight.clone().chain(down)) {
+            let is_given_up = body.has_given_up_job();
+            if let Some((_, done)) = under.take_if(|(due, _)| *due <= k || is_given_up) {
+                body.install(done);
+            }
+            body.set_aim(is_told.then_some(aim));
+            far = far.max(body.step(&tools, 0.005).n_far);
+            if let Some(job) = body.take_job() {
+                under = Some((k + LATE, job.run()));
+            }
+        }
+        let (middle, _) = body.fine().unwrap();
+        ((middle - aim).norm(), body.n_meshes(), far)
+    };
+    let (off, meshes, far) = run(true);
+    assert!(
+        off < 10e-3 && meshes == [2, 0] && far == 0,
+        "{off} {meshes:?} {far}"
+    );
+    // Told nothing, it presses outside the zone first.
+    let (_, _, far) = run(false);
+    assert!(far > 0);
+}
+
+/// A hand never holds still to the bit. While it stays within a micrometre, a body in equilibrium has nothing to do; a
+/// hand that creeps is followed all the same.
+#[test]
+fn a_tool_that_stays_within_a_micrometre_needs_no_iterations() {
+    let model = model(13, false);
+    let tool = sphere(0.3);
+    let place = |k: u32, by: f64| at(tool, 0.0, 0.0, 2e-3 + by * f64::from(k));
+    let mut live = rested(&model, tool);
+    let still: usize = (0..50)
+        .map(|k| live.step(&place(k % 2, 0.4e-6), 0.002).iterations)
+        .sum();
+    assert_eq!(still, 0);
+    let before = live.tool_force(0).z;
+    let reports: Vec<_> = (0..100)
+        .map(|k| live.step(&place(k, 0.4e-6), 0.002))
+        .collect();
+    let worked = reports
+        .iter()
+        .filter(|report| report.iterations > 0)
+        .count();
+    assert!((20..=50).contains(&worked), "{worked}");
+    // 40 µm more of 2 mm.
+    let change = live.tool_force(0).z / before - 1.0;
+    assert!((0.015..0.05).contains(&change), "{change}");
+}
+
+/// A body in equilibrium with a tool that is 2 mm deep.
+fn rested(model: &Arc<Model>, tool: Tool) -> Live {
+    let params = params((14e-3, ExteriorMode::Linear));
+    let mut live = Live::new(Arc::clone(model), &at(tool, 0.0, 0.0, 0.0), params).unwrap();
+    for k in 0..100 {
+        live.step(&at(tool, 0.0, 0.0, 0.1e-3 * f64::from(k.min(20))), 0.002);
+        if let Some(job) = live.take_job() {
+            live.install(job.run());
+        }
+    }
+    live
+}
+
 /// The tool goes on while a zone is being made for it, in which columns are that were in none.
 #[test]
 fn zones_that_come_late_lose_nothing() {

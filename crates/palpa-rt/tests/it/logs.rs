@@ -236,7 +236,7 @@ fn logs_of_other_layouts_and_partial_logs_are_refused_with_the_reason() {
     rewritten(&bytes, &other, as_is, old);
     let why = refused();
     assert!(
-        why.contains("palpa 0.0.9 wrote it with layout 2 of logs instead of 3"),
+        why.contains("palpa 0.0.9 wrote it with layout 2 of logs instead of 4"),
         "{why}"
     );
     assert!(why.contains("can neither replay nor export it"), "{why}");

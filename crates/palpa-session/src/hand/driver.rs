@@ -46,6 +46,11 @@ const LEAST_STIFFNESS: f64 = 60.0;
 /// Distance between skin and tool on the path around the body, m; the tool's size is added.
 const CLEARANCE: f64 = 12e-3;
 
+/// A goal that stays within this distance, m, for this time, s, is meant. On its way there, a pointer passes other
+/// places.
+const MEANT: f64 = 3e-3;
+const MEANT_TIME: f64 = 0.03;
+
 /// The goal of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Goal {
@@ -86,6 +91,8 @@ pub(crate) struct HandDriver {
     tip: Vec3,
     doing: Doing,
     goal: Option<Goal>,
+    /// A place that the goal has stayed near, m, and for how long, s.
+    meant: (Vec3, f64),
     /// Preferred direction of the tool's x axis.
     along: Vec3,
     /// Size of the tool, m; this much more distance is kept on the path around the body.
@@ -101,6 +108,7 @@ impl HandDriver {
             tip: place.point + place.normal * HOVER,
             doing: Doing::There,
             goal: None,
+            meant: (place.point, 0.0),
             along,
             tool_size,
         }
@@ -112,6 +120,17 @@ impl HandDriver {
             depth: goal.depth.clamp(-HOVER, goal.place.deepest()),
             ..goal
         });
+        if let Some(Goal { place, .. }) = self.goal
+            && (place.point - self.meant.0).norm() > MEANT
+        {
+            self.meant = (place.point, 0.0);
+        }
+    }
+
+    /// The place of the goal, once it has stayed there for a moment.
+    pub(crate) fn aim(&self) -> Option<Vec3> {
+        let place = self.goal?.place.point;
+        (self.meant.1 >= MEANT_TIME).then_some(place)
     }
 
     /// Deepest press at the goal, or at the present place without a goal, m.
@@ -142,6 +161,7 @@ impl HandDriver {
     /// Moves the hand by `dt` seconds. `felt` is the force of the tissue on the tool, N, in the scene's
     /// frame. Returns the commanded pose of the tool in the scene's frame.
     pub(crate) fn advance(&mut self, skin: &Skin, dt: f64, felt: Vec3) -> Pose {
+        self.meant.1 += dt;
         match &mut self.doing {
             Doing::Travel(points) => {
                 let mut way = AIR_SPEED * dt;
@@ -370,6 +390,31 @@ mod tests {
         (0..60).for_each(|_| before = hand.advance(&skin, DT, Vec3::zeros()));
         assert!(hand.is_lifted());
         assert!((before.rotation * Vec3::z() - place.normal).norm() < 1e-9);
+    }
+
+    #[test]
+    fn it_aims_at_a_goal_that_stays_and_at_none_that_passes() {
+        let skin = limb();
+        let mut hand = hand(&skin);
+        assert_eq!(hand.aim(), None);
+        // The pointer runs along the limb, and stops.
+        let goal = |x: f64| Some(Goal::at_depth(at(&skin, x, 0.0), -HOVER));
+        for k in 0..20 {
+            hand.set_goal(goal(0.04 + 4e-3 * f64::from(k)));
+            hand.advance(&skin, DT, Vec3::zeros());
+            assert_eq!(hand.aim(), None, "{k}");
+        }
+        // It jumps to another place: that is known before the hand is there.
+        let last = at(&skin, 0.06, 0.0).point;
+        hand.set_goal(goal(0.06));
+        (0..3).for_each(|_| _ = hand.advance(&skin, DT, Vec3::zeros()));
+        assert_eq!(hand.aim(), Some(last));
+        assert!((hand.tip() - last).norm() > 10e-3);
+        // A pointer that trembles keeps it.
+        hand.set_goal(goal(0.0605));
+        assert!(hand.aim().is_some_and(|aim| (aim - last).norm() < 1e-3));
+        hand.set_goal(None);
+        assert_eq!(hand.aim(), None);
     }
 
     #[test]

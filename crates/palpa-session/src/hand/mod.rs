@@ -153,6 +153,14 @@ impl Hand {
         self.driver.place()
     }
 
+    /// The place of the skin where the hand means to press, if it stays with it; `None` on the path of the scene's motion.
+    pub(crate) fn aim(&self) -> Option<Vec3> {
+        match self.lead {
+            Lead::Moving { .. } => None,
+            _ => self.driver.aim(),
+        }
+    }
+
     /// The place from which the depth of a tip is measured: the hand's own, or the nearest on the
     /// skin while the hand travels or the scene's motion leads it.
     pub(crate) fn place_under(&self, tip: Vec3, skin: &Skin, home: Place) -> Place {

@@ -1,6 +1,7 @@
 //! Real-time finite elements as the engine's tissue.
 
 use super::Watch;
+use nalgebra::Translation3;
 use palpa_fem::PosedTool;
 use palpa_fem::realtime::{
     Live, LiveReport, LocalContact, LocalModel, RoamDone, RoamJob, Roaming, StepOutcome,
@@ -10,6 +11,12 @@ use palpa_rt::{StepStatus, Tissue, TissueInput, TissueStep};
 use palpa_servo::{
     Candidate, ContactPatch, MAX_CONTACTS, MAX_TOOLS, Mat3, Pose, ToolContact, Vec3,
 };
+
+/// Longest way along the skin that a dent goes with its tool ahead of the body, m; on a limb the skin has turned aside by
+/// less than a millimetre there.
+const MOST_CARRIED: f64 = 8e-3;
+/// Forces below this have no direction, N.
+const LEAST_FORCE: f64 = 1e-3;
 
 /// The finite elements of [`Roaming`], with tools whose poses arrive in a device's frame.
 #[derive(Debug)]
@@ -130,16 +137,37 @@ impl LiveTissue {
         })
     }
 
+    /// By how much a tool has left the pose of its local model behind, along the skin, m. The body holds a tool at the
+    /// edge of its zone until the next one is ready; until then the dent is taken to go with it, as it would in even
+    /// tissue.
+    fn carried(&self, tool: usize) -> Vec3 {
+        let (Some(local), Some(posed)) = (self.local.tools.get(tool), self.posed.get(tool)) else {
+            return Vec3::zeros();
+        };
+        let mut push = Vec3::zeros();
+        for contact in self.local.contacts.iter().filter(|c| c.tool == tool) {
+            let normal = local.pose.rotation * contact.normal;
+            push += normal * normal.dot(&contact.force).max(0.0);
+        }
+        let Some(inward) = push.try_normalize(LEAST_FORCE) else {
+            return Vec3::zeros();
+        };
+        let way = posed.pose.translation.vector - local.pose.translation.vector;
+        let along = way - inward * inward.dot(&way);
+        along * (MOST_CARRIED / along.norm()).min(1.0)
+    }
+
     /// Writes the local model into the patch, in the device's frame.
     fn fill(&self, patch: &mut ContactPatch) {
+        let carried: [Vec3; MAX_TOOLS] = std::array::from_fn(|tool| self.carried(tool));
         let frame = &self.scene_from_device;
         let turn: Mat3 = *frame.rotation.to_rotation_matrix().matrix();
         let back = turn.transpose();
         patch.n_tools = self.local.tools.len().min(MAX_TOOLS);
-        for (out, tool) in patch.tools.iter_mut().zip(&self.local.tools) {
+        for ((out, tool), carried) in patch.tools.iter_mut().zip(&self.local.tools).zip(carried) {
             *out = ToolContact {
                 // The pose that the step reached, which may lag behind the device.
-                pose: frame.inverse() * tool.pose,
+                pose: frame.inverse() * Translation3::from(carried) * tool.pose,
                 friction: tool.friction,
                 is_bonded: false,
                 force: back * tool.force,
@@ -150,12 +178,13 @@ impl LiveTissue {
         let mesh = ((self.local_mesh % 16) as u32) << 27;
         let n = self.local.contacts.len().min(MAX_CONTACTS);
         patch.n_contacts = n;
+        let carried_by = |tool: usize| carried.get(tool).copied().unwrap_or_default();
         for (out, contact) in patch.contacts.iter_mut().zip(&self.local.contacts) {
             *out = Candidate {
                 vertex: contact.vertex ^ mesh,
                 tool: u32::try_from(contact.tool).unwrap_or(u32::MAX),
                 position: frame
-                    .inverse_transform_point(&contact.position.into())
+                    .inverse_transform_point(&(contact.position + carried_by(contact.tool)).into())
                     .coords,
                 force: back * contact.force,
                 surface: contact.surface,
@@ -191,6 +220,11 @@ impl Tissue for LiveTissue {
 
     fn step(&mut self, input: &TissueInput, patch: &mut ContactPatch) -> TissueStep {
         self.pose_tools(input);
+        let frame = &self.scene_from_device;
+        let aim = input
+            .aim
+            .map(|aim| frame.transform_point(&aim.into()).coords);
+        self.body.set_aim(aim);
         (self.body.live_mut()).set_time_of_poses(input.time_of_poses());
         let report = self.body.step(&self.posed, input.dt);
         let is_finished = report.residual <= self.tolerance && report.is_whole();

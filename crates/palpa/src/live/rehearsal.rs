@@ -99,6 +99,7 @@ pub fn rehearse<T: Tissue>(
                 period: patch_period,
                 poses: [ahead(pose, &velocity, patch_period); MAX_TOOLS],
                 n_tools: 1,
+                aim: None,
             };
             let done = tissue.step(&input, &mut working);
             stamp(&mut working, &input, &done);

@@ -7,7 +7,7 @@ use palpa::Note;
 use palpa::live::{LiveScene, SpringScene};
 use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
-use palpa_rt::{Tissue, TissueInput, empty_patch};
+use palpa_rt::{StepStatus, Tissue, TissueInput, empty_patch};
 use palpa_servo::{MAX_TOOLS, Pose};
 use palpa_testkit::{Layer, Scene as SceneText, Value};
 
@@ -126,6 +126,7 @@ fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
             period: 5e-3,
             poses: [Pose::translation(0.0, 0.0, z); MAX_TOOLS],
             n_tools: 1,
+            aim: None,
         };
         tissue.step(&input, &mut patch);
         if let Some(job) = tissue.take_job() {
@@ -145,4 +146,69 @@ fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
     println!("{force} N, {expected} N in a scripted press");
     assert!(expected > 0.05, "{expected} N");
     assert!((force / expected - 1.0).abs() < 0.01, "{force} {expected}");
+}
+
+/// The background never gets a core, so the body holds the tool at the edge of its zone. What the hand feels must go
+/// with the hand, and not stay behind.
+#[test]
+fn the_dent_goes_with_a_tool_that_waits_for_its_zone() {
+    let scene = SceneText::soft_over_stiff([120.0, 60.0, 24.0], 8.0, 8.0, 10.0)
+        .sphere(8.0)
+        .press(3.0)
+        .near_tool(4.0)
+        .motion("press", 3.0);
+    let scene = parse(&scene);
+    let live = LiveScene::build(&scene).unwrap();
+    let mut tissue = live.tissue().unwrap();
+    let mut patch = empty_patch();
+    let down = -(scene.motion.above + 3e-3);
+    let mut step = |number: u64, x: f64, z: f64| {
+        let input = TissueInput {
+            step: number,
+            tick: number,
+            sampled_at: 0.0,
+            now: 0.0,
+            dt: 5e-3,
+            period: 5e-3,
+            poses: [Pose::translation(x, 0.0, z); MAX_TOOLS],
+            n_tools: 1,
+            aim: None,
+        };
+        let status = tissue.step(&input, &mut patch).status;
+        let pressed = patch.contacts[..patch.n_contacts].iter();
+        let (force, middle) = pressed.fold((0.0, 0.0), |(force, middle), contact| {
+            let size = contact.force.norm();
+            (force + size, middle + size * contact.position.x)
+        });
+        (
+            status,
+            force,
+            middle / force,
+            patch.tools[0].pose.translation.x,
+        )
+    };
+    for k in 0..50 {
+        step(k, 0.0, down * (k as f64 / 40.0).min(1.0));
+    }
+    let (_, pressed, _, _) = step(50, 0.0, down);
+    let mut held_at = None;
+    for k in 1..=58_u32 {
+        let x = 0.25e-3 * f64::from(k);
+        let (status, force, middle, tool) = step(50 + u64::from(k), x, down);
+        // The force is that of the body where it holds the tool.
+        let change = force / pressed - 1.0;
+        assert!(change.abs() < 0.12, "{x}: {force} {pressed} {status:?}");
+        if held_at.is_none() && status == StepStatus::Behind {
+            held_at = Some(x);
+        }
+        let far = held_at.map_or(0.0, |held_at| x - held_at);
+        if far < 6e-3 {
+            assert!((middle - x).abs() < 1.2e-3, "{x}: {middle}");
+            assert!((tool - x).abs() < 0.1e-3, "{x}: {tool}");
+        } else if far > 9e-3 {
+            // No farther than 8 mm.
+            assert!(x - tool > 0.8e-3, "{x}: {tool}");
+        }
+    }
+    assert!(held_at.is_some_and(|x| x < 0.015), "{held_at:?}");
 }

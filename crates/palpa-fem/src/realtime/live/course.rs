@@ -81,7 +81,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    fn go_on(&mut self, targets: &[PosedTool], dt: f64) {
+    pub(super) fn go_on(&mut self, targets: &[PosedTool], dt: f64) {
         let n = targets.len() as f64;
         let sum: Vec3 = targets.iter().map(|t| t.pose.translation.vector).sum();
         let place = (n > 0.0).then(|| sum / n);

@@ -299,7 +299,6 @@ impl Live {
     /// Whether a step with this report left nothing to do while the tools that press stay where they are.
     pub(super) fn is_settled_now(&self, report: &LiveReport) -> bool {
         report.n_candidates > 0
-            && report.n_far == 0
             && report.outcome == StepOutcome::Arrived
             && report.residual.max(report.outside) <= STILL_SHARE * self.params.tolerance
             && !self.model.has_memory

@@ -129,12 +129,8 @@ impl Live {
     /// needs each factor soon, to come near equilibrium. Cost: a copy of the zone's displacements
     /// and viscous memory; of the whole body's displacements if the exterior is followed.
     pub(super) fn ask(&mut self, dt: f64) {
-        if let Job::Out { is_zone: false } = self.jobs.job
-            && self.params.exterior == ExteriorMode::Linear
-            && !self.has_given_up_job()
-            && self.next_zone().is_some()
-        {
-            self.jobs.is_given_up.store(true, Ordering::Relaxed);
+        if self.has_factor_out() && self.next_zone().is_some() {
+            self.give_up_factor();
         }
         if !matches!(self.jobs.job, Job::Idle(_)) || self.plan.exterior.is_empty() {
             return;
@@ -183,6 +179,18 @@ impl Live {
             }
         }
         self.jobs.job = Job::Waiting(job);
+    }
+
+    /// Whether a thread works on a new factor of the exterior that may be given up.
+    pub(super) fn has_factor_out(&self) -> bool {
+        matches!(self.jobs.job, Job::Out { is_zone: false })
+            && self.params.exterior == ExteriorMode::Linear
+            && !self.has_given_up_job()
+    }
+
+    /// Gives up the factor that a thread works on.
+    pub(super) fn give_up_factor(&mut self) {
+        self.jobs.is_given_up.store(true, Ordering::Relaxed);
     }
 
     /// Copies the state that a job needs into its room.

@@ -36,6 +36,8 @@ const LEAD: f64 = 0.35;
 /// Speed of tools in the air above which no job is worth while: where they come down is not known yet, and a job would
 /// only keep the one waiting that is needed there. m/s
 const FAST: f64 = 0.05;
+/// Speed along the skin above which tools that press stroke it, m/s.
+const STROKE: f64 = 3e-3;
 /// Speed of the tools below which they head nowhere, m/s.
 const SLOWEST: f64 = 1e-3;
 
@@ -66,6 +68,8 @@ pub struct Roaming {
     bodies: Option<Arc<dyn FineBodies>>,
     params: LiveParams,
     live: Box<Live>,
+    /// The place (at rest, m) over which the first tool is, or is on its way in the air, if it is known.
+    aim: Option<Vec3>,
     /// Centre of the fine part at rest, m.
     place: Vec3,
     /// The mesh to be used next, with its place at rest, m.
@@ -115,6 +119,10 @@ struct Move {
     old: Arc<Model>,
     new: Arc<Model>,
     come: Come,
+    /// Whether tools press outside the zone of the old mesh.
+    was_beyond: bool,
+    /// Whether tools go along the skin that they press.
+    is_stroke: bool,
     /// Displacements of the old mesh at rest, m.
     rest: Arc<[Vec3]>,
     tools: Vec<PosedTool>,
@@ -133,6 +141,8 @@ struct Moved {
     live: Box<Live>,
     carry: Carry,
     then: Come,
+    was_beyond: bool,
+    has_own: bool,
     lag: f64,
 }
 
@@ -165,13 +175,21 @@ impl Move {
             let come = come.nearer_to(&rest, share);
             self.settled(come, Arc::clone(&rest))
         })?;
+        let has_own = self.come.is_at_rest() || self.needs_own();
         Some(Box::new(Moved {
             place: self.place,
             live,
             carry,
             then: self.come,
+            was_beyond: self.was_beyond,
+            has_own,
             lag: self.lag,
         }))
+    }
+
+    /// Whether the exterior gets its own stiffness before the new mesh takes over.
+    fn needs_own(&self) -> bool {
+        !self.come.is_at_rest() && !self.is_stroke
     }
 
     /// The body on the new mesh in equilibrium with the tools, found from a state near it.
@@ -187,9 +205,9 @@ impl Move {
         live.exterior.set_lag(self.lag);
         // The whole body must be in balance, so each step is followed by another linearisation of the exterior. Its
         // unbalanced forces, N; infinite before the first. At last it gets its own stiffness, without which forces were up
-        // to 16 % too large as soon as the tools went on.
+        // to 16 % too large as soon as the tools went deeper. A stroke cannot wait for that: its next zone brings it.
         let mut outside = f64::INFINITY;
-        let mut is_own = self.come.is_at_rest();
+        let mut is_own = !self.needs_own();
         for round in 1..=MOST_SETTLING {
             let report = live.step(&self.tools, 0.0);
             live.take_back_job();
@@ -270,7 +288,10 @@ impl Moved {
     /// Continues from the present state of the old mesh.
     fn take_over(self, old: &mut Live) -> Box<Live> {
         old.take_back_job();
-        old.ease_beyond();
+        if !self.was_beyond {
+            // Else the new mesh is in equilibrium with tools that pressed there already.
+            old.ease_beyond();
+        }
         old.settle();
         let mut live = self.live;
         let model = Arc::clone(&live.model);
@@ -311,7 +332,11 @@ impl Moved {
         live.jobs.latency = old.jobs.latency;
         live.recovery.pace = old.recovery.pace;
         live.forget_forces();
-        live.jobs.is_factored_at(old.depth());
+        if self.has_own {
+            live.jobs.is_factored_at(old.depth());
+        } else {
+            live.jobs.ask_for_factor();
+        }
         live.add_change(&self.carry, &self.then.state.displacements, old);
         live
     }
@@ -383,6 +408,7 @@ impl Roaming {
             params: live.params,
             place: Vec3::zeros(),
             live: Box::new(live),
+            aim: None,
             next: None,
             is_job_out: false,
             was_zone: false,
@@ -439,6 +465,7 @@ impl Roaming {
     /// outcome is "behind".
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
         let mut report = self.live.step(tools, dt);
+        self.forget_places();
         let is_beyond = report.n_far > 0 || self.is_beyond();
         if report.outcome == StepOutcome::Arrived && is_beyond {
             report.outcome = StepOutcome::Behind;
@@ -460,20 +487,62 @@ impl Roaming {
         (pressed.middle - self.place).norm() + reach > bodies.radius()
     }
 
+    /// Tells where (at rest, m) the first tool will touch the skin, while it is in the air; `None` if that is not known.
+    /// The mesh and the zone for that place are made while the tool is on its way.
+    pub fn set_aim(&mut self, aim: Option<Vec3>) {
+        self.aim = aim;
+    }
+
+    fn is_in_air(&self) -> bool {
+        self.live.problem.pressing().next().is_none()
+    }
+
+    /// Whether the tools fly to another place.
+    fn is_on_way(&self) -> bool {
+        let is_fast = || self.live.course.pace.velocity().norm() > FAST;
+        self.bodies.is_some() && self.is_in_air() && is_fast()
+    }
+
+    /// Drops what is no longer wanted while the tools are in the air.
+    fn forget_places(&mut self) {
+        if self.bodies.is_none() || !self.is_in_air() {
+            return;
+        }
+        if self.is_on_way() {
+            // A zone would be for a place on the way.
+            self.live.take_back_job();
+        }
+        if let Some((place, _)) = &self.next
+            && !self.is_useful(*place)
+        {
+            self.next = None;
+        }
+        if self.aim.is_some() && self.live.has_factor_out() && self.next_place().is_some() {
+            self.live.give_up_factor();
+        }
+    }
+
     /// A job for the background thread, if one is due. Give its result to [`Self::install`]. Zones and meshes take
-    /// turns under contact; a finished mesh is taken up first. In the air a mesh comes first: it brings a zone.
+    /// turns under contact; a finished mesh is taken up first. In the air, and where tools press outside the zone, a mesh
+    /// comes first: it brings a zone.
+    ///
+    /// A call that returns no job changes nothing: a replay makes only those that returned one.
     pub fn take_job(&mut self) -> Option<RoamJob> {
         if self.is_job_out {
             return None;
         }
-        let is_in_air = self.live.problem.pressing().next().is_none();
-        if is_in_air && self.bodies.is_some() && self.live.course.pace.velocity().norm() > FAST {
-            return None;
+        let is_in_air = self.is_in_air();
+        let is_on_way = self.is_on_way();
+        if is_on_way {
+            self.aim?;
         }
-        let is_mesh_first = self.next.is_some() || self.was_zone || is_in_air;
+        let is_mesh_first =
+            self.next.is_some() || self.was_zone || is_in_air || self.live.presses_beyond();
         let zone = |live: &mut Live| live.take_job().map(Kind::Zone);
-        // Without contact this check searches the skin, so it is made once a step.
-        let kind = if is_mesh_first {
+        // Without contact and aim this check searches the skin, so it is made once a step.
+        let kind = if is_on_way {
+            self.ask()
+        } else if is_mesh_first {
             self.ask().or_else(|| zone(&mut self.live))
         } else {
             zone(&mut self.live).or_else(|| self.ask())
@@ -485,10 +554,6 @@ impl Roaming {
     }
 
     fn ask(&mut self) -> Option<Kind> {
-        if self.live.presses_beyond() {
-            // The zone comes first: the body there is far from equilibrium.
-            return None;
-        }
         let bodies = Arc::clone(self.bodies.as_ref()?);
         if let Some((place, new)) = self.next.take() {
             self.live.take_back_job();
@@ -497,14 +562,31 @@ impl Roaming {
                 old: Arc::clone(&self.live.model),
                 new,
                 come: Come::of(&mut self.live),
+                was_beyond: self.live.presses_beyond(),
+                is_stroke: self.is_stroke(),
                 rest: Arc::clone(&self.live.rest),
                 tools: self.live.course.tools.clone(),
                 params: self.params,
-                zone: self.live.present_zone(),
+                zone: self.zone_on_new_mesh(),
                 lag: self.live.exterior.lag(),
                 n_before: self.live.jobs.n_zones.max(self.live.jobs.n_asked),
             })));
         }
+        (self.next_place()).map(|place| Kind::Mesh(bodies, place))
+    }
+
+    /// Whether a mesh that was made for a place still does: the tools may have gone elsewhere meanwhile.
+    fn is_useful(&self, place: Vec3) -> bool {
+        let radius = self
+            .bodies
+            .as_ref()
+            .map_or(f64::INFINITY, |bodies| bodies.radius());
+        (place - self.heading(radius).0).norm() < LEAVE * radius
+    }
+
+    /// The place of the mesh that is due, m, if one is.
+    fn next_place(&self) -> Option<Vec3> {
+        let bodies = self.bodies.as_ref()?;
         let (middle, ahead) = self.heading(bodies.radius());
         if (middle - self.place).norm() < LEAVE * bodies.radius() {
             return None;
@@ -512,18 +594,40 @@ impl Roaming {
         let place = bodies.place(middle + ahead);
         let is_nearer = (place - middle).norm() < (self.place - middle).norm();
         let is_new = place != self.place && self.refused != Some(place);
-        (is_nearer && is_new).then(|| Kind::Mesh(bodies, place))
+        (is_nearer && is_new).then_some(place)
+    }
+
+    /// The first zone on a new mesh: that of what is pressed now, or will be.
+    fn zone_on_new_mesh(&self) -> (Centres, [f64; 2]) {
+        let (centres, radii) = self.live.present_zone();
+        let Some(aim) = self.aim.filter(|_| self.is_in_air()) else {
+            return (centres, radii);
+        };
+        let n = self.live.course.tools.len();
+        let centres = Centres::new(n, |tool| if tool == 0 { aim } else { centres.of(tool) });
+        (centres, radii)
+    }
+
+    fn velocity_along_skin(&self, Pressed { along, .. }: &Pressed) -> Vec3 {
+        let velocity = self.live.course.pace.velocity();
+        velocity - along * along.dot(&velocity)
+    }
+
+    fn is_stroke(&self) -> bool {
+        let pressed = self.live.pressed();
+        pressed.is_some_and(|pressed| self.velocity_along_skin(&pressed).norm() > STROKE)
     }
 
     /// The place where the skin is pressed, or would be, and the centre of the next fine part ahead
     /// of it; at rest, m.
     fn heading(&self, radius: f64) -> (Vec3, Vec3) {
         let live = &self.live;
-        if let Some(Pressed { middle, along }) = live.pressed() {
-            let velocity = live.course.pace.velocity();
-            let aside = velocity - along * along.dot(&velocity);
-            let ahead = aside.try_normalize(SLOWEST).unwrap_or_default();
-            return (middle, ahead * (LEAD * radius));
+        if let Some(pressed) = live.pressed() {
+            let ahead = self.velocity_along_skin(&pressed).try_normalize(SLOWEST);
+            return (pressed.middle, ahead.unwrap_or_default() * (LEAD * radius));
+        }
+        if let Some(aim) = self.aim {
+            return (aim, Vec3::zeros());
         }
         let displacements = &live.state.displacements;
         let (_, point) = nearest_point(&live.model, displacements, &live.course.tools, None);

@@ -15,6 +15,12 @@ const LOST: f64 = 0.6;
 /// force was up to 2.3 % off with less, and 5 % with a third.
 const MOST_AT_RING: f64 = 0.25;
 
+/// Tools that stay within this distance of where they were, m, have not moved; the force of a fingertip changes by less
+/// than a millinewton there. A hand that holds still stays within it, and to the bit it never stands still.
+const SAME_PLACE: f64 = 1e-6;
+/// The same for their turns: sine of the angle, for tools of some centimetres.
+const SAME_TURN: f64 = 3e-5;
+
 /// The verdict on a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
@@ -26,15 +32,24 @@ enum Verdict {
     Lost,
 }
 
+/// Whether a tool has not moved, for the force on it.
+fn is_same_place(at: &PosedTool, now: &PosedTool) -> bool {
+    let way = now.pose.translation.vector - at.pose.translation.vector;
+    let turn = at.pose.rotation.rotation_to(&now.pose.rotation);
+    at.tool == now.tool && way.norm() <= SAME_PLACE && 2.0 * turn.imag().norm() <= SAME_TURN
+}
+
 impl Live {
     /// Follows the tools to their new poses. Their number must be that of [`Live::new`]. `dt` is
     /// the time since the last step, s.
     pub fn step(&mut self, tools: &[PosedTool], dt: f64) -> LiveReport {
-        let mut report = self.begin_step(tools, dt);
         if let Some(settled) = self.settled_under(tools) {
+            self.course.pace.go_on(tools, dt);
+            self.jobs.grow_older(dt);
             self.ask(dt);
             return settled;
         }
+        let mut report = self.begin_step(tools, dt);
         self.iterations(dt, &mut report);
         self.refine(dt, &mut report);
         let verdict = self.judge(&mut report);
@@ -68,11 +83,14 @@ impl Live {
         report
     }
 
-    /// The report of a step in which nothing happens: the tools press as in the last one, which left
-    /// the body in equilibrium.
+    /// The report of a step in which nothing happens: the tools press where the body was left in equilibrium with
+    /// them, to within [`SAME_PLACE`].
     fn settled_under(&self, tools: &[PosedTool]) -> Option<LiveReport> {
-        let has_stayed = self.problem.tools_before == tools;
-        let settled = self.settled.filter(|_| has_stayed)?;
+        let settled = self.settled?;
+        let mut pairs = self.course.tools.iter().zip(tools);
+        if !pairs.all(|(at, now)| is_same_place(at, now)) {
+            return None;
+        }
         Some(LiveReport {
             iterations: 0,
             n_factors: 0,

@@ -268,6 +268,7 @@ impl Loop {
                 self.period,
             ); MAX_TOOLS],
             n_tools: 1,
+            aim: None,
         };
         let clock = thread_cpu();
         if let Some(Under { done, .. }) = self.job.take_if(|job| job.due <= start) {
