@@ -1,6 +1,6 @@
 // The bar at the top: scene, connection, control, theme, language, messages, help.
 
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 import { language, named, t, type Language } from '../i18n';
 import { askAloud, figures, hello, isController, state, status } from '../store';
 import { Button, Select } from './controls';
@@ -83,17 +83,24 @@ function ScenePicker() {
   );
 }
 
+/** The rate to be shown, kHz: the one before, as long as the new one (Hz) is near it. At rest nothing flickers. */
+function steady(before: number, rate: number): number {
+  return Math.abs(rate / 1e3 - before) < 0.08 ? before : Math.round(rate / 50) / 20;
+}
+
 function ConnectionState() {
   const isOpen = status.value === 'open';
   const phase = state.value?.phase;
   const kind = !isOpen ? 'bad' : phase === 'stopped' ? 'bad' : phase === 'building' ? 'busy' : 'good';
   const rate = figures.value;
+  const shown = useRef(0);
+  shown.current = steady(shown.current, rate?.tick_rate ?? 0);
   return (
     <span class={`state ${kind}`} data-testid="connection-status" data-status={status.value} data-phase={phase} data-revision={state.value?.revision} role="status">
       <span class="dot" aria-hidden="true" />
       {isOpen ? (phase === undefined ? t('connection.open') : t(`phase.${phase}`)) : t(`connection.${status.value}`)}
       {isOpen && phase === 'running' && rate !== null && (
-        <span class="rate" aria-hidden="true">{formatNumber(Math.round(rate.tick_rate / 50) / 20, 2)} kHz</span>
+        <span class="rate" aria-hidden="true">{formatNumber(shown.current, 2)} kHz</span>
       )}
     </span>
   );

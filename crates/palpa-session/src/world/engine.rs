@@ -5,6 +5,7 @@ use palpa::live::{Look, Watch, open_device, servo_params};
 use palpa_device::LiveTarget;
 use palpa_mesh::Vec3;
 use palpa_rt::{Engine, EngineParams, Priority, Reader, RecorderParams, TissueParams, Wish};
+use palpa_servo::ServoParams;
 
 use super::{Kind, World};
 use crate::hand::{HandDriver, Place};
@@ -15,6 +16,9 @@ const LOOK_PERIOD: f64 = 1.0 / 60.0;
 const STEP_PERIOD: f64 = 2e-3;
 /// The same while the body is at rest, s: a hand that comes down is 0.4 mm deeper by then.
 const REST_PERIOD: f64 = 10e-3;
+/// Age at which a patch is stale, s: a browser that draws without a graphics card takes both of two cores for so long at
+/// times. Only a simulated hand may be served for so long by the same local model.
+const STALE_AFTER: f64 = 0.25;
 /// Requested priority of the threads that compute the force. A browser without a graphics card
 /// takes every core it gets; the force has priority if the system grants it.
 pub(crate) const BEFORE_THE_BROWSER: Wish = Wish {
@@ -52,8 +56,11 @@ impl World {
         let target = LiveTarget::new(in_device.coords);
         let device = open_device(&self.scene.device, target.clone())?;
         let params = EngineParams {
-            servo: servo_params(&*device),
             // All devices of a session are simulated yet.
+            servo: ServoParams {
+                stale_after: STALE_AFTER,
+                ..servo_params(&*device)
+            },
             time_waits: true,
             tissue: TissueParams {
                 min_period: STEP_PERIOD,
