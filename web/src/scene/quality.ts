@@ -22,13 +22,13 @@ const GIVEN_UP = 2000;
 /** A picture that took longer, ms, was held up by something else. */
 const LONGEST = 150;
 /** In software WebGL, the pause after a picture, in times that it took. */
-const PAUSE = 0.8;
+const PAUSE = 0.5;
 /** Pictures that follow each other more slowly, because the engine was late: at most this many times, for at
  * least this time after it was late last, ms. */
-const MOST_YIELD = 2;
+const MOST_YIELD = 1.5;
 const YIELD_MS = 6000;
 /** While pictures yield, the least pause between two, ms; it grows with them. */
-const YIELD_PAUSE = 30;
+const YIELD_PAUSE = 20;
 /** Between two answers to an engine that is late, ms. */
 const YIELD_WAIT = 400;
 
