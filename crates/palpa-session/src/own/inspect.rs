@@ -111,22 +111,47 @@ fn dimensions_of(report: &SurfaceReport, top: Option<[f64; 3]>) -> Dimensions {
     }
 }
 
-/// The highest place over the middle of a surface with these bounds; if it stands upright, the foremost before it.
-/// `None` if nothing is there.
+/// The highest place over the middle of a surface with these bounds; if it stands upright, or was cut off there, the
+/// foremost before it, or else the one at its side. `None` if nothing is there.
 fn top_of(surface: &Surface, [lower, upper]: [Vec3; 2]) -> Option<Vec3> {
     /// From the middle at most this share of the width.
     const NEAR: f64 = 0.2;
     let size = upper - lower;
-    let (up, sign) = if size.z > size.x.max(size.y) {
-        (1, -1.0)
-    } else {
-        (2, 1.0)
-    };
+    let is_upright = size.z > size.x.max(size.y);
+    let ways = [(2, 1.0), (1, -1.0), (0, 1.0)];
+    let mut ways = ways.into_iter().skip(usize::from(is_upright));
+    let is_round = |&(up, sign): &(usize, f64)| !is_cut_off(surface, [lower, upper], up, sign);
+    // A block is flat everywhere.
+    let (up, sign) = ways.clone().find(is_round).or_else(|| ways.next())?;
     let middle = (lower + upper) * 0.5;
     let is_near = |p: &&Vec3| (0..3).all(|c| c == up || (p[c] - middle[c]).abs() <= NEAR * size[c]);
     (surface.points.iter().filter(is_near))
         .max_by(|p, q| (sign * p[up]).total_cmp(&(sign * q[up])))
         .copied()
+}
+
+/// Whether a surface with these bounds ends in a plane across an axis, as a limb that was cut off.
+fn is_cut_off(surface: &Surface, [lower, upper]: [Vec3; 2], axis: usize, sign: f64) -> bool {
+    /// Distance from the bound that counts as in the plane, as a share of the extent, and the least share of the
+    /// bounds' area that lies in it.
+    const THIN: f64 = 1e-3;
+    const LEAST: f64 = 0.1;
+    let size = upper - lower;
+    let end = if sign > 0.0 { upper } else { lower }[axis];
+    let of = |t: &[u32; 3]| t.map(|v| surface.points.get(v as usize).copied());
+    let triangles = surface.triangles.iter().filter_map(|t| match of(t) {
+        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+        _ => None,
+    });
+    let is_in_plane = |corners: &[Vec3; 3]| {
+        let off = corners.map(|p| (p[axis] - end).abs());
+        off.iter().all(|off| *off <= THIN * size[axis])
+    };
+    let areas = triangles
+        .filter(is_in_plane)
+        .map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm());
+    let across = size[(axis + 1) % 3] * size[(axis + 2) % 3];
+    areas.sum::<f64>() > LEAST * across
 }
 
 /// The surface for a picture, with its middle at the origin. Triangles that cannot be drawn are left out.
@@ -166,4 +191,55 @@ pub(super) fn is_surface(path: &Path) -> bool {
         let ending = ending.to_string_lossy().to_ascii_lowercase();
         super::SURFACES.contains(&ending.as_str())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tube of eight sides along z with this length and radius, m, closed by two planes.
+    fn tube(length: f64, radius: f64) -> Surface {
+        let corner = |k: u32, z: f64| {
+            let angle = std::f64::consts::FRAC_PI_4 * f64::from(k);
+            Vec3::new(radius * angle.cos(), radius * angle.sin(), z)
+        };
+        // On the side there is a ring in the middle, too.
+        let rings = [0.0, 0.5 * length, length];
+        let mut points: Vec<Vec3> = (rings.iter())
+            .flat_map(|&z| (0..8).map(move |k| corner(k, z)))
+            .collect();
+        points.extend([Vec3::zeros(), Vec3::z() * length]);
+        let triangles = (0..8).flat_map(|k| {
+            let next = (k + 1) % 8;
+            let side = |r: u32| {
+                [
+                    [8 * r + k, 8 * r + next, 8 * r + 8 + k],
+                    [8 * r + next, 8 * r + 8 + next, 8 * r + 8 + k],
+                ]
+            };
+            let ends = [[24, next, k], [25, 16 + k, 16 + next]];
+            side(0).into_iter().chain(side(1)).chain(ends)
+        });
+        Surface {
+            triangles: triangles.collect(),
+            points,
+        }
+    }
+
+    #[test]
+    fn a_limb_that_was_cut_off_is_pressed_on_its_skin() {
+        // Wider than long, as a slice of a calf.
+        for length in [0.1, 0.3] {
+            let top = top_of(
+                &tube(length, 0.07),
+                [Vec3::new(-0.07, -0.07, 0.0), Vec3::new(0.07, 0.07, length)],
+            );
+            let top = top.unwrap();
+            assert!(
+                (top.xy().norm() - 0.07).abs() < 1e-9 && top.y < -0.06,
+                "{top:?}"
+            );
+            assert!((top.z - 0.5 * length).abs() < 0.2 * length, "{top:?}");
+        }
+    }
 }
