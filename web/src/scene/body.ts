@@ -34,7 +34,7 @@ export class Body {
   readonly bonePositions: Float32Array;
   readonly boneTriangles: Uint32Array;
   /** Smooth normals of the bones, three numbers a point. */
-  readonly boneNormals: ArrayLike<number>;
+  readonly boneNormals: Float32Array;
   readonly box = new Box3();
   readonly centre = new Vector3();
   readonly radius: number;
@@ -132,12 +132,12 @@ function areEqual(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
   return true;
 }
 
-function smoothNormals(positions: Float32Array, triangles: Uint32Array): ArrayLike<number> {
+function smoothNormals(positions: Float32Array, triangles: Uint32Array): Float32Array {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(positions, 3));
   geometry.setIndex(new BufferAttribute(triangles, 1));
   geometry.computeVertexNormals();
-  return geometry.getAttribute('normal').array;
+  return geometry.getAttribute('normal').array as Float32Array;
 }
 
 /** Two triangles for every interval between two levels at every open edge. */

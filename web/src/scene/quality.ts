@@ -23,9 +23,9 @@ const GIVEN_UP = 2000;
 const LONGEST = 150;
 /** In software WebGL, the pause after a picture, in times that it took. */
 const PAUSE = 0.5;
-/** Pictures that follow each other more slowly, because the engine was late: at most this many times, for at
+/** Pictures that follow each other more slowly, because the engine was late: their pauses are so many times longer, for at
  * least this time after it was late last, ms. */
-const MOST_YIELD = 1.5;
+const YIELD = 1.5;
 const YIELD_MS = 6000;
 /** While pictures yield, the least pause between two, ms; it grows with them. */
 const YIELD_PAUSE = 20;
@@ -106,7 +106,7 @@ export class Quality {
   yield(now: number): void {
     if (!this.mayYield || now - this.yieldedAt < YIELD_WAIT) return;
     this.yieldedAt = now;
-    this.setYield(Math.min(2 * this.yielded, MOST_YIELD));
+    this.setYield(YIELD);
   }
 
   /** Pictures as before, whether the engine is late or not. */
@@ -144,8 +144,7 @@ export class Quality {
    * follow each other. `isHeld`: the tool presses, and the engine needs the processor that draws. */
   begin(isRefinement: boolean, isHeld: boolean, now: number): Detail {
     if (this.yielded > 1 && now - this.yieldedAt > YIELD_MS) {
-      this.yieldedAt = now;
-      this.setYield(this.yielded / 2);
+      this.setYield(1);
     }
     this.isHeld = isHeld && this.isSoftware;
     this.isFull = isRefinement || (this.step === 0 && !this.isSoftware);

@@ -122,7 +122,7 @@ export class Surfaces {
     geometry.setAttribute('rest', position);
     geometry.setAttribute('value', new BufferAttribute(new Float32Array(this.body.bonePositions.length / 3), 1));
     geometry.setIndex(new BufferAttribute(this.body.boneTriangles, 1));
-    geometry.setAttribute('normal', new BufferAttribute(Float32Array.from(this.body.boneNormals), 3));
+    geometry.setAttribute('normal', new BufferAttribute(this.body.boneNormals, 3));
     this.geometries.push(geometry);
     return this.add('bones', geometry);
   }

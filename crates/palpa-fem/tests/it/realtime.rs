@@ -377,7 +377,7 @@ fn the_mesh_of_the_place_that_a_tool_flies_to_is_made_meanwhile() {
     assert!(far > 0);
 }
 
-/// A hand never holds still to the bit. While it stays within a micrometre, a body in equilibrium has nothing to do; a
+/// A hand never stays at exactly the same place. While it stays within a micrometre, a body in equilibrium has nothing to do; a
 /// hand that creeps is followed all the same.
 #[test]
 fn a_tool_that_stays_within_a_micrometre_needs_no_iterations() {

@@ -103,6 +103,21 @@ fn tense() -> SceneText {
         .motion("press", 2.0)
 }
 
+/// The input of a step of 5 ms with one tool.
+fn input(number: u64, pose: Pose) -> TissueInput {
+    TissueInput {
+        step: number,
+        tick: number,
+        sampled_at: 0.0,
+        now: 0.0,
+        dt: 5e-3,
+        period: 5e-3,
+        poses: [pose; MAX_TOOLS],
+        n_tools: 1,
+        aim: None,
+    }
+}
+
 #[test]
 fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
     let scene = parse(&tense());
@@ -117,17 +132,7 @@ fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
     let mut patch = empty_patch();
     let mut step = |number: u64, depth: f64| {
         let z = -(scene.motion.above + depth);
-        let input = TissueInput {
-            step: number,
-            tick: number,
-            sampled_at: 0.0,
-            now: 0.0,
-            dt: 5e-3,
-            period: 5e-3,
-            poses: [Pose::translation(0.0, 0.0, z); MAX_TOOLS],
-            n_tools: 1,
-            aim: None,
-        };
+        let input = input(number, Pose::translation(0.0, 0.0, z));
         tissue.step(&input, &mut patch);
         if let Some(job) = tissue.take_job() {
             let done = palpa::live::LiveTissue::run(job);
@@ -163,17 +168,7 @@ fn the_dent_goes_with_a_tool_that_waits_for_its_zone() {
     let mut patch = empty_patch();
     let down = -(scene.motion.above + 3e-3);
     let mut step = |number: u64, x: f64, z: f64| {
-        let input = TissueInput {
-            step: number,
-            tick: number,
-            sampled_at: 0.0,
-            now: 0.0,
-            dt: 5e-3,
-            period: 5e-3,
-            poses: [Pose::translation(x, 0.0, z); MAX_TOOLS],
-            n_tools: 1,
-            aim: None,
-        };
+        let input = input(number, Pose::translation(x, 0.0, z));
         let status = tissue.step(&input, &mut patch).status;
         let pressed = patch.contacts[..patch.n_contacts].iter();
         let (force, middle) = pressed.fold((0.0, 0.0), |(force, middle), contact| {

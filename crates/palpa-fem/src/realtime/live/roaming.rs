@@ -141,7 +141,9 @@ struct Moved {
     live: Box<Live>,
     carry: Carry,
     then: Come,
+    /// As [`Move::was_beyond`].
     was_beyond: bool,
+    /// Whether the exterior has its own stiffness.
     has_own: bool,
     lag: f64,
 }
@@ -175,21 +177,15 @@ impl Move {
             let come = come.nearer_to(&rest, share);
             self.settled(come, Arc::clone(&rest))
         })?;
-        let has_own = self.come.is_at_rest() || self.needs_own();
         Some(Box::new(Moved {
             place: self.place,
             live,
             carry,
             then: self.come,
             was_beyond: self.was_beyond,
-            has_own,
+            has_own: !self.is_stroke,
             lag: self.lag,
         }))
-    }
-
-    /// Whether the exterior gets its own stiffness before the new mesh takes over.
-    fn needs_own(&self) -> bool {
-        !self.come.is_at_rest() && !self.is_stroke
     }
 
     /// The body on the new mesh in equilibrium with the tools, found from a state near it.
@@ -207,7 +203,7 @@ impl Move {
         // unbalanced forces, N; infinite before the first. At last it gets its own stiffness, without which forces were up
         // to 16 % too large as soon as the tools went deeper. A stroke cannot wait for that: its next zone brings it.
         let mut outside = f64::INFINITY;
-        let mut is_own = !self.needs_own();
+        let mut is_own = self.come.is_at_rest() || self.is_stroke;
         for round in 1..=MOST_SETTLING {
             let report = live.step(&self.tools, 0.0);
             live.take_back_job();
@@ -597,7 +593,7 @@ impl Roaming {
         (is_nearer && is_new).then_some(place)
     }
 
-    /// The first zone on a new mesh: that of what is pressed now, or will be.
+    /// Centres and radii of the first zone on a new mesh, m: where the tools press, or where the first will touch.
     fn zone_on_new_mesh(&self) -> (Centres, [f64; 2]) {
         let (centres, radii) = self.live.present_zone();
         let Some(aim) = self.aim.filter(|_| self.is_in_air()) else {

@@ -16,7 +16,7 @@ const LOST: f64 = 0.6;
 const MOST_AT_RING: f64 = 0.25;
 
 /// Tools that stay within this distance of where they were, m, have not moved; the force of a fingertip changes by less
-/// than a millinewton there. A hand that holds still stays within it, and to the bit it never stands still.
+/// than a millinewton there. A hand that holds still stays within it, but never at exactly the same place.
 const SAME_PLACE: f64 = 1e-6;
 /// The same for their turns: sine of the angle, for tools of some centimetres.
 const SAME_TURN: f64 = 3e-5;
