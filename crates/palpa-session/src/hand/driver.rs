@@ -22,13 +22,13 @@ pub(crate) const HOVER: f64 = 6e-3;
 /// The same on the way between two places that are pressed, m.
 const LOW: f64 = 2e-3;
 /// Speeds, m/s: into the skin, along it while pressing, and in the air.
-const PRESS_SPEED: f64 = 0.04;
+const PRESS_SPEED: f64 = 0.025;
 const STROKE_SPEED: f64 = 0.06;
 const AIR_SPEED: f64 = 0.4;
 /// Speed towards the skin and away from it in the air, m/s, and the height above it at which the hand slows
 /// down to the speed of a press, m.
-const FALL_SPEED: f64 = 0.15;
-const SLOW_BELOW: f64 = 1e-3;
+const FALL_SPEED: f64 = 0.3;
+const SLOW_BELOW: f64 = 0.5e-3;
 /// Distance above which the hand lifts to go to a place, m.
 const STRIDE: f64 = 15e-3;
 /// A lifted hand glides close over the skin to places that are nearer than this, m, and whose normals differ by
@@ -275,17 +275,16 @@ impl HandDriver {
     }
 }
 
-/// A depth that moves from one to another for `dt` seconds, m.
+/// A depth that moves from one to another for `dt` seconds, m. It falls to a little above the skin, and goes on at the
+/// speed of a press.
 fn approached(from: f64, to: f64, dt: f64) -> f64 {
-    let is_in_air = from < -SLOW_BELOW || (from <= 0.0 && to < from);
-    let speed = if is_in_air { FALL_SPEED } else { PRESS_SPEED };
-    // It does not fall into the skin in one step.
-    let slowed = if from < -SLOW_BELOW {
-        to.min(-SLOW_BELOW)
-    } else {
-        to
-    };
-    from + (slowed - from).clamp(-speed * dt, speed * dt)
+    if to < from {
+        let speed = if from > 0.0 { PRESS_SPEED } else { FALL_SPEED };
+        return (from - speed * dt).max(to);
+    }
+    let fallen = (from + FALL_SPEED * dt).min(to.min(from.max(-SLOW_BELOW)));
+    let left = dt - (fallen - from) / FALL_SPEED;
+    (fallen + PRESS_SPEED * left).min(to)
 }
 
 fn is_outside(skin: &Skin, at: Vec3) -> bool {
@@ -373,7 +372,7 @@ mod tests {
         for _ in 0..60 {
             let pose = hand.advance(&skin, DT, Vec3::zeros());
             let way = pose.translation.vector - before.translation.vector;
-            // Fast in the air, and at the speed of a press from a millimetre above the skin.
+            // Fast in the air, and at the speed of a press from a little above the skin.
             let above = place.normal.dot(&(before.translation.vector - place.point));
             let speed = if above > SLOW_BELOW + 1e-9 {
                 FALL_SPEED

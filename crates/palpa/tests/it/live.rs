@@ -8,7 +8,7 @@ use palpa::live::{LiveScene, SpringScene};
 use palpa::press::tissue::Indentation;
 use palpa::scene::Scene;
 use palpa_rt::{StepStatus, Tissue, TissueInput, empty_patch};
-use palpa_servo::{MAX_TOOLS, Pose};
+use palpa_servo::{ContactPatch, MAX_TOOLS, Pose, Vec3};
 use palpa_testkit::{Layer, Scene as SceneText, Value};
 
 fn block() -> SceneText {
@@ -206,4 +206,81 @@ fn the_dent_goes_with_a_tool_that_waits_for_its_zone() {
         }
     }
     assert!(held_at.is_some_and(|x| x < 0.015), "{held_at:?}");
+}
+
+/// The force (N) of a patch's local model along its first normal when the tool goes on by `way`, m, without friction.
+fn force_further_on(patch: &ContactPatch, way: Vec3) -> f64 {
+    let pose = patch.tools[0].pose;
+    let contacts = &patch.contacts[..patch.n_contacts];
+    let normals: Vec<Vec3> = contacts.iter().map(|c| pose.rotation * c.normal).collect();
+    let along = |i: usize, j: usize| normals[i].dot(&(patch.block(i, j) * normals[j]));
+    let gaps: Vec<f64> = (contacts.iter().zip(&normals))
+        .map(|(contact, normal)| {
+            let surface = pose.transform_point(&contact.surface.into()).coords + way;
+            normal.dot(&(contact.position - surface))
+        })
+        .collect();
+    let mut forces = vec![0.0; contacts.len()];
+    for _ in 0..2000 {
+        for i in 0..contacts.len() {
+            let moved: f64 = (0..contacts.len()).map(|j| along(i, j) * forces[j]).sum();
+            forces[i] = (forces[i] - (gaps[i] + moved) / along(i, i)).max(0.0);
+        }
+    }
+    forces.iter().zip(&normals).map(|(f, n)| f * -n.z).sum()
+}
+
+/// Where the tissue has no core for a while, the hand feels the local model of the time before the first touch, also
+/// where the triangles are large because the fine mesh is elsewhere.
+#[test]
+fn a_first_touch_is_felt_right_before_the_tissue_has_seen_it() {
+    let scene = SceneText::soft_over_stiff([160.0, 80.0, 24.0], 8.0, 8.0, 10.0)
+        .sphere(8.0)
+        .press(3.0)
+        .near_tool(4.0)
+        .motion("press", 3.0);
+    let scene = parse(&scene);
+    let live = LiveScene::build(&scene).unwrap();
+    const GAP: f64 = 0.1e-3;
+    // In the fine part and outside it, with the tool over vertices, edges and faces.
+    for (xs, worst) in [([0.0, 1.5e-3, 3e-3], 0.7), ([45e-3, 47.5e-3, 52e-3], 1.0)] {
+        let (mut sum, mut n) = (0.0, 0);
+        for (x, y) in xs.into_iter().flat_map(|x| [(x, 0.0), (x, 2.3e-3)]) {
+            let mut tissue = live.tissue().unwrap();
+            let mut patch = empty_patch();
+            let mut number = 0;
+            let mut step = |height: f64, patch: &mut ContactPatch| {
+                number += 1;
+                let pose = Pose::translation(x, y, height - scene.motion.above);
+                tissue.step(&input(number, pose), patch);
+                tissue.force(0).z
+            };
+            for k in (0..20).rev() {
+                step(GAP + 0.05e-3 * f64::from(k), &mut patch);
+            }
+            let before = patch.clone();
+            assert!(
+                before.contacts[..before.n_contacts]
+                    .iter()
+                    .all(|c| c.force == Vec3::zeros())
+            );
+            for k in 1..=30 {
+                let depth = 0.05e-3 * f64::from(k);
+                let tissue = step(-depth, &mut patch);
+                if k % 10 == 0 {
+                    let felt = force_further_on(&before, -Vec3::z() * (GAP + depth));
+                    let ratio = felt / tissue;
+                    assert!(
+                        (ratio - 1.0).abs() < worst,
+                        "{x} {y}: {felt} N for {tissue} N at {depth}"
+                    );
+                    sum += ratio;
+                    n += 1;
+                }
+            }
+        }
+        let mean = sum / f64::from(n);
+        println!("{mean}");
+        assert!((mean - 1.0).abs() < 0.2, "{mean}");
+    }
 }

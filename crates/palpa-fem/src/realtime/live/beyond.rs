@@ -53,6 +53,11 @@ impl Beyond {
         }
     }
 
+    /// Called when tools are taken back: they are to come to their targets in the next steps.
+    pub(super) fn take_back_tools(&mut self) {
+        self.catching_up = MOST_CATCHING_UP;
+    }
+
     /// Counts a step. Returns whether tools that were taken back are still on their way to their targets, which they
     /// stay `is_short` of.
     pub(super) fn is_catching_up(&mut self, is_short: bool) -> bool {
@@ -148,7 +153,7 @@ impl Live {
             let back = along.normalize() * (depth - MOST_TAKEN_UP);
             self.course.tools[t].pose.translation.vector -= back;
             self.recovery.pace = self.recovery.pace.min(EASY_PACE);
-            self.beyond.catching_up = MOST_CATCHING_UP;
+            self.beyond.take_back_tools();
         }
         self.course.clearance = 0.0;
         self.load_exterior();

@@ -117,7 +117,14 @@ impl Live {
         }
         self.problem.clear();
         self.problem.candidates.clone_from(&good.candidates);
-        self.course.tools.copy_from_slice(&good.tools);
+        if self.problem.pressing().next().is_some() {
+            self.course.tools.copy_from_slice(&good.tools);
+        } else {
+            // They may have been far away in the air then. The way from there to where they press now leads through the
+            // body, so they come down anew.
+            self.lift_tools();
+        }
+        self.beyond.take_back_tools();
         self.course.clearance = 0.0;
         self.springs.take_off();
         self.forget_forces();
@@ -138,7 +145,7 @@ impl Live {
         self.keep_good();
     }
 
-    /// Lifts the tools off the zone's skin.
+    /// Lifts the tools off the skin.
     fn lift_tools(&mut self) {
         let (model, displacements) = (&self.model, &self.state.displacements);
         let tools = &mut self.course.tools;
@@ -147,8 +154,7 @@ impl Live {
         let outward = body.positions[body.node(vertex, 0)] - body.positions[body.node(vertex, 1)];
         let step = outward.normalize() * LIFT;
         for _ in 0..MOST_LIFTS {
-            let among = Some(&*self.plan.vertices);
-            let (gap, _) = nearest_vertex(model, displacements, tools, among);
+            let (gap, _) = nearest_vertex(model, displacements, tools, None);
             if gap > 0.0 {
                 break;
             }
@@ -156,5 +162,64 @@ impl Live {
                 tool.pose.translation.vector += step;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use palpa_mesh::generate::{Diagonal, Grid, LevelStack, mapped_grid};
+
+    use super::super::LiveParams;
+    use super::*;
+    use crate::law::NeoHookean;
+    use crate::shape::{Pose, Sphere, Tool};
+    use crate::{Material, Materials, Model, ModelParams, Supports};
+
+    /// A body that came to another mesh while its tool was on its way in the air may not get along with where the tool
+    /// presses meanwhile. From where the tool was in the air, the way there leads through the body.
+    #[test]
+    fn a_tool_that_was_far_away_in_the_air_comes_down_anew_where_it_presses() {
+        let grid = Grid {
+            n_cells: [13, 13],
+            diagonal: Diagonal::Alternate,
+            jitter: None,
+        };
+        let levels = LevelStack {
+            depths: vec![0.0, 10e-3, 20e-3],
+            interval_layer: vec![0, 0],
+        };
+        let place = |u: f64, v: f64| Vec3::new(0.06 * (u - 0.5), 0.06 * (v - 0.5), 0.0);
+        let body = mapped_grid(&grid, place, &levels);
+        let law = NeoHookean::from_young(10e3, 0.45).unwrap();
+        let materials = Materials::of_layers(vec![Material::new("gel", law)]);
+        let supports = Supports::on_base(&body);
+        let model = Model::build(&body, &materials, &supports, ModelParams::default()).unwrap();
+        let tool = Tool::new(Sphere::new(8e-3).unwrap(), 0.0).unwrap();
+        let at = |x: f64, z: f64| {
+            let pose = Pose::translation(x, 0.0, z);
+            [PosedTool { tool, pose }]
+        };
+        let (in_air, pressed) = (at(-12e-3, 6e-3), at(8e-3, -2e-3));
+        let mut live = Live::new(Arc::new(model), &in_air, LiveParams::default()).unwrap();
+        live.course.tools.copy_from_slice(&pressed);
+        assert_eq!(live.recover(), StepOutcome::Held);
+        let lifted = live.course.tools[0].pose.translation.vector;
+        assert!((lifted.x - 8e-3).abs() < 0.5e-3, "{lifted}");
+        assert!((0.0..2.5e-3).contains(&lifted.z), "{lifted}");
+        // Until it is back its force is too small, and the steps say so.
+        let mut n_short = 0;
+        for _ in 0..30 {
+            let report = live.step(&pressed, 0.002);
+            let is_short = live.course.tools[0].pose != pressed[0].pose;
+            assert_eq!(report.is_catching_up, is_short);
+            n_short += u32::from(is_short);
+            if let Some(job) = live.take_job() {
+                live.install(job.run());
+            }
+        }
+        assert!((1..10).contains(&n_short), "{n_short}");
+        assert!(live.tool_force(0).z > 0.02, "{}", live.tool_force(0));
     }
 }
