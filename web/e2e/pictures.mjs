@@ -11,9 +11,9 @@ const folder = resolve(process.argv[2] ?? 'pictures');
 const frames = join(folder, 'frames');
 mkdirSync(frames, { recursive: true });
 
-/** Rows of strokes over the lump, in shares of the picture's height, and their ends, in shares of its width. */
-const ROWS = [0.36, 0.385, 0.41, 0.435, 0.46];
-const ENDS = [0.43, 0.66];
+/** Rows of strokes over the lump as seen from above, 6 mm apart, in shares of the picture's height, and their ends, in shares of its width. */
+const ROWS = [0.455, 0.476, 0.497, 0.518, 0.539];
+const ENDS = [0.42, 0.66];
 /** Moves of a stroke, and time between two of them, ms. */
 const MOVES = 36;
 const STEP = 60;
@@ -36,6 +36,8 @@ try {
 
   await palpa.choose('forearm_lump');
   await palpa.tab('view');
+  await palpa.by('view-top').click();
+  await pause(1500);
   let n = 0;
   const keep = () => page.screenshot({ path: join(frames, `${String(n++).padStart(4, '0')}.png`), clip: { x: 361, y: 48, width: 919, height: 672 } });
   for (const [row, y] of ROWS.entries()) {
@@ -55,9 +57,11 @@ try {
   await keep();
   await shot('viewer_map');
 
+  await palpa.by('view-home').click();
+  await pause(1500);
   await palpa.by('cutaway-toggle').check();
   await palpa.by('cutaway-axis-tool').click();
-  await palpa.press(0.545, 0.41);
+  await palpa.press(0.535, 0.41);
   await palpa.steady(0.02);
   await pause(2500);
   await shot('viewer_cutaway');
@@ -72,13 +76,24 @@ try {
   await palpa.by('game-seed').fill('4');
   await palpa.by('game-start').click();
   await palpa.by('game-bar').waitFor();
-  for (const [x, y] of [[0.4, 0.42], [0.5, 0.45], [0.6, 0.4]]) {
-    await palpa.press(x, y);
-    await palpa.steady(0.03);
+  await palpa.by('game-reveal').click();
+  await viewer.running('it is shown', ({ game }) => game?.result != null);
+  await pause(4000);
+  // Played again, the lump is at the same place, where the camera looks now.
+  await palpa.by('game-same-seed').click();
+  await viewer.running('it is hidden again', ({ game }) => game != null && game.result == null);
+  await palpa.atRest();
+  for (const y of [0.42, 0.47, 0.52, 0.57]) {
+    await palpa.press(0.38, y);
+    await palpa.reads('a force', ({ newtons }) => newtons > 0.1);
+    for (let k = 0; k <= MOVES; k++) {
+      await page.mouse.move(...(await palpa.at(0.38 + (0.24 * k) / MOVES, y)));
+      await pause(STEP);
+    }
     await palpa.release();
   }
   await palpa.by('game-mark-mode').click();
-  await page.mouse.click(...(await palpa.at(0.52, 0.43)));
+  await page.mouse.click(...(await palpa.at(0.515, 0.51)));
   await until('it is marked', async () => ((await viewer.state()).game?.marks.length ?? 0) === 1);
   await palpa.by('game-reveal').click();
   await viewer.running('it is shown', ({ game }) => game?.result != null);
