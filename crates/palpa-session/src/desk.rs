@@ -311,7 +311,7 @@ impl Desk {
 
     /// Refuses a change of the scene when it would spoil a game or a recording.
     fn check_may_change(&self) -> anyhow::Result<()> {
-        if self.game.is_some() {
+        if self.game.as_ref().is_some_and(|game| !game.is_revealed()) {
             bail!("the scene cannot be changed while lumps are hidden; end the game first");
         }
         if self.tape.is_under_way() {
@@ -320,8 +320,10 @@ impl Desk {
         Ok(())
     }
 
-    /// Builds the scene that is wanted now.
+    /// Builds the scene that is wanted now. A game whose lumps are revealed ends.
     fn follow(&mut self) {
+        self.game = None;
+        self.hidden = None;
         self.tape.close();
         if self.end_motion() {
             self.status

@@ -2,7 +2,7 @@
 
 import { useEffect } from 'preact/hooks';
 import { t } from '../i18n';
-import { askAloud, isController, notify, state } from '../store';
+import { askAloud, isController, isHiding, notify, state } from '../store';
 import { Button } from './controls';
 import { Icon } from './icons';
 
@@ -12,7 +12,7 @@ type Way = 'undo' | 'redo';
 function hindrance(): string | null {
   const now = state.value;
   if (!isController.value) return t('undo.not_in_control');
-  if (now?.game != null) return t('undo.in_game');
+  if (isHiding.value) return t('undo.in_game');
   if (now?.recording.is_recording) return t('undo.in_recording');
   return null;
 }

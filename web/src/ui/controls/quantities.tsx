@@ -38,7 +38,9 @@ export function QuantityField(props: {
   // If the body could not be built, the field shows the old value again.
   const isBuilding = state.value?.phase === 'building';
   useEffect(() => {
-    if (!isBuilding && !isSliding && draft !== null && draft === committed.current) setDraft(null);
+    if (isBuilding || isSliding || draft === null || draft !== committed.current) return;
+    setDraft(null);
+    setError(null);
   }, [isBuilding]);
   const commitLatest = useLatest(props.onCommit, setError);
 
@@ -55,7 +57,7 @@ export function QuantityField(props: {
     committed.current = written;
     setError(await props.onCommit(written));
   };
-  const current = parseQuantity(shown, props.dimension) ?? parseQuantity(props.value, props.dimension);
+  const current = (error === null ? parseQuantity(shown, props.dimension) : null) ?? parseQuantity(props.value, props.dimension);
   return (
     <div class={`row quantity ${error !== null ? 'refused' : ''}`}>
       <label for={id} title={props.hint}>{props.label}</label>
