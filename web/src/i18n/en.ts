@@ -91,7 +91,7 @@ export const en = {
   'readout.above': '{height} above the skin',
   'readout.spoken': 'Force {force}, depth {depth}',
   'readout.spoken_above': 'Force {force}, {depth}',
-  'readout.deepest': 'maximum depth here',
+  'readout.deepest': 'deepest here',
   'readout.bar_at': 'mesh error, probed at {depth}',
   'readout.bar_unknown': 'mesh error: not known here yet',
   'readout.bar_failed': 'no mesh error at {depth}: {why}',
