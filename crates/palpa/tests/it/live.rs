@@ -230,6 +230,9 @@ fn force_further_on(patch: &ContactPatch, way: Vec3) -> f64 {
     forces.iter().zip(&normals).map(|(f, n)| f * -n.z).sum()
 }
 
+/// Gap between tool and skin when the tissue sees them last before the touch, m.
+const GAP: f64 = 0.1e-3;
+
 /// Where the tissue has no core for a while, the hand feels the local model of the time before the first touch, also
 /// where the triangles are large because the fine mesh is elsewhere.
 #[test]
@@ -241,7 +244,6 @@ fn a_first_touch_is_felt_right_before_the_tissue_has_seen_it() {
         .motion("press", 3.0);
     let scene = parse(&scene);
     let live = LiveScene::build(&scene).unwrap();
-    const GAP: f64 = 0.1e-3;
     // In the fine part and outside it, with the tool over vertices, edges and faces.
     for (xs, worst) in [([0.0, 1.5e-3, 3e-3], 0.7), ([45e-3, 47.5e-3, 52e-3], 1.0)] {
         let (mut sum, mut n) = (0.0, 0);
