@@ -402,6 +402,10 @@ impl Desk {
             && self.stage.live().is_some()
         {
             self.history.give_up(present);
+            // The body that stays has the lumps of a game that has ended.
+            if std::mem::take(&mut self.has_hidden) {
+                self.build();
+            }
         }
     }
 

@@ -153,16 +153,21 @@ fn a_press_of_tense_skin_has_the_force_of_a_scripted_press() {
     assert!((force / expected - 1.0).abs() < 0.01, "{force} {expected}");
 }
 
-/// The background never gets a core, so the body holds the tool at the edge of its zone. What the hand feels must go
-/// with the hand, and not stay behind.
-#[test]
-fn the_dent_goes_with_a_tool_that_waits_for_its_zone() {
-    let scene = SceneText::soft_over_stiff([120.0, 60.0, 24.0], 8.0, 8.0, 10.0)
+/// A block much wider than the fine part of its mesh, mm.
+fn wide(size: [f64; 3]) -> Scene {
+    let scene = SceneText::soft_over_stiff(size, 8.0, 8.0, 10.0)
         .sphere(8.0)
         .press(3.0)
         .near_tool(4.0)
         .motion("press", 3.0);
-    let scene = parse(&scene);
+    parse(&scene)
+}
+
+/// The background never gets a core, so the body holds the tool at the edge of its zone. What the hand feels must go
+/// with the hand, and not stay behind.
+#[test]
+fn the_dent_goes_with_a_tool_that_waits_for_its_zone() {
+    let scene = wide([120.0, 60.0, 24.0]);
     let live = LiveScene::build(&scene).unwrap();
     let mut tissue = live.tissue().unwrap();
     let mut patch = empty_patch();
@@ -237,12 +242,7 @@ const GAP: f64 = 0.1e-3;
 /// where the triangles are large because the fine mesh is elsewhere.
 #[test]
 fn a_first_touch_is_felt_right_before_the_tissue_has_seen_it() {
-    let scene = SceneText::soft_over_stiff([160.0, 80.0, 24.0], 8.0, 8.0, 10.0)
-        .sphere(8.0)
-        .press(3.0)
-        .near_tool(4.0)
-        .motion("press", 3.0);
-    let scene = parse(&scene);
+    let scene = wide([160.0, 80.0, 24.0]);
     let live = LiveScene::build(&scene).unwrap();
     // In the fine part and outside it, with the tool over vertices, edges and faces.
     for (xs, worst) in [([0.0, 1.5e-3, 3e-3], 0.7), ([45e-3, 47.5e-3, 52e-3], 1.0)] {
